@@ -1,0 +1,77 @@
+"""The compute device: one Quadrants runtime per process, started on first use.
+
+Quadrants is imported here and in the kernel modules only, never by ``import cagefield``.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Literal, get_args
+
+
+from cagefield.errors import DeviceError
+
+DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
+
+_started: str | None = None
+
+
+def start(device: str = "auto") -> str:
+    """The name of the running device: "cpu", "cuda", "metal" or "vulkan".
+
+    The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes
+    CUDA or Metal where there is one, else the CPU.
+
+    Raises:
+        DeviceError: an unknown name, a device this machine lacks, or a second, different device.
+    """
+    global _started
+    if device not in get_args(DeviceName):
+        raise DeviceError(f"device {device!r} is unknown; choose one of {', '.join(get_args(DeviceName))}")
+    if _started is not None:
+        if device not in ("auto", _started):
+            raise DeviceError(
+                f"device {device!r} cannot be started: this process already runs on {_started!r}; "
+                "start a new process for another device"
+            )
+        return _started
+    os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
+    import quadrants as qd
+
+    archs: dict[str, Any] = {"cpu": qd.cpu, "cuda": qd.cuda, "metal": qd.metal, "vulkan": qd.vulkan}
+    if device == "auto":
+        chosen = next((name for name in ("cuda", "metal") if _supported(archs[name])), "cpu")
+    elif device == "cpu" or _supported(archs[device]):
+        chosen = device
+    else:
+        raise DeviceError(f'device {device!r} is not available on this machine; use device="cpu" or "auto"')
+    try:
+        qd.init(arch=archs[chosen], offline_cache=True, log_level="error", enable_fallback=False)
+    except Exception as error:
+        raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
+    _started = chosen
+    return chosen
+
+
+def current() -> str | None:
+    """The name of the running device, or None before `start`."""
+    return _started
+
+
+def is_gpu() -> bool:
+    """True where kernels run on a GPU; starts the default device if none runs yet."""
+    return start() != "cpu"
+
+
+def threads() -> int:
+    """Number of CPU threads that kernels use."""
+    try:
+        return max(1, len(os.sched_getaffinity(0)))
+    except AttributeError:
+        return max(1, os.cpu_count() or 1)
+
+
+def _supported(arch: Any) -> bool:
+    from quadrants.lang.misc import is_arch_supported
+
+    return bool(is_arch_supported(arch))
