@@ -1,5 +1,56 @@
-"""cagefield: edit the geometry of a captured radiance field with two nested cages."""
+"""cagefield: edit the geometry of a captured radiance field with two nested cages.
+
+The names below are imported on first use, so that `import cagefield` stays quick and loads no compute runtime.
+"""
 
 from __future__ import annotations
 
+import importlib
+from typing import TYPE_CHECKING
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from cagefield.cages import Cage as Cage
+    from cagefield.cameras import Camera as Camera
+    from cagefield.cameras import turntable as turntable
+    from cagefield.datasets.dataset import Dataset as Dataset
+    from cagefield.datasets.dataset import load_dataset as load_dataset
+    from cagefield.edits import Edit as Edit
+    from cagefield.edits import EditStack as EditStack
+    from cagefield.edits.files import load_edits as load_edits
+    from cagefield.edits.files import save_edits as save_edits
+    from cagefield.errors import CagefieldError as CagefieldError
+    from cagefield.fields.voxel import VoxelField as VoxelField
+    from cagefield.rendering.frame import Frame as Frame
+    from cagefield.scene import Scene as Scene
+
+_HOME = {
+    "Cage": "cagefield.cages",
+    "CagefieldError": "cagefield.errors",
+    "Camera": "cagefield.cameras",
+    "Dataset": "cagefield.datasets.dataset",
+    "Edit": "cagefield.edits",
+    "EditStack": "cagefield.edits",
+    "Frame": "cagefield.rendering.frame",
+    "Scene": "cagefield.scene",
+    "VoxelField": "cagefield.fields.voxel",
+    "load_dataset": "cagefield.datasets.dataset",
+    "load_edits": "cagefield.edits.files",
+    "save_edits": "cagefield.edits.files",
+    "turntable": "cagefield.cameras",
+}
+
+
+def __getattr__(name: str) -> object:
+    """The exported object `name`, imported from its own module the first time it is asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'cagefield' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The module's public names, loaded or not."""
+    return sorted({"__version__", *_HOME})

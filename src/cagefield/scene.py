@@ -1,0 +1,288 @@
+"""Scene: a trained field, the edits on it and the cameras it was seen by; a folder on disk.
+
+    SCENE/
+      field.safetensors   the VoxelField, in canonical space
+      edits.yaml          the edit stack, as a person would write it
+      cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
+      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b]}
+
+A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
+a half of each.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.edits.files import load_edits, save_edits
+from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.voxel import VoxelField
+
+if TYPE_CHECKING:
+    from cagefield.rendering.frame import Frame
+    from cagefield.rendering.march import Renderer
+
+Background = tuple[float, float, float]
+
+FORMAT = "cagefield-scene"
+VERSION = 1
+WHITE: Background = (1.0, 1.0, 1.0)
+BLACK: Background = (0.0, 0.0, 0.0)
+
+_FIELD, _EDITS, _CAMERAS, _MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
+_FILES = (_FIELD, _EDITS, _CAMERAS, _MANIFEST)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
+
+    The field stays as it was trained; the edits are applied when it is rendered.
+
+    Raises:
+        SceneError: a background outside [0, 1], or a version this cagefield does not write.
+    """
+
+    field: VoxelField
+    edits: EditStack = field(default_factory=lambda: EditStack([]))
+    cameras: Mapping[str, tuple[Camera, ...]] = field(default_factory=dict)
+    background: Background = WHITE
+    version: int = VERSION
+
+    def __post_init__(self) -> None:
+        cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
+        object.__setattr__(self, "cameras", MappingProxyType(cameras))
+        object.__setattr__(self, "background", _checked_background(self.background))
+        if self.version != VERSION:
+            raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
+
+    @classmethod
+    def open(cls, path: Path | str) -> Scene:
+        """The scene in the folder `path`.
+
+        Raises:
+            SceneError: the folder or one of its files is missing, damaged or of a newer version; the message
+                names the file and the cure.
+        """
+        folder = Path(path)
+        if not folder.is_dir():
+            what = "is a file, not a folder" if folder.exists() else "does not exist"
+            raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
+        background = _read_manifest(folder)
+        for name in (_FIELD, _CAMERAS, _EDITS):
+            if not (folder / name).is_file():
+                raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
+        cameras = _read_cameras(folder / _CAMERAS)
+        edits = load_edits(folder / _EDITS)
+        return cls(VoxelField.load(folder / _FIELD), edits, cameras, background)
+
+    def save(self, path: Path | str, overwrite: bool = False) -> None:
+        """Writes the scene folder `path`, complete or not at all.
+
+        With `overwrite` a scene that is there is replaced once the new one is complete; other files in its
+        folder are kept.
+
+        Raises:
+            SceneError: something else is there, or a scene and no `overwrite`.
+        """
+        target = check_destination(path, overwrite)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        staging = _sibling(target, "new")
+        staging.mkdir()
+        try:
+            self.field.save(staging / _FIELD)
+            save_edits(self.edits, staging / _EDITS)
+            _write_json(
+                {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
+                staging / _CAMERAS,
+            )
+            manifest = {"format": FORMAT, "version": self.version, "background": list(self.background)}
+            _write_json(manifest, staging / _MANIFEST)
+            _swap(staging, target)
+        except BaseException:
+            shutil.rmtree(staging, ignore_errors=True)
+            raise
+
+    def with_edits(self, edits: EditStack) -> Scene:
+        """The same scene under another edit stack."""
+        return replace(self, edits=edits)
+
+    def with_cameras(self, cameras: Mapping[str, tuple[Camera, ...]]) -> Scene:
+        """The same scene with other cameras."""
+        return replace(self, cameras=cameras)
+
+    def render(
+        self,
+        camera: Camera,
+        *,
+        background: Background | None = None,
+        normals: bool = False,
+        exact: bool = False,
+    ) -> Frame:
+        """The edited scene seen by `camera`, on the scene's own background unless another is given.
+
+        The fused renderer is kept between calls. `exact` takes the plain sampled renderer instead, with every
+        edit evaluated in float64 at every sample: slow, and the reference.
+        """
+        colour = self.background if background is None else _checked_background(background)
+        if not exact:
+            return self._renderer.render(camera, background=colour, normals=normals)
+        from cagefield.rendering.sampled import render_sampled
+
+        near, far = _sampling_range(self.field, camera)
+        samples = min(4096, max(64, math.ceil(2.0 * (far - near) / float(min(self.field.voxel_size)))))
+        return render_sampled(
+            self.field,
+            camera,
+            near=near,
+            far=far,
+            samples=samples,
+            background=colour,
+            edits=self.edits,
+            normals=normals,
+        )
+
+    @cached_property
+    def _renderer(self) -> Renderer:
+        from cagefield.rendering.march import Renderer
+
+        return Renderer(self.field, self.edits)
+
+
+def check_destination(path: Path | str, overwrite: bool) -> Path:
+    """The resolved folder that a scene may be written to: new, empty, or a scene to be replaced.
+
+    Called before a long training, so that its result has a place to go.
+
+    Raises:
+        SceneError: something is there that may not be replaced.
+    """
+    target = Path(path).resolve()
+    if not target.exists():
+        return target
+    if not target.is_dir():
+        raise SceneError(f"{path} is a file; give a new folder for the scene")
+    if not any(target.iterdir()):
+        return target
+    if not is_scene(target):
+        raise SceneError(f"{path} is a folder that holds no scene and is left as it is; give a new folder")
+    if not overwrite:
+        raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
+    return target
+
+
+def is_scene(path: Path | str) -> bool:
+    """True where `path` is a folder with the manifest of a scene, of any version."""
+    try:
+        document = json.loads((Path(path) / _MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(document, dict) and document.get("format") == FORMAT
+
+
+def _swap(staging: Path, target: Path) -> None:
+    """Puts `staging` in the place of `target`; the old folder goes last, after its foreign files moved over."""
+    if not target.exists() or not any(target.iterdir()):
+        if target.exists():
+            target.rmdir()
+        staging.rename(target)
+        return
+    retired = _sibling(target, "old")
+    target.rename(retired)
+    try:
+        staging.rename(target)
+    except BaseException:
+        retired.rename(target)
+        raise
+    for entry in retired.iterdir():
+        if entry.name not in _FILES:
+            entry.rename(target / entry.name)
+    shutil.rmtree(retired)
+
+
+def _sibling(target: Path, role: str) -> Path:
+    """A hidden path beside `target` that nobody else uses."""
+    return target.parent / f".{target.name}.{role}-{uuid.uuid4().hex[:12]}"
+
+
+def _read_manifest(folder: Path) -> Background:
+    path = folder / _MANIFEST
+    if not path.is_file():
+        raise SceneError(
+            f"folder {folder} holds no {_MANIFEST}: it is not a scene; give the folder of a scene"
+        )
+    document = _read_json(path)
+    if document.get("format") != FORMAT:
+        raise SceneError(
+            f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"; give a scene folder'
+        )
+    version = document.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise SceneError(f"{path}: version is {version!r}, expected a whole number from 1 to {VERSION}")
+    if version > VERSION:
+        raise SceneError(
+            f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
+        )
+    try:
+        return _checked_background(document.get("background", WHITE))
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def _read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
+    cameras: dict[str, tuple[Camera, ...]] = {}
+    for split, members in _read_json(path).items():
+        if not isinstance(members, list):
+            raise SceneError(f'{path}: "{split}" must be a list of cameras; write the scene again')
+        read = []
+        for index, member in enumerate(members):
+            try:
+                read.append(Camera.from_dict(member))
+            except (CagefieldError, KeyError, TypeError, AttributeError) as error:
+                raise SceneError(f"{path}: {split}[{index}] is no camera: {error}") from error
+        cameras[split] = tuple(read)
+    return cameras
+
+
+def _checked_background(value: object) -> Background:
+    try:
+        red, green, blue = (float(channel) for channel in value)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise SceneError(f"background {value!r} must be three numbers (r, g, b) from 0 to 1") from None
+    if not all(0.0 <= channel <= 1.0 for channel in (red, green, blue)):
+        raise SceneError(f"background {(red, green, blue)} must be three numbers (r, g, b) from 0 to 1")
+    return red, green, blue
+
+
+def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
+    """Near and far distance from the camera that hold the field's box, or several box sizes where it is unbounded."""
+    lower, upper = voxels.bounds
+    radius = 0.5 * float(((upper - lower) ** 2).sum()) ** 0.5
+    distance = float(((0.5 * (lower + upper) - camera.origin) ** 2).sum()) ** 0.5
+    reach = 8.0 if voxels.contracted else 1.0
+    return max(0.0, distance - reach * radius), distance + reach * radius
+
+
+def _read_json(path: Path) -> dict[str, object]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
+    if not isinstance(document, dict):
+        raise SceneError(f"{path} must hold a JSON object; copy it back or train again")
+    return document
+
+
+def _write_json(document: Mapping[str, object], path: Path) -> None:
+    path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
