@@ -1,0 +1,142 @@
+"""Pictures and videos in and out; a file appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from cagefield.errors import CagefieldError, DatasetError
+from cagefield.rendering.frame import to_uint8
+
+UInt8 = NDArray[np.uint8]
+
+
+@contextmanager
+def replaced_whole(path: Path) -> Iterator[Path]:
+    """A temporary file beside `path`, same suffix: becomes `path` on success, is removed on failure."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def read_image(path: str | os.PathLike[str]) -> UInt8:
+    """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
+
+    Grey, palette and 16-bit files are converted; pixels come as stored, EXIF orientation is not applied
+    (camera poses refer to the stored pixels). Raises DatasetError for a file that is missing or is no picture.
+    """
+    path = Path(path)
+    try:
+        with Image.open(path) as file:
+            image: Image.Image = file
+            image.load()
+            if image.mode.startswith("I"):
+                image = Image.fromarray((np.asarray(image) / 257.0 + 0.5).astype(np.uint8))
+            transparent = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
+            return np.array(image.convert("RGBA" if transparent else "RGB"))
+    except FileNotFoundError as error:
+        raise DatasetError(f"{path}: there is no such image") from error
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise DatasetError(f"{path}: not a readable image ({error})") from error
+
+
+def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8:
+    """uint8 [H,W] or [H,W,C] of a picture in uint8 or floats of [0,1]."""
+    image = np.asarray(image)
+    depth = 1 if image.ndim == 2 else image.shape[-1] if image.ndim == 3 else 0
+    if depth not in channels or image.size == 0:
+        raise CagefieldError(f"an image must be [H,W,C] with C in {list(channels)}, not {list(image.shape)}")
+    if image.dtype != np.uint8 and not np.issubdtype(image.dtype, np.floating):
+        raise CagefieldError(f"an image must be uint8, or floats in [0, 1], not {image.dtype}")
+    return np.ascontiguousarray(to_uint8(image))
+
+
+def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
+    """Writes uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes or suffixes."""
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise CagefieldError(f"{path}: write_png writes .png files")
+    pixels = _pixels(image)
+    if pixels.ndim == 3 and pixels.shape[-1] == 1:
+        pixels = pixels[..., 0]
+    with replaced_whole(path) as temporary:
+        Image.fromarray(pixels).save(temporary, format="PNG")
+
+
+def write_video(
+    path: str | os.PathLike[str], frames: Iterable[NDArray[Any]], fps: float = 24.0, *, quality: int = 18
+) -> None:
+    """Writes RGB frames [H,W,3] (uint8 or float) as H.264 in yuv420p, which every player shows.
+
+    Odd sizes are extended by repeating the last row or column. `quality` is x264's CRF, 0 (lossless) to 51.
+    Raises CagefieldError for no frames, frames of different sizes, or a suffix other than .mp4.
+    """
+    import imageio_ffmpeg
+
+    path = Path(path)
+    if path.suffix.lower() != ".mp4":
+        raise CagefieldError(f"{path}: write_video writes .mp4 files")
+    if not fps > 0 or not 0 <= quality <= 51:
+        raise CagefieldError(f"fps must be positive and quality in [0, 51], not fps={fps}, quality={quality}")
+    source = iter(frames)
+    first = next(source, None)
+    if first is None:
+        raise CagefieldError(f"{path}: a video needs at least one frame")
+    first = _pixels(first, (3,))
+    height, width = first.shape[:2]
+    pad = ((0, height % 2), (0, width % 2), (0, 0))
+    with replaced_whole(path) as temporary:
+        writer = imageio_ffmpeg.write_frames(
+            str(temporary),
+            (width + width % 2, height + height % 2),
+            fps=fps,
+            codec="libx264",
+            pix_fmt_out="yuv420p",
+            macro_block_size=2,
+            quality=None,
+            output_params=["-crf", str(quality), "-movflags", "+faststart"],
+        )
+        writer.send(None)
+        try:
+            writer.send(np.pad(first, pad, mode="edge").tobytes())
+            for index, frame in enumerate(source, start=1):
+                pixels = _pixels(frame, (3,))
+                if pixels.shape != first.shape:
+                    raise CagefieldError(
+                        f"frame {index} is {list(pixels.shape)}; all frames must be {list(first.shape)}"
+                    )
+                writer.send(np.pad(pixels, pad, mode="edge").tobytes())
+        finally:
+            writer.close()
+
+
+def side_by_side(*images: NDArray[Any], gap: int = 4) -> UInt8:
+    """RGB pictures [H,W,3] in one row, white between them and below shorter ones."""
+    if not images:
+        raise CagefieldError("side_by_side needs at least one image")
+    columns = [_pixels(image, (3,)) for image in images]
+    height = max(column.shape[0] for column in columns)
+    width = sum(column.shape[1] for column in columns) + gap * (len(columns) - 1)
+    row = np.full((height, width, 3), 255, np.uint8)
+    left = 0
+    for column in columns:
+        row[: column.shape[0], left : left + column.shape[1]] = column
+        left += column.shape[1] + gap
+    return row
