@@ -1,6 +1,6 @@
 """cagefield: edit the geometry of a captured radiance field with two nested cages.
 
-The names below are imported on first use, so that `import cagefield` stays quick and loads no compute runtime.
+The names below are imported on first use: `import cagefield` stays quick and loads no compute runtime.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -31,9 +32,10 @@ class CameraPath:
 
 
 def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None = None) -> CameraPath:
-    """The path in a nerfstudio camera-path file (`camera_path`, `render_width`, `render_height`, `fps`, `seconds`).
+    """The path in a nerfstudio camera-path file.
 
-    `fov` is vertical and in degrees; pixels are square, so `aspect` follows from the picture size and is not read.
+    Its keys: `camera_path` (`camera_to_world`, `fov`), `render_width`, `render_height`, `fps`, `seconds`.
+    `fov` is vertical and in degrees; pixels are square, so `aspect` follows from the size and is not read.
     Without `fps` the rate is the number of cameras over `seconds`.
 
     nerfstudio writes its paths in the space it trains in, not in that of transforms.json. Its file
@@ -41,14 +43,14 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
     brought back to the space of transforms.json.
 
     Raises:
-        CameraError: a file that is not a camera path, or a value that makes no camera; names the entry and the cure.
+        CameraError: no camera path, or a value that makes no camera; names the entry and the cure.
     """
     path = Path(path)
     document = _read_json(path, "camera path")
     entries = document.get("camera_path")
     if not isinstance(entries, list) or not entries:
         raise CameraError(
-            f'{path}: "camera_path" must be a list with at least one camera; export the path again from nerfstudio'
+            f'{path}: "camera_path" must be a list with at least one camera; export it again from nerfstudio'
         )
     kind = document.get("camera_type", "perspective")
     if kind != "perspective":
@@ -65,10 +67,10 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
 def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tuple[Camera, ...]:
     """`n` cameras on a closed circle around what `cameras` look at, at their mean distance and elevation.
 
-    The centre is the point nearest to all optical axes (least squares), the axis of the circle the mean of their
-    up directions. Where the cameras cover less than two thirds of the circle (a capture from one side) the
-    path swings to and fro over the arc they cover instead, and stays where the field was seen. The horizontal
-    field of view is the one of the first camera, widened or narrowed to the new aspect at the same focal ratio.
+    The centre is the point nearest to all optical axes (least squares), the axis of the circle the mean of
+    their up directions. Where the cameras cover less than two thirds of the circle (a capture from one side)
+    the path swings to and fro over the arc they cover instead, and stays where the field was seen. The field
+    of view is the first camera's, along the longer side.
 
     Raises:
         CameraError: fewer than one camera, or `n` < 1.
@@ -133,7 +135,7 @@ def _path_camera(entry: object, where: str, width: int, height: int, to_dataset:
 
 
 def _similarity_inverse(path: Path | str | None) -> Floats:
-    """The [4,4] map from nerfstudio's training space to the space of transforms.json; identity without a file."""
+    """The [4,4] map from nerfstudio's training space to that of transforms.json; identity without a file."""
     if path is None:
         return np.eye(4)
     path = Path(path)
@@ -177,8 +179,8 @@ def _mean_up(poses: Floats) -> Floats:
 def _common_target(poses: Floats) -> Floats:
     """The point nearest to all optical axes, in front of the cameras on average.
 
-    Least squares of the distances to the axes, Σ (I - f fᵀ)(p - o) = 0. Parallel axes have no such point: then,
-    or where it lies behind the cameras, the point one scene radius ahead of the mean camera is returned.
+    Least squares of the distances to the axes, Σ (I - f fᵀ)(p - o) = 0. Parallel axes have no such point:
+    then, or where it lies behind the cameras, it is the point one capture size ahead of the mean camera.
     """
     origins, forwards = poses[:, :3, 3], -poses[:, :3, 2]
     projectors = np.eye(3) - forwards[:, :, None] * forwards[:, None, :]
@@ -194,7 +196,7 @@ def _common_target(poses: Floats) -> Floats:
 
 
 def _sweep(azimuths: Floats, n: int) -> Floats:
-    """`n` azimuths: a full turn, or one to-and-fro cosine swing over the covered arc if a third of the circle is empty."""
+    """`n` azimuths: a full turn, or a cosine swing over the covered arc if a third of the circle is empty."""
     ordered = np.sort(np.mod(azimuths, 2.0 * math.pi))
     gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * math.pi))
     widest = int(np.argmax(gaps))
@@ -234,5 +236,5 @@ def _positive_integer(document: Mapping[str, object], key: str, path: Path) -> i
     return int(value)
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -4,7 +4,7 @@
       field.safetensors   the VoxelField, in canonical space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
-      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b]}
+      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null}
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
@@ -12,12 +12,12 @@ a half of each.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import shutil
 import uuid
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -28,42 +28,40 @@ from cagefield.edits import EditStack
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.frame import Background, Frame, background_rgb
 
 if TYPE_CHECKING:
-    from cagefield.rendering.frame import Frame
     from cagefield.rendering.march import Renderer
-
-Background = tuple[float, float, float]
 
 FORMAT = "cagefield-scene"
 VERSION = 1
-WHITE: Background = (1.0, 1.0, 1.0)
-BLACK: Background = (0.0, 0.0, 0.0)
 
 _FIELD, _EDITS, _CAMERAS, _MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
 _FILES = (_FIELD, _EDITS, _CAMERAS, _MANIFEST)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
     """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
 
-    The field stays as it was trained; the edits are applied when it is rendered.
+    Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
+    when it is rendered.
 
     Raises:
-        SceneError: a background outside [0, 1], or a version this cagefield does not write.
+        CagefieldError: a background outside [0, 1].
+        SceneError: a version this cagefield does not write.
     """
 
     field: VoxelField
-    edits: EditStack = field(default_factory=lambda: EditStack([]))
-    cameras: Mapping[str, tuple[Camera, ...]] = field(default_factory=dict)
-    background: Background = WHITE
+    edits: EditStack = dataclasses.field(default_factory=lambda: EditStack([]))
+    cameras: Mapping[str, tuple[Camera, ...]] = dataclasses.field(default_factory=dict)
+    background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     version: int = VERSION
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
         object.__setattr__(self, "cameras", MappingProxyType(cameras))
-        object.__setattr__(self, "background", _checked_background(self.background))
+        object.__setattr__(self, "background", background_rgb(self.background))
         if self.version != VERSION:
             raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
 
@@ -107,7 +105,7 @@ class Scene:
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
                 staging / _CAMERAS,
             )
-            manifest = {"format": FORMAT, "version": self.version, "background": list(self.background)}
+            manifest = {"format": FORMAT, "version": self.version, "background": self.background}
             _write_json(manifest, staging / _MANIFEST)
             _swap(staging, target)
         except BaseException:
@@ -116,26 +114,22 @@ class Scene:
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack."""
-        return replace(self, edits=edits)
-
-    def with_cameras(self, cameras: Mapping[str, tuple[Camera, ...]]) -> Scene:
-        """The same scene with other cameras."""
-        return replace(self, cameras=cameras)
+        return dataclasses.replace(self, edits=edits)
 
     def render(
         self,
         camera: Camera,
         *,
-        background: Background | None = None,
+        background: Background = None,
         normals: bool = False,
         exact: bool = False,
     ) -> Frame:
-        """The edited scene seen by `camera`, on the scene's own background unless another is given.
+        """The edited scene seen by `camera`, over the scene's own background unless another is given.
 
-        The fused renderer is kept between calls. `exact` takes the plain sampled renderer instead, with every
-        edit evaluated in float64 at every sample: slow, and the reference.
+        "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
+        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference.
         """
-        colour = self.background if background is None else _checked_background(background)
+        colour = self.background if background is None else background_rgb(background)
         if not exact:
             return self._renderer.render(camera, background=colour, normals=normals)
         from cagefield.rendering.sampled import render_sampled
@@ -192,7 +186,7 @@ def is_scene(path: Path | str) -> bool:
 
 
 def _swap(staging: Path, target: Path) -> None:
-    """Puts `staging` in the place of `target`; the old folder goes last, after its foreign files moved over."""
+    """Puts `staging` in the place of `target`; foreign files move over before the old folder goes."""
     if not target.exists() or not any(target.iterdir()):
         if target.exists():
             target.rmdir()
@@ -216,7 +210,7 @@ def _sibling(target: Path, role: str) -> Path:
     return target.parent / f".{target.name}.{role}-{uuid.uuid4().hex[:12]}"
 
 
-def _read_manifest(folder: Path) -> Background:
+def _read_manifest(folder: Path) -> tuple[float, float, float] | None:
     path = folder / _MANIFEST
     if not path.is_file():
         raise SceneError(
@@ -235,8 +229,8 @@ def _read_manifest(folder: Path) -> Background:
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
     try:
-        return _checked_background(document.get("background", WHITE))
-    except SceneError as error:
+        return background_rgb(document.get("background"))
+    except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
 
 
@@ -255,18 +249,8 @@ def _read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
     return cameras
 
 
-def _checked_background(value: object) -> Background:
-    try:
-        red, green, blue = (float(channel) for channel in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise SceneError(f"background {value!r} must be three numbers (r, g, b) from 0 to 1") from None
-    if not all(0.0 <= channel <= 1.0 for channel in (red, green, blue)):
-        raise SceneError(f"background {(red, green, blue)} must be three numbers (r, g, b) from 0 to 1")
-    return red, green, blue
-
-
 def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
-    """Near and far distance from the camera that hold the field's box, or several box sizes where it is unbounded."""
+    """Near and far distance from the camera that hold the field's box; 8 times that if unbounded."""
     lower, upper = voxels.bounds
     radius = 0.5 * float(((upper - lower) ** 2).sum()) ** 0.5
     distance = float(((0.5 * (lower + upper) - camera.origin) ** 2).sum()) ** 0.5
