@@ -1,0 +1,99 @@
+"""The `cagefield` command: one module per subcommand, heavy imports inside `run`.
+
+Bad input ends with one line on stderr and exit code 2; nothing is overwritten without `--overwrite`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Protocol
+
+import cagefield
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+
+    class Command(Protocol):
+        """A parsed subcommand."""
+
+        def run(self) -> None: ...
+
+
+_DESCRIPTION = """Edit the geometry of a captured radiance field with two nested cages.
+
+`cagefield demo` shows the whole chain on a built-in scene; `cagefield --version` prints the version."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Exit code of the command line `argv` (default: the process's own): 0, 2 for bad input, 130 for Ctrl-C."""
+    args = list(sys.argv[1:] if argv is None else argv)
+    if args in (["--version"], ["-V"]):
+        print(f"cagefield {cagefield.__version__}")
+        return 0
+    try:
+        command = _parse(args or ["--help"])
+        if isinstance(command, int):
+            return command
+        command.run()
+    except CagefieldError as error:
+        return _refuse(str(error))
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
+        return _refuse(f"{names}: {error.strerror or error}" if names else str(error))
+    except KeyboardInterrupt:
+        print("cagefield: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parse(args: list[str]) -> Command | int:
+    """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after one line on what is wrong."""
+    import tyro
+
+    from cagefield.cli.demo import Demo
+    from cagefield.cli.edit import EditScene
+    from cagefield.cli.info import Info
+    from cagefield.cli.make_scene import MakeScene
+    from cagefield.cli.render import Render
+    from cagefield.cli.train import Train
+
+    commands = (
+        Annotated[Demo, tyro.conf.subcommand("demo")]
+        | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
+        | Annotated[Train, tyro.conf.subcommand("train")]
+        | Annotated[EditScene, tyro.conf.subcommand("edit")]
+        | Annotated[Render, tyro.conf.subcommand("render")]
+        | Annotated[Info, tyro.conf.subcommand("info")]
+    )
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            command: Command = tyro.cli(commands, prog="cagefield", description=_DESCRIPTION, args=args)  # type: ignore[call-overload]
+    except SystemExit as stop:
+        if not stop.code:
+            return 0
+        return _refuse(_without_box(complaint.getvalue()))
+    return command
+
+
+def _without_box(text: str) -> str:
+    """tyro's framed message as one line: title, message, hint."""
+    lines = []
+    for line in text.splitlines():
+        words = line.strip("─╭╮╰╯│ ")
+        if words:
+            lines.append(words)
+    return ". ".join(lines[:1]) + ": " + " ".join(lines[1:]) if len(lines) > 1 else " ".join(lines)
+
+
+def _refuse(message: str) -> int:
+    """Exit code 2, after one line on stderr."""
+    print("cagefield: " + " ".join(message.split()), file=sys.stderr)
+    return 2

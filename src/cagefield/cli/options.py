@@ -1,0 +1,79 @@
+"""What several subcommands share: option types, sizes, colours, destinations, progress."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Literal, TypeVar
+
+import tyro
+
+from cagefield.errors import CagefieldError
+
+Device = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
+Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+OptionalOutput = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]
+Flag = tyro.conf.FlagCreatePairsOff[bool]
+T = TypeVar("T")
+
+
+def parse_size(text: str | None, width: int, height: int) -> tuple[int, int]:
+    """(width, height) in pixels of "800x600", of "800" (the longer side, same aspect), or as given for None.
+
+    Raises:
+        CagefieldError: another text, or a side outside 1 to 16384.
+    """
+    if text is None:
+        return width, height
+    parts = text.lower().split("x")
+    if len(parts) > 2 or not all(part.strip().isascii() and part.strip().isdigit() for part in parts):
+        raise CagefieldError(f"--size {text!r} is no size; give WIDTHxHEIGHT or the longer side, such as 800x600 or 800")
+    sides = [int(part) for part in parts]
+    if len(sides) == 1:
+        scale = sides[0] / max(width, height)
+        sides = [max(1, round(width * scale)), max(1, round(height * scale))] if sides[0] else [0, 0]
+    if not all(1 <= side <= 16384 for side in sides):
+        raise CagefieldError(f"--size {text!r} is out of range; each side must be from 1 to 16384 pixels")
+    return sides[0], sides[1]
+
+
+def parse_background(text: str | None) -> str | tuple[float, float, float] | None:
+    """A name as it is, "r,g,b" (0 to 1) as numbers, None (the scene's own background) for None.
+
+    Raises:
+        CagefieldError: neither a name nor three numbers.
+    """
+    if text is None or text in ("white", "black", "none"):
+        return text
+    try:
+        red, green, blue = (float(part) for part in text.split(","))
+    except ValueError:
+        raise CagefieldError(
+            f"--background {text!r} is no colour; give white, black, none, or r,g,b from 0 to 1 such as 0.2,0.4,1"
+        ) from None
+    return red, green, blue
+
+
+def check_folder(path: Path, overwrite: bool) -> None:
+    """Passes where `path` is new or an empty folder, or any folder with `overwrite`."""
+    if path.exists() and not path.is_dir():
+        raise CagefieldError(f"{path} is a file; give a folder")
+    if path.is_dir() and any(path.iterdir()) and not overwrite:
+        raise CagefieldError(f"folder {path} exists already and is not empty; give a new one, or --overwrite")
+
+
+def check_file(path: Path, overwrite: bool) -> None:
+    """Passes where `path` is new, or a file with `overwrite`."""
+    if path.is_dir():
+        raise CagefieldError(f"{path} is a folder; give a file name")
+    if path.exists() and not overwrite:
+        raise CagefieldError(f"{path} exists already; give another name, or --overwrite")
+
+
+def track(items: Sequence[T] | Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
+    """The items, with a progress bar on stderr while they are taken."""
+    from rich.console import Console
+    from rich.progress import track as bar
+
+    console = Console(stderr=True)
+    yield from bar(items, description=what, total=total, console=console, transient=True, disable=not console.is_terminal)

@@ -1,0 +1,75 @@
+"""Frames as files: colour, depth and normals, before and after side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.rendering.frame import Frame
+from cagefield.rendering.images import replaced_whole, side_by_side, write_png
+
+Array = npt.NDArray[Any]
+Pictures = dict[str, Array]
+
+
+@dataclass(frozen=True)
+class DepthScale:
+    """Grey levels for distances: white at `near`, black at `far`, linear in the inverse distance."""
+
+    near: float
+    far: float
+
+    @classmethod
+    def fitted(cls, depths: Sequence[Array]) -> DepthScale:
+        """The scale that spreads the finite distances, their nearest and farthest hundredth left out."""
+        finite = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
+        if finite.size == 0:
+            return cls(1.0, 2.0)
+        near, far = np.percentile(finite, (1.0, 99.0))
+        near = max(float(near), 1e-6)
+        return cls(near, max(float(far), 1.01 * near))
+
+    def picture(self, depth: Array) -> Array:
+        """Grey picture [H,W,3] in [0,1]; black where nothing is seen."""
+        inverse = 1.0 / np.maximum(depth, 1e-6)
+        grey = (inverse - 1.0 / self.far) / (1.0 / self.near - 1.0 / self.far)
+        return np.repeat(np.clip(grey, 0.0, 1.0)[..., None], 3, axis=-1)
+
+
+def pictures_of(frames: Sequence[Frame], depth_scale: DepthScale | None = None) -> Pictures:
+    """End of the file name -> picture: the frames side by side, with their depth and normals where there are any.
+
+    A single frame over nothing becomes an RGBA picture.
+    """
+    if len(frames) == 1 and frames[0].background is None:
+        pictures: Pictures = {".png": frames[0].rgba8()}
+    else:
+        pictures = {".png": side_by_side(*(frame.rgb8() for frame in frames))}
+    if depth_scale is not None:
+        pictures["_depth.png"] = side_by_side(*(depth_scale.picture(frame.depth) for frame in frames))
+        pictures["_depth.npy"] = np.concatenate([frame.depth for frame in frames], axis=1)
+    normals = [frame.normals for frame in frames if frame.normals is not None]
+    if normals:
+        pictures["_normals.png"] = side_by_side(*(0.5 * (normal + 1.0) for normal in normals))
+    return pictures
+
+
+def in_one_row(pictures: Pictures) -> Array:
+    """The pictures beside one another, for a video."""
+    return side_by_side(*(picture for end, picture in pictures.items() if end.endswith(".png")))
+
+
+def write_pictures(stem: Path, pictures: Pictures) -> None:
+    """Writes each picture as `stem` with its end."""
+    for end, picture in pictures.items():
+        path = stem.with_name(stem.name + end)
+        if end.endswith(".npy"):
+            with replaced_whole(path) as temporary, temporary.open("wb") as file:
+                np.save(file, picture)
+        else:
+            write_png(path, picture)

@@ -1,0 +1,154 @@
+"""`cagefield render`: pictures or a video of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from cagefield.cli.options import (
+    Device,
+    Flag,
+    Output,
+    check_file,
+    check_folder,
+    parse_background,
+    parse_size,
+    track,
+)
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.cameras import Camera
+    from cagefield.cli.pictures import Pictures
+    from cagefield.scene import Scene
+
+
+@dataclass(frozen=True)
+class Render:
+    """Pictures or a video of a scene: its test views, an orbit, or a nerfstudio camera path."""
+
+    scene: tyro.conf.Positional[Path]
+    """Scene folder."""
+    out: Output
+    """Folder for numbered PNGs, or one .mp4, or one .png for a single view."""
+    split: str = "test"
+    """Whose cameras: test, train or val."""
+    views: tuple[int, ...] = ()
+    """Only these cameras of the split, by index; all if left out."""
+    turntable: int = 0
+    """Number of pictures on an orbit around what the cameras look at, instead of the split's cameras."""
+    camera_path: Path | None = None
+    """nerfstudio camera-path JSON, instead of the split's cameras."""
+    dataparser_transforms: Path | None = None
+    """nerfstudio's dataparser_transforms.json, to bring its camera path back into the data set's space."""
+    size: str | None = None
+    """WIDTHxHEIGHT, or the longer side alone; the cameras' own size if left out."""
+    background: str | None = None
+    """white, black, none (transparent PNGs) or r,g,b from 0 to 1; the scene's own if left out."""
+    depth: Flag = False
+    """Depth too: grey, near is bright; as NAME_depth.png with the distances in NAME_depth.npy, or in a video beside the picture."""
+    normals: Flag = False
+    """Normals too, world space, (n + 1) / 2 as rgb; as NAME_normals.png, or in a video beside the picture."""
+    compare: Flag = False
+    """Side by side: the scene before its edits, and after."""
+    unedited: Flag = False
+    """Leave the scene's edits out."""
+    exact: Flag = False
+    """The plain reference renderer: every edit exact at every sample; minutes a picture."""
+    fps: float | None = None
+    """Pictures a second in a video: 24, or what the camera path says."""
+    device: Device = "auto"
+    """Where kernels run."""
+    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Renders and writes; prints where the result is."""
+        self._check_options()
+        video, single = self.out.suffix.lower() == ".mp4", self.out.suffix.lower() == ".png"
+        (check_file if video or single else check_folder)(self.out, self.overwrite)
+
+        from cagefield import devices
+        from cagefield.cli.pictures import in_one_row, write_pictures
+        from cagefield.rendering.images import write_video
+        from cagefield.scene import Scene
+
+        scene = Scene.open(self.scene)
+        cameras, fps = self._cameras(scene)
+        if single and len(cameras) != 1:
+            raise CagefieldError(f"{self.out} is one picture, the views are {len(cameras)}; give a folder or --views")
+        devices.start(self.device)
+        pictures = track(self._pictures(scene, cameras), "Rendering", len(cameras))
+        if video:
+            write_video(self.out, (in_one_row(picture) for picture in pictures), fps)
+        else:
+            digits = max(4, len(str(len(cameras) - 1)))
+            for index, picture in enumerate(pictures):
+                write_pictures(self.out.with_suffix("") if single else self.out / f"{index:0{digits}d}", picture)
+        count = f"{len(cameras)} picture{'s' if len(cameras) > 1 else ''}"
+        print(f"{count} in {self.out}")
+
+    def _check_options(self) -> None:
+        if self.turntable < 0:
+            raise CagefieldError(f"--turntable is {self.turntable}; give the number of pictures, 1 or more")
+        if self.turntable and self.camera_path:
+            raise CagefieldError("--turntable and --camera-path exclude each other; give one of them")
+        if self.dataparser_transforms and not self.camera_path:
+            raise CagefieldError("--dataparser-transforms belongs to --camera-path; give both or neither")
+        if self.compare and self.unedited:
+            raise CagefieldError("--compare and --unedited exclude each other; give one of them")
+        if self.fps is not None and not 0.0 < self.fps <= 1000.0:
+            raise CagefieldError(f"--fps is {self.fps}; give a number above 0 and up to 1000")
+        background = parse_background(self.background)
+        if background == "none" and (self.compare or self.out.suffix.lower() == ".mp4"):
+            raise CagefieldError("--background none makes transparent PNGs; give a colour for --compare or a video")
+
+    def _cameras(self, scene: Scene) -> tuple[list[Camera], float]:
+        """The cameras to render, at their final size, and the frame rate."""
+        from cagefield.camera_paths import load_camera_path, orbit
+
+        fps = 24.0
+        if self.camera_path:
+            path = load_camera_path(self.camera_path, self.dataparser_transforms)
+            cameras, fps = path.cameras, path.fps
+        elif self.turntable:
+            seen = scene.cameras.get("train") or next((c for c in scene.cameras.values() if c), ())
+            if not seen:
+                raise CagefieldError(f"scene {self.scene} has no cameras to orbit with; give --camera-path")
+            width, height = parse_size(self.size, seen[0].width, seen[0].height)
+            return list(orbit(seen, self.turntable, width=width, height=height)), self.fps or fps
+        else:
+            cameras = self._split_cameras(scene)
+        sized = [c.resized(*parse_size(self.size, c.width, c.height)) if self.size else c for c in cameras]
+        return sized, self.fps or fps
+
+    def _split_cameras(self, scene: Scene) -> tuple[Camera, ...]:
+        cameras = scene.cameras.get(self.split, ())
+        if not cameras:
+            known = ", ".join(f"{name} ({len(c)})" for name, c in scene.cameras.items() if c) or "none"
+            raise CagefieldError(f"scene {self.scene} has no {self.split!r} cameras, it has {known}; give --split")
+        for index in self.views:
+            if not 0 <= index < len(cameras):
+                raise CagefieldError(f"--views {index} is out of range; {self.split} views go from 0 to {len(cameras) - 1}")
+        return tuple(cameras[index] for index in self.views) or cameras
+
+    def _pictures(self, scene: Scene, cameras: list[Camera]) -> Iterator[Pictures]:
+        """Per camera: end of the file name -> picture."""
+        from cagefield.cli.pictures import DepthScale, pictures_of
+        from cagefield.edits import EditStack
+
+        background = parse_background(self.background)
+        unedited = scene.with_edits(EditStack([]))
+        shown = [unedited, scene] if self.compare else [unedited] if self.unedited else [scene]
+        scale: DepthScale | None = None
+        for camera in cameras:
+            frames = [
+                one.render(camera, background=background, normals=self.normals, exact=self.exact) for one in shown
+            ]
+            if self.depth and scale is None:
+                scale = DepthScale.fitted([frame.depth for frame in frames])
+            yield pictures_of(frames, scale)
