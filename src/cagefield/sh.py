@@ -1,0 +1,61 @@
+"""Real spherical harmonics of degree 0 to 2, in the order and with the signs of 3DGS and Plenoxels.
+
+With d = (x, y, z) a unit direction, the (L+1)^2 values are
+  l=0   C0
+  l=1   -C1 y, C1 z, -C1 x
+  l=2   C2[0] xy, C2[1] yz, C2[2] (2 z^2 - x^2 - y^2), C2[3] xz, C2[4] (x^2 - y^2)
+They are orthonormal over the sphere: the integral of Y_i Y_j is 1 for i = j, else 0. The order is
+m = -l..l; the Condon-Shortley phase is kept, so odd m have the opposite sign of tables without it.
+
+Source: Ramamoorthi and Hanrahan 2001; constants as in PlenOctrees (Yu et al. 2021), 3DGS (Kerbl et al. 2023).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.errors import FieldError
+
+MAX_DEGREE: Final = 2
+C0: Final = 0.28209479177387814
+C1: Final = 0.4886025119029199
+C2: Final = (
+    1.0925484305920792,
+    -1.0925484305920792,
+    0.31539156525252005,
+    -1.0925484305920792,
+    0.5462742152960396,
+)
+
+
+def basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
+    """Values [N,(degree+1)^2] of the harmonics at unit directions `viewdirs` [N,3].
+
+    float32 in, float32 out; anything else gives float64. Directions are not normalised here.
+
+    Raises FieldError for a degree outside 0..2 or directions of another shape.
+    """
+    if degree not in range(MAX_DEGREE + 1):
+        raise FieldError(f"degree of the spherical harmonics must be 0 to {MAX_DEGREE}, got {degree}")
+    d = np.asarray(viewdirs)
+    if d.ndim != 2 or d.shape[1] != 3:
+        raise FieldError(f"viewdirs must have the shape [N,3], got {list(d.shape)}")
+    if d.dtype != np.float32:
+        d = d.astype(np.float64)
+    x, y, z = d.T
+    values = np.empty((len(d), (degree + 1) ** 2), dtype=d.dtype)
+    values[:, 0] = C0
+    if degree >= 1:
+        values[:, 1] = -C1 * y
+        values[:, 2] = C1 * z
+        values[:, 3] = -C1 * x
+    if degree >= 2:
+        values[:, 4] = C2[0] * x * y
+        values[:, 5] = C2[1] * y * z
+        values[:, 6] = C2[2] * (2 * z * z - x * x - y * y)
+        values[:, 7] = C2[3] * x * z
+        values[:, 8] = C2[4] * (x * x - y * y)
+    return values
