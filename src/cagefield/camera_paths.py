@@ -15,12 +15,10 @@ from typing import TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.cameras import Camera
+from cagefield.cameras import Camera, turntable
 from cagefield.errors import CameraError
 
 Floats = npt.NDArray[np.float64]
-
-_OTHER_CAMERA_TYPES_CURE = 'set "camera_type" to "perspective"'
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
         )
     kind = document.get("camera_type", "perspective")
     if kind != "perspective":
-        raise CameraError(f"{path}: camera_type {kind!r} is not supported; {_OTHER_CAMERA_TYPES_CURE}")
+        raise CameraError(f"{path}: camera_type {kind!r} is not supported; set it to 'perspective'")
     width, height = (_positive_integer(document, key, path) for key in ("render_width", "render_height"))
     to_dataset = _similarity_inverse(dataparser_transforms)
     cameras = tuple(
@@ -67,8 +65,8 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
 def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tuple[Camera, ...]:
     """`n` cameras on a closed circle around what `cameras` look at, at their mean distance and elevation.
 
-    The centre is the point nearest to all optical axes (least squares), the axis of the circle the mean of
-    their up directions. Where the cameras cover less than two thirds of the circle (a capture from one side)
+    The centre is the point nearest to all optical axes (least squares), the axis of the circle their
+    shared up direction. Where the cameras cover less than two thirds of the circle (a capture from one side)
     the path swings to and fro over the arc they cover instead, and stays where the field was seen. The field
     of view is the first camera's, along the longer side.
 
@@ -80,27 +78,26 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
     if n < 1:
         raise CameraError(f"an orbit has {n} cameras; give at least 1")
     poses = np.stack([camera.c2w for camera in cameras])
-    up = _mean_up(poses)
+    up = _shared_up(poses)
     center = _common_target(poses)
     offsets = poses[:, :3, 3] - center
     heights = offsets @ up
     level = offsets - heights[:, None] * up
-    reach = float(np.linalg.norm(level, axis=1).mean())
-    x_axis = _perpendicular(up)
-    y_axis = np.cross(up, x_axis)
-    azimuths = np.arctan2(level @ y_axis, level @ x_axis)
+    reach, rise = float(np.linalg.norm(level, axis=1).mean()), float(heights.mean())
     first = cameras[0]
     focal = max(width, height) / max(first.width, first.height) * first.fx
     fov_x = 2.0 * math.atan(0.5 * width / focal)
-    path = []
-    for azimuth in _sweep(azimuths, n):
-        eye = (
-            center
-            + float(heights.mean()) * up
-            + reach * (math.cos(azimuth) * x_axis + math.sin(azimuth) * y_axis)
-        )
-        path.append(Camera.look_at(eye, center, up, width=width, height=height, fov_x=fov_x))
-    return tuple(path)
+    x_axis = _perpendicular(up)
+    y_axis = np.cross(up, x_axis)
+    arc = _covered_arc(np.arctan2(level @ y_axis, level @ x_axis))
+    if arc is None:
+        return turntable(
+            center, math.hypot(reach, rise), n, elevation=math.atan2(rise, reach), up=up,
+            width=width, height=height, fov_x=fov_x,
+        )  # fmt: skip
+    swing = arc[0] + 0.5 * arc[1] * (1.0 - np.cos(2.0 * math.pi * np.arange(n) / n))
+    eyes = center + rise * up + reach * (np.cos(swing)[:, None] * x_axis + np.sin(swing)[:, None] * y_axis)
+    return tuple(Camera.look_at(eye, center, up, width=width, height=height, fov_x=fov_x) for eye in eyes)
 
 
 def _path_camera(entry: object, where: str, width: int, height: int, to_dataset: Floats) -> Camera:
@@ -122,12 +119,9 @@ def _path_camera(entry: object, where: str, width: int, height: int, to_dataset:
             f'{where}: "fov" is {fov!r}; give the vertical field of view in degrees, between 0 and 180'
         )
     focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
-    axes = c2w[:3, :3] / np.linalg.norm(c2w[:3, :3], axis=0)
-    pose = np.eye(4)
-    pose[:3, :3] = axes
-    pose[:3, 3] = c2w[:3, 3]
-    pose = to_dataset @ pose
-    pose[:3, :3] /= np.linalg.norm(pose[:3, :3], axis=0)
+    pose = to_dataset @ c2w
+    pose[:3, :3] /= np.maximum(np.linalg.norm(pose[:3, :3], axis=0), 1e-12)
+    pose[3] = 0.0, 0.0, 0.0, 1.0
     try:
         return Camera(pose, width, height, focal, focal, 0.5 * width, 0.5 * height)
     except CameraError as error:
@@ -166,13 +160,20 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
     return 24.0
 
 
-def _mean_up(poses: Floats) -> Floats:
-    """The unit up direction shared by the cameras; exactly +z where it is within 10 degrees of it."""
-    mean: Floats = poses[:, :3, 1].mean(axis=0)
-    length = float(np.linalg.norm(mean))
+def _shared_up(poses: Floats) -> Floats:
+    """The unit up direction of the cameras; exactly +z where it is within 10 degrees of it.
+
+    A camera that is not rolled has its +x axis level, so up is the direction most normal to all +x axes: the
+    last eigenvector of Σ x xᵀ. Cameras that all share one +x axis leave it open; then it is their mean +y.
+    """
+    mean_y: Floats = poses[:, :3, 1].mean(axis=0)
+    right = poses[:, :3, 0]
+    values, vectors = np.linalg.eigh(right.T @ right / len(right))
+    up = vectors[:, 0] * (1.0 if vectors[:, 0] @ mean_y > 0.0 else -1.0) if values[1] > 1e-2 else mean_y
+    length = float(np.linalg.norm(up))
     if length < 1e-6:
         return np.array([0.0, 0.0, 1.0])
-    up = mean / length
+    up = up / length
     return np.array([0.0, 0.0, 1.0]) if up[2] > math.cos(math.radians(10.0)) else up
 
 
@@ -195,19 +196,14 @@ def _common_target(poses: Floats) -> Floats:
     return straight
 
 
-def _sweep(azimuths: Floats, n: int) -> Floats:
-    """`n` azimuths: a full turn, or a cosine swing over the covered arc if a third of the circle is empty."""
+def _covered_arc(azimuths: Floats) -> tuple[float, float] | None:
+    """(start, length) of the arc that holds all azimuths; None for one, or over two thirds of a turn."""
     ordered = np.sort(np.mod(azimuths, 2.0 * math.pi))
     gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * math.pi))
     widest = int(np.argmax(gaps))
-    phases = np.arange(n) / n
     if len(azimuths) == 1 or gaps[widest] <= 2.0 * math.pi / 3.0:
-        turn: Floats = azimuths[0] + 2.0 * math.pi * phases
-        return turn
-    start = ordered[(widest + 1) % len(ordered)]
-    arc = 2.0 * math.pi - gaps[widest]
-    swing: Floats = start + 0.5 * arc * (1.0 - np.cos(2.0 * math.pi * phases))
-    return swing
+        return None
+    return float(ordered[(widest + 1) % len(ordered)]), float(2.0 * math.pi - gaps[widest])
 
 
 def _perpendicular(direction: Floats) -> Floats:

@@ -29,7 +29,7 @@ _DESCRIPTION = """Edit the geometry of a captured radiance field with two nested
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Exit code of the command line `argv` (default: the process's own): 0, 2 for bad input, 130 for Ctrl-C."""
+    """Exit code of the command line `argv` (the process's own for None): 0, or 2 for bad input."""
     args = list(sys.argv[1:] if argv is None else argv)
     if args in (["--version"], ["-V"]):
         print(f"cagefield {cagefield.__version__}")
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parse(args: list[str]) -> Command | int:
-    """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after one line on what is wrong."""
+    """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after a complaint."""
     import tyro
 
     from cagefield.cli.demo import Demo

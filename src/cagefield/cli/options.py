@@ -27,7 +27,9 @@ def parse_size(text: str | None, width: int, height: int) -> tuple[int, int]:
         return width, height
     parts = text.lower().split("x")
     if len(parts) > 2 or not all(part.strip().isascii() and part.strip().isdigit() for part in parts):
-        raise CagefieldError(f"--size {text!r} is no size; give WIDTHxHEIGHT or the longer side, such as 800x600 or 800")
+        raise CagefieldError(
+            f"--size {text!r} is no size; give WIDTHxHEIGHT or the longer side, such as 800x600 or 800"
+        )
     sides = [int(part) for part in parts]
     if len(sides) == 1:
         scale = sides[0] / max(width, height)
@@ -49,7 +51,7 @@ def parse_background(text: str | None) -> str | tuple[float, float, float] | Non
         red, green, blue = (float(part) for part in text.split(","))
     except ValueError:
         raise CagefieldError(
-            f"--background {text!r} is no colour; give white, black, none, or r,g,b from 0 to 1 such as 0.2,0.4,1"
+            f"--background {text!r} is no colour; give white, black, none, or r,g,b from 0 to 1 (0.2,0.4,1)"
         ) from None
     return red, green, blue
 
@@ -76,4 +78,6 @@ def track(items: Sequence[T] | Iterable[T], what: str, total: int | None = None)
     from rich.progress import track as bar
 
     console = Console(stderr=True)
-    yield from bar(items, description=what, total=total, console=console, transient=True, disable=not console.is_terminal)
+    yield from bar(
+        items, description=what, total=total, console=console, transient=True, disable=not console.is_terminal
+    )

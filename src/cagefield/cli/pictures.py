@@ -42,7 +42,7 @@ class DepthScale:
 
 
 def pictures_of(frames: Sequence[Frame], depth_scale: DepthScale | None = None) -> Pictures:
-    """End of the file name -> picture: the frames side by side, with their depth and normals where there are any.
+    """End of the file name -> picture: the frames side by side, and their depth and normals if any.
 
     A single frame over nothing becomes an RGBA picture.
     """

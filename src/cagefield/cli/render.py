@@ -50,9 +50,9 @@ class Render:
     background: str | None = None
     """white, black, none (transparent PNGs) or r,g,b from 0 to 1; the scene's own if left out."""
     depth: Flag = False
-    """Depth too: grey, near is bright; as NAME_depth.png with the distances in NAME_depth.npy, or in a video beside the picture."""
+    """Depth too, near is bright: NAME_depth.png, distances in NAME_depth.npy; in a video beside it."""
     normals: Flag = False
-    """Normals too, world space, (n + 1) / 2 as rgb; as NAME_normals.png, or in a video beside the picture."""
+    """Normals too, (n + 1) / 2 as rgb, world space: NAME_normals.png; in a video beside it."""
     compare: Flag = False
     """Side by side: the scene before its edits, and after."""
     unedited: Flag = False
@@ -80,7 +80,9 @@ class Render:
         scene = Scene.open(self.scene)
         cameras, fps = self._cameras(scene)
         if single and len(cameras) != 1:
-            raise CagefieldError(f"{self.out} is one picture, the views are {len(cameras)}; give a folder or --views")
+            raise CagefieldError(
+                f"{self.out} is one picture, the views are {len(cameras)}; give a folder or --views"
+            )
         devices.start(self.device)
         pictures = track(self._pictures(scene, cameras), "Rendering", len(cameras))
         if video:
@@ -88,7 +90,9 @@ class Render:
         else:
             digits = max(4, len(str(len(cameras) - 1)))
             for index, picture in enumerate(pictures):
-                write_pictures(self.out.with_suffix("") if single else self.out / f"{index:0{digits}d}", picture)
+                write_pictures(
+                    self.out.with_suffix("") if single else self.out / f"{index:0{digits}d}", picture
+                )
         count = f"{len(cameras)} picture{'s' if len(cameras) > 1 else ''}"
         print(f"{count} in {self.out}")
 
@@ -105,7 +109,9 @@ class Render:
             raise CagefieldError(f"--fps is {self.fps}; give a number above 0 and up to 1000")
         background = parse_background(self.background)
         if background == "none" and (self.compare or self.out.suffix.lower() == ".mp4"):
-            raise CagefieldError("--background none makes transparent PNGs; give a colour for --compare or a video")
+            raise CagefieldError(
+                "--background none makes transparent PNGs; give a colour for --compare or a video"
+            )
 
     def _cameras(self, scene: Scene) -> tuple[list[Camera], float]:
         """The cameras to render, at their final size, and the frame rate."""
@@ -130,10 +136,14 @@ class Render:
         cameras = scene.cameras.get(self.split, ())
         if not cameras:
             known = ", ".join(f"{name} ({len(c)})" for name, c in scene.cameras.items() if c) or "none"
-            raise CagefieldError(f"scene {self.scene} has no {self.split!r} cameras, it has {known}; give --split")
+            raise CagefieldError(
+                f"scene {self.scene} has no {self.split!r} cameras, it has {known}; give --split"
+            )
         for index in self.views:
             if not 0 <= index < len(cameras):
-                raise CagefieldError(f"--views {index} is out of range; {self.split} views go from 0 to {len(cameras) - 1}")
+                raise CagefieldError(
+                    f"--views {index} is out of range; {self.split} views go from 0 to {len(cameras) - 1}"
+                )
         return tuple(cameras[index] for index in self.views) or cameras
 
     def _pictures(self, scene: Scene, cameras: list[Camera]) -> Iterator[Pictures]:
@@ -147,7 +157,8 @@ class Render:
         scale: DepthScale | None = None
         for camera in cameras:
             frames = [
-                one.render(camera, background=background, normals=self.normals, exact=self.exact) for one in shown
+                one.render(camera, background=background, normals=self.normals, exact=self.exact)
+                for one in shown
             ]
             if self.depth and scale is None:
                 scale = DepthScale.fitted([frame.depth for frame in frames])
