@@ -1,0 +1,367 @@
+"""Cages: the hexahedra that say what moves and how much of the surroundings may give way.
+
+Corner k = x + 2y + 4z with x, y, z in {0, 1} along the cage's own axes (VTK voxel order). Edges are corner
+pairs (i, j), i < j, that differ in one bit. Faces are "+x", "-x", "+y", "-y", "+z", "-z" of the same axes.
+Angles are radians, lengths world units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from cagefield import hexahedron
+from cagefield.errors import CageError
+from cagefield.hexahedron import Array, Mask
+
+Axes: TypeAlias = Literal["world", "cage"]
+
+EDGES: tuple[tuple[int, int], ...] = tuple(
+    (i, i | 1 << axis) for axis in range(3) for i in range(8) if not i >> axis & 1
+)
+FACES: dict[str, tuple[int, int, int, int]] = {
+    f"{sign}{name}": tuple(k for k in range(8) if (k >> axis & 1) == bit)  # type: ignore[misc]
+    for axis, name in enumerate("xyz")
+    for sign, bit in (("+", 1), ("-", 0))
+}
+
+_FLAT = 1e-9
+"""Least Jacobian determinant of a valid cage, as a share of the product of its mean edge lengths."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cage:
+    """A hexahedron with 8 corners, 12 edges and 6 bilinear faces; operations return a new cage.
+
+    A point of the cage is x(u) = sum_k N_k(u) corners[k], u in [0,1]^3. The Jacobian determinant of this map
+    must be positive over the whole cage.
+
+    Parameters: corners [8,3] in world units; pivot [3], about which `rotate`, `scale` and `shear` turn. The
+    pivot of a new cage is its centre, travels with `translate`, and stays where it is when a corner, an edge
+    or a face is moved.
+
+    Raises `CageError` when a corner is not finite, or the cage is flat, mirrored or inside out.
+
+    Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", section 3. Its formula for the
+    centre divides the sum of the corners by 6; a hexahedron has 8, and the centre here is their mean. Its
+    R_z is the transpose of the right-handed rotation; rotations here are right-handed.
+    """
+
+    corners: Array
+    pivot: Array = field(default=None, kw_only=True)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        corners = _read_only(self.corners, (8, 3), "cage corners")
+        pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
+        object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "pivot", _read_only(pivot, (3,), "cage pivot"))
+        _check_orientation(corners)
+
+    @classmethod
+    def box(cls, center: ArrayLike, size: ArrayLike, rotation: ArrayLike = (0.0, 0.0, 0.0)) -> Cage:
+        """A box: centre [3], full edge lengths [3] (or one for a cube), intrinsic XYZ rotation in radians."""
+        c = vector(center, "cage center")
+        s = factors(size, "cage size")
+        offsets = (hexahedron.BITS - 0.5) * s
+        theta = vector(rotation, "cage rotation")
+        if theta.any():
+            offsets = offsets @ rotation_matrix(theta).T
+        return cls(c + offsets, pivot=c)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Cage):
+            return NotImplemented
+        return np.array_equal(self.corners, other.corners) and np.array_equal(self.pivot, other.pivot)
+
+    def __hash__(self) -> int:
+        return hash((self.corners.tobytes(), self.pivot.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"Cage(corners={self.corners.tolist()})"
+
+    @property
+    def center(self) -> Array:
+        """Mean of the 8 corners [3]."""
+        return np.asarray(self.corners.mean(axis=0))
+
+    @property
+    def edges(self) -> tuple[tuple[int, int], ...]:
+        """The 12 corner pairs (i, j), i < j: four along x, four along y, four along z."""
+        return EDGES
+
+    @property
+    def faces(self) -> dict[str, tuple[int, int, int, int]]:
+        """The corner numbers of each face, by name."""
+        return dict(FACES)
+
+    @property
+    def aabb(self) -> Array:
+        """Axis-aligned box [2,3] (min, max) of the cage; the cage lies in the hull of its corners."""
+        return np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
+
+    @cached_property
+    def affine(self) -> tuple[Array, Array]:
+        """(A [3,3], b [3]) with x(u) = b + A u: exact where `is_affine`, else the least-squares fit."""
+        C = hexahedron.coefficients(self.corners)
+        A = 2.0 * C[[1, 2, 4]].T
+        return A, C[0] - A.sum(axis=1) / 2.0
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """True when the cage is a parallelepiped, to 1e-12 of its extent."""
+        C = hexahedron.coefficients(self.corners)
+        return bool(np.abs(C[[3, 5, 6, 7]]).max() <= 1e-12 * np.abs(C[[1, 2, 4]]).max())
+
+    @property
+    def frame(self) -> tuple[Array, Array]:
+        """(origin [3], edge vectors as columns [3,3]) of the least box in the affine frame that holds the cage."""
+        A, b = self.affine
+        if self.is_affine:
+            return b, A
+        u = (self.corners - b) @ np.linalg.inv(A).T
+        low, high = u.min(axis=0), u.max(axis=0)
+        return b + A @ low, A * (high - low)
+
+    def grown(self, margin: ArrayLike) -> Cage:
+        """A parallelepiped around the cage: its `frame` moved outwards by a margin > 0, one or three.
+
+        The margin is in world units along the frame's edges, the same on both sides.
+        """
+        m = factors(margin, "margin")
+        origin, edges = self.frame
+        lengths = np.linalg.norm(edges, axis=0)
+        origin = origin - edges @ (m / lengths)
+        return Cage(origin + hexahedron.BITS @ (edges * (1.0 + 2.0 * m / lengths)).T)
+
+    @property
+    def axes(self) -> Array:
+        """Unit edge directions at the cage's middle, as the columns of a [3,3] matrix."""
+        A = self.affine[0]
+        return np.asarray(A / np.linalg.norm(A, axis=0))
+
+    def coordinates(self, points: ArrayLike) -> tuple[Array, Mask]:
+        """(u [N,3], inside [N]) of points [N,3]: u in [0,1]^3 where inside, else unspecified."""
+        p = np.asarray(points, dtype=np.float64)
+        u = np.full(p.shape, np.nan)
+        mask = np.zeros(len(p), dtype=bool)
+        low, high = self.aabb
+        slack = 1e-9 * (high - low)
+        near = np.flatnonzero(((p >= low - slack) & (p <= high + slack)).all(axis=1))
+        if self.is_affine:
+            A, b = self.affine
+            u[near] = (p[near] - b) @ np.linalg.inv(A).T
+            mask[near] = hexahedron.inside(u[near], np.ones(len(near), dtype=bool))
+        else:
+            u[near], found = hexahedron.inverse(self.corners, p[near])
+            mask[near] = hexahedron.inside(u[near], found)
+        return u, mask
+
+    def contains(self, points: ArrayLike) -> Mask:
+        """Mask [N] of the points [N,3] in the closed cage; exact for planar and for bilinear faces."""
+        return self.coordinates(points)[1]
+
+    def translate(self, by: ArrayLike) -> Cage:
+        """The cage moved by a vector [3]; the pivot travels with it."""
+        v = vector(by, "translate")
+        return Cage(self.corners + v, pivot=self.pivot + v)
+
+    def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Cage:
+        """The cage turned about its pivot by R_x R_y R_z, intrinsic XYZ angles [3] in radians.
+
+        As `scipy.spatial.transform.Rotation.from_euler("XYZ")`. axes="cage" turns about the cage's own x, y
+        and z directions instead of the world's.
+        """
+        R = rotation_matrix(vector(theta, "rotate"))
+        if axes == "cage":
+            U, _, Vt = np.linalg.svd(self.axes)  # the rotation nearest to the edge directions
+            R = (U @ Vt) @ R @ (U @ Vt).T
+        return self._linear(R, axes)
+
+    def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Cage:
+        """The cage scaled about its pivot by one factor or three, each > 0.
+
+        axes="world" scales along the world's x, y, z; axes="cage" along the cage's own edges.
+        """
+        return self._linear(np.diag(factors(by, "scale")), axes, own=True)
+
+    def shear(
+        self,
+        *,
+        xy: float = 0.0,
+        xz: float = 0.0,
+        yx: float = 0.0,
+        yz: float = 0.0,
+        zx: float = 0.0,
+        zy: float = 0.0,
+        axes: Axes = "world",
+    ) -> Cage:
+        """The cage sheared about its pivot: `xy` adds xy * y to x, and so on for the other pairs."""
+        S = np.array([[1.0, xy, xz], [yx, 1.0, yz], [zx, zy, 1.0]])
+        if not np.isfinite(S).all():
+            raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
+        if np.linalg.det(S) <= 0.0:
+            raise CageError(
+                f"shear must not turn space inside out: {_named_shears(S)} has determinant"
+                f" {np.linalg.det(S):.3g}; use smaller factors"
+            )
+        return self._linear(S, axes, own=True)
+
+    def move_corner(self, corner: int, by: ArrayLike) -> Cage:
+        """The cage with corner k, 0 to 7, moved by a vector [3]; the pivot stays."""
+        return self._move((_corner_number(corner),), vector(by, "move_corner"))
+
+    def move_edge(self, edge: tuple[int, int], by: ArrayLike) -> Cage:
+        """The cage with both corners of edge (i, j) moved by a vector [3]; the pivot stays."""
+        pair = tuple(sorted(_corner_number(k) for k in edge))
+        if pair not in EDGES:
+            raise CageError(f"edge {tuple(edge)} is not an edge of a cage: the edges are {list(EDGES)}")
+        return self._move(pair, vector(by, "move_edge"))
+
+    def move_face(self, face: str, by: ArrayLike) -> Cage:
+        """The cage with the four corners of a face, such as "+x", moved by a vector [3]; the pivot stays."""
+        if face not in FACES:
+            raise CageError(f'face "{face}" is not a face of a cage: the faces are {", ".join(FACES)}')
+        return self._move(FACES[face], vector(by, "move_face"))
+
+    def _linear(self, M: Array, axes: Axes, own: bool = False) -> Cage:
+        if axes not in ("world", "cage"):
+            raise CageError(f'axes must be "world" or "cage", got "{axes}"')
+        if own and axes == "cage":
+            M = self.axes @ M @ np.linalg.inv(self.axes)
+        return Cage(self.pivot + (self.corners - self.pivot) @ M.T, pivot=self.pivot)
+
+    def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
+        moved = self.corners.copy()
+        moved[list(corners)] += by
+        return Cage(moved, pivot=self.pivot)
+
+
+def rotation_matrix(theta: ArrayLike) -> Array:
+    """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
+    return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())
+
+
+def vector(value: ArrayLike, name: str) -> Array:
+    """A finite float64 vector [3], or a `CageError` that names it."""
+    v = _read_only(value, (3,), name)
+    return v
+
+
+def factors(value: ArrayLike, name: str) -> Array:
+    """Three positive finite factors [3] from one or three, or a `CageError` that names them."""
+    raw = np.asarray(value, dtype=np.float64)
+    v = _read_only(np.full(3, raw) if raw.ndim == 0 else raw, (3,), name)
+    if not (v > 0.0).all():
+        axis = int(np.argmin(v))
+        raise CageError(f"{name} must be positive along every axis, got {v[axis]:g} along {'xyz'[axis]}")
+    return v
+
+
+def outside_by(cage: Cage, point: ArrayLike) -> tuple[str, float]:
+    """(face, distance) of the face of the cage that the point [3] is furthest outside of.
+
+    The distance is signed, positive outside, and measured from the face's nearest point along the outward
+    normal there; for planar faces it is the distance to the face's plane.
+    """
+    p = vector(point, "point")
+    best = ("", -np.inf)
+    for name, ids in FACES.items():
+        distance = _face_distance(cage, ids, p, outward=1.0 if name[0] == "+" else -1.0)
+        if distance > best[1]:
+            best = (name, distance)
+    return best
+
+
+def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -> float:
+    """Signed distance of p from the bilinear face with corners `ids`, along the normal at the nearest point."""
+    v = cage.corners[list(ids)]
+    axis = next(a for a in range(3) if len({k >> a & 1 for k in ids}) == 1)
+    a, b = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9))
+    s, t = a.ravel(), b.ravel()
+    grid = np.outer((1 - s) * (1 - t), v[0]) + np.outer(s * (1 - t), v[1])
+    grid += np.outer((1 - s) * t, v[2]) + np.outer(s * t, v[3])
+    nearest = int(np.argmin(((grid - p) ** 2).sum(axis=1)))
+    st = np.array([s[nearest], t[nearest]])
+    for _ in range(20):
+        ds = (1 - st[1]) * (v[1] - v[0]) + st[1] * (v[3] - v[2])
+        dt = (1 - st[0]) * (v[2] - v[0]) + st[0] * (v[3] - v[1])
+        x = v[0] + st[0] * (v[1] - v[0]) + st[1] * dt
+        st = np.clip(st + np.linalg.lstsq(np.stack([ds, dt], axis=1), p - x, rcond=None)[0], 0.0, 1.0)
+    # The face's two directions taken in cyclic order span the axis' positive normal; y has them swapped.
+    normal = np.cross(ds, dt) * (outward if axis != 1 else -outward)
+    return float((p - x) @ normal / np.linalg.norm(normal))
+
+
+def _read_only(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CageError(f"{name} must be numbers of shape {list(shape)}, got {value!r}") from None
+    if array.shape != shape:
+        raise CageError(f"{name} must have shape {list(shape)}, got {list(array.shape)}")
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        label = f"{name}: corner {where[0]}" if len(shape) == 2 else name
+        shown = array[where[0]] if len(shape) == 2 else array
+        raise CageError(f"{label} must be finite, got {format_vector(shown)}")
+    array.setflags(write=False)
+    return array
+
+
+def format_vector(v: Array) -> str:
+    """A point as text, "(0.41, 0.10, 0.93)"."""
+    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
+
+
+def _corner_number(corner: int) -> int:
+    if isinstance(corner, bool) or not isinstance(corner, (int, np.integer)) or not 0 <= corner <= 7:
+        raise CageError(f"corner {corner!r} is not a corner of a cage: corners are 0 to 7, k = x + 2y + 4z")
+    return int(corner)
+
+
+def _named_shears(S: Array) -> str:
+    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
+    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)
+
+
+def _check_orientation(corners: Array) -> None:
+    """Raise `CageError` where the Jacobian determinant is not positive over the whole hexahedron."""
+    pairs = np.array(EDGES)
+    lengths = np.linalg.norm(corners[pairs[:, 1]] - corners[pairs[:, 0]], axis=1).reshape(3, 4).mean(axis=1)
+    bernstein = hexahedron.determinant_coefficients(corners)
+    floor = _FLAT * lengths.prod()
+    if floor > 0.0 and hexahedron.is_positive(bernstein - floor):
+        return
+    at_corners = bernstein[::2, ::2, ::2].transpose(2, 1, 0).ravel()  # corner k = x + 2y + 4z
+    k = int(np.argmin(at_corners))
+    where = f"corner {k} at {format_vector(corners[k])}"
+    if lengths.min() == 0.0 or np.abs(at_corners).max() <= floor:
+        raise CageError(
+            f"cage has zero size: its mean edges along x, y, z are {format_vector(lengths)} long and {where}"
+            " spans no volume; give it a positive size along every axis"
+        )
+    if at_corners.max() < 0.0:
+        raise CageError(
+            f"cage is mirrored: the Jacobian determinant is negative at every corner ({at_corners[k]:.3g} at"
+            f" {where}); list the corners in the order k = x + 2y + 4z of a right-handed frame"
+        )
+    if at_corners.min() > floor:
+        g = np.linspace(0.0, 1.0, 17)
+        u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
+        det = np.linalg.det(hexahedron.jacobian(corners, u))
+        worst = int(np.argmin(det))
+        k = int(np.argmin(((hexahedron.BITS - u[worst]) ** 2).sum(axis=1)))
+        raise CageError(
+            f"cage is inside out between its corners, nearest to corner {k} at {format_vector(corners[k])}:"
+            f" the Jacobian determinant there falls to {det[worst]:.3g} and must stay positive; move corner"
+            f" {k} away from the middle of the cage"
+        )
+    raise CageError(
+        f"cage is inside out at {where}: the Jacobian determinant there is {at_corners[k]:.3g} and must be"
+        f" positive; move corner {k} back from the opposite faces"
+    )

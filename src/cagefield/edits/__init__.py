@@ -1,0 +1,32 @@
+"""Edits of a radiance field: what moves, how, and what becomes of the surroundings."""
+
+from __future__ import annotations
+
+from cagefield.edits.edit import Edit
+
+from cagefield.edits.operations import (
+    MoveCorner,
+    MoveEdge,
+    MoveFace,
+    Operation,
+    Rotate,
+    Scale,
+    Shear,
+    Translate,
+)
+from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack
+
+__all__ = [
+    "CanonicalSamples",
+    "DeformedPoints",
+    "Edit",
+    "EditStack",
+    "MoveCorner",
+    "MoveEdge",
+    "MoveFace",
+    "Operation",
+    "Rotate",
+    "Scale",
+    "Shear",
+    "Translate",
+]

@@ -1,0 +1,291 @@
+"""One edit: two cages, the operations that move the inner one, and the kind of adjustment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cagefield.cages import Axes, Cage, format_vector, outside_by
+from cagefield.edits import operations as ops
+from cagefield.edits.operations import Operation
+from cagefield.errors import CageError, EditError
+from cagefield.hexahedron import Array
+from cagefield.warps import SHELLS, Shell, Warp
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.discrete import DiscreteWarp
+from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.warps.lattice import Lattice
+
+Adjustment: TypeAlias = Literal["continuous", "discrete"]
+
+LATTICE_RANGE = (2, 512)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """An inner cage that moves, and what becomes of the rest. Operations return a new edit.
+
+    Parameters
+    - inner: the canonical inner cage V^c: where the content is in the trained field.
+    - outer: the outer cage V^o, which confines a continuous edit; ignored by a discrete one.
+    - adjustment: "continuous" (the shell between the cages is interpolated and the field stays connected) or
+      "discrete" (only the inner region changes: moved, with `keep_source` copied, with `deleted` removed).
+    - shell: the continuous map between the cages, a name in `warps.SHELLS`.
+    - operations: what moved the inner cage, in order; `deformed` is the result.
+    - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
+      (64, 128 or 256 in the paper). The inner region is exact either way.
+    - enabled: False hides the edit in a stack.
+    - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
+      sheets is shown.
+
+    Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
+    shells are reported by `check`, which every evaluation calls.
+    """
+
+    inner: Cage
+    outer: Cage | None = None
+    adjustment: Adjustment = "continuous"
+    shell: str = "trilinear"
+    keep_source: bool = False
+    name: str = ""
+    operations: tuple[Operation, ...] = ()
+    lattice: int | None = None
+    enabled: bool = True
+    allow_folding: bool = False
+    deleted: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "operations", tuple(self.operations))
+        self._check_options()
+        self.deformed  # noqa: B018  an operation that makes an impossible cage is an error here
+
+    @classmethod
+    def delete(cls, cage: Cage, *, name: str = "") -> Edit:
+        """The edit that empties a cage."""
+        return cls(cage, adjustment="discrete", deleted=True, name=name)
+
+    @cached_property
+    def deformed(self) -> Cage:
+        """The inner cage after all operations."""
+        cage = self.inner
+        for number, operation in enumerate(self.operations, start=1):
+            try:
+                cage = operation.apply(cage)
+            except CageError as error:
+                raise self._error(f"operation {number} ({operation.noun} {operation}): {error}") from None
+        return cage
+
+    def translate(self, by: ArrayLike) -> Edit:
+        """The edit with its inner cage moved by a vector [3]."""
+        return self.then(ops.Translate(ops.displacement(by, "translate")))
+
+    def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Edit:
+        """The edit with its inner cage turned about its pivot, intrinsic XYZ angles [3] in radians."""
+        return self.then(ops.Rotate.from_radians(theta, axes))
+
+    def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Edit:
+        """The edit with its inner cage scaled about its pivot by one factor or three."""
+        return self.then(ops.Scale.of(by, axes))
+
+    def shear(self, *, axes: Axes = "world", **factors: float) -> Edit:
+        """The edit with its inner cage sheared about its pivot; factors xy, xz, yx, yz, zx, zy."""
+        return self.then(ops.Shear(**factors, axes=axes))
+
+    def move_corner(self, corner: int, by: ArrayLike) -> Edit:
+        """The edit with one corner of its inner cage moved by a vector [3]."""
+        return self.then(ops.MoveCorner(corner, ops.displacement(by, "move_corner")))
+
+    def move_edge(self, edge: tuple[int, int], by: ArrayLike) -> Edit:
+        """The edit with an edge (i, j) of its inner cage moved by a vector [3]."""
+        return self.then(ops.MoveEdge((edge[0], edge[1]), ops.displacement(by, "move_edge")))
+
+    def move_face(self, face: str, by: ArrayLike) -> Edit:
+        """The edit with a face of its inner cage, such as "+x", moved by a vector [3]."""
+        return self.then(ops.MoveFace(face, ops.displacement(by, "move_face")))
+
+    def then(self, operation: Operation) -> Edit:
+        """The edit with one more operation."""
+        return self.replace(operations=(*self.operations, operation))
+
+    def replace(self, **changes: Any) -> Edit:
+        """The edit with some fields changed."""
+        return replace(self, **changes)
+
+    @cached_property
+    def changes_anything(self) -> bool:
+        """False when the inner cage is where it was (and not deleted): the map is the identity."""
+        return self.deleted or not np.array_equal(self.inner.corners, self.deformed.corners)
+
+    @property
+    def boxes(self) -> Array:
+        """Deformed-space boxes [B,2,3] (min, max), B 0 to 2, outside which the edit changes nothing."""
+        cages: list[Cage] = []
+        if self.changes_anything:
+            if self.adjustment == "continuous" and self.outer is not None:
+                cages = [self.outer]
+            else:
+                cages = [] if self.deleted else [self.deformed]
+                cages += [] if self.keep_source else [self.inner]
+        return np.array([cage.aabb for cage in cages]).reshape(-1, 2, 3)
+
+    @property
+    def bounds(self) -> Array:
+        """The box [2,3] that holds `boxes`; (inf, -inf) for an edit that changes nothing."""
+        return bounds_of(self.boxes)
+
+    @cached_property
+    def warp(self) -> Warp:
+        """The map of this edit. Raises `EditError` as `check` does."""
+        self.check()
+        inner = HexahedronMap(self.inner, self.deformed)
+        if self.adjustment == "discrete" or self.outer is None:
+            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source)
+        exact = ContinuousWarp(inner, self.outer, self._shell(self.deformed))
+        if self.lattice is None:
+            return exact
+        lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, self.outer, self.lattice)
+        return replace(exact, lattice=lattice)
+
+    def check(self) -> None:
+        """Raise `EditError` where the edit cannot be evaluated, naming what is wrong and what is still safe.
+
+        A continuous edit's inner cage must lie in its outer cage, before and after the operations, and its
+        shell must not fold (unless `allow_folding`).
+        """
+        if self.adjustment == "discrete" or self.outer is None:
+            return
+        start = self._problem(self.inner)
+        if start is not None:
+            raise self._error(start.message + start.cure)
+        problem = self._problem(self.deformed)
+        if problem is not None:
+            raise self._error(problem.message + self._safe_part() + problem.cure)
+
+    def safe_fraction(self, operation: Operation | None = None) -> float:
+        """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
+
+        1.0 where the whole operation is safe; otherwise everything from 0 to t is. The last operation is
+        meant where none is given. A discrete edit is limited only by its cage turning inside out.
+        """
+        before = self
+        if operation is None:
+            if not self.operations:
+                return 1.0
+            before, operation = self.replace(operations=self.operations[:-1]), self.operations[-1]
+        return before._largest_part(operation)
+
+    def _largest_part(self, operation: Operation) -> float:
+        cage = self.deformed
+
+        def safe(t: float) -> bool:
+            try:
+                return self._problem(operation.part(t).apply(cage)) is None
+            except CageError:
+                return False
+
+        return largest_safe(safe)
+
+    def _safe_part(self) -> str:
+        """What is still safe of the operation after which the edit never recovered, as a clause."""
+        for number in range(len(self.operations), 0, -1):
+            before = self.replace(operations=self.operations[: number - 1])
+            if before._problem(before.deformed) is None:
+                operation = self.operations[number - 1]
+                fraction = np.floor(100.0 * before._largest_part(operation)) / 100.0
+                return f"; {fraction:.2f} of this {operation.noun} (operation {number}, {operation}) is safe"
+        return ""
+
+    def _problem(self, deformed: Cage) -> _Problem | None:
+        """Why the edit cannot be evaluated with its inner cage at `deformed`, or None."""
+        if self.adjustment == "discrete" or self.outer is None:
+            return None
+        u, inside = self.outer.coordinates(deformed.corners)
+        if not inside.all():
+            distances = [outside_by(self.outer, corner) for corner in deformed.corners]
+            k = max(np.flatnonzero(~inside), key=lambda corner: distances[corner][1])
+            face, distance = distances[k]
+            return _Problem(
+                f"outer cage must contain the inner cage: inner corner {k} at"
+                f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
+                '; enlarge the outer cage or use adjustment="discrete"',
+            )
+        if self.allow_folding:
+            return None
+        problem = self._shell(deformed).problem()
+        if problem is None:
+            return None
+        return _Problem(
+            f"the {self.shell} shell {problem}",
+            '; reduce it, enlarge the outer cage, or use adjustment="discrete"'
+            if deformed is not self.inner
+            else "",
+        )
+
+    def _shell(self, deformed: Cage) -> Shell:
+        if self.outer is None:
+            raise self._error("a shell needs an outer cage")
+        return SHELLS[self.shell](self.inner, deformed, self.outer)
+
+    def _check_options(self) -> None:
+        if self.adjustment not in ("continuous", "discrete"):
+            raise self._error(f'adjustment must be "continuous" or "discrete", got "{self.adjustment}"')
+        if self.shell not in SHELLS:
+            raise self._error(f'shell must be one of {", ".join(SHELLS)}, got "{self.shell}"')
+        if self.adjustment == "continuous":
+            if self.outer is None:
+                raise self._error(
+                    "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
+                    ' adjustment="discrete"'
+                )
+            if self.keep_source or self.deleted:
+                raise self._error(
+                    f'{"deleted" if self.deleted else "keep_source"} needs adjustment="discrete"'
+                )
+        if self.deleted and (self.operations or self.keep_source):
+            raise self._error("a delete has no operations and keeps no source")
+        low, high = LATTICE_RANGE
+        if self.lattice is not None and not (
+            isinstance(self.lattice, int) and not isinstance(self.lattice, bool) and low <= self.lattice <= high
+        ):
+            raise self._error(
+                f"lattice must be None (exact) or a whole number of nodes per axis from {low} to {high}"
+                f" (64, 128 or 256, say), got {self.lattice!r}"
+            )
+
+    def _error(self, message: str) -> EditError:
+        return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")
+
+
+@dataclass(frozen=True)
+class _Problem:
+    message: str
+    cure: str
+
+
+def bounds_of(boxes: Array) -> Array:
+    """The box [2,3] that holds boxes [B,2,3]; (inf, -inf) for none."""
+    return np.stack(
+        [boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)]
+    )
+
+
+def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:
+    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe; 1.0 where safe(1).
+
+    Goes up in sixteenths to the first that is not safe and bisects in front of it.
+    """
+    if safe(1.0):
+        return 1.0
+    if not safe(0.0):
+        return 0.0
+    high = next((n / 16.0 for n in range(1, 17) if not safe(n / 16.0)), 1.0)
+    low = high - 1.0 / 16.0
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if safe(middle) else (low, middle)
+    return low

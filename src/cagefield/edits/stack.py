@@ -1,0 +1,165 @@
+"""Edits in order, and the map of all of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import SupportsIndex
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cagefield.edits.edit import Edit, bounds_of
+from cagefield.errors import EditError
+from cagefield.hexahedron import Array, Mask
+
+
+@dataclass(frozen=True)
+class CanonicalSamples:
+    """Samples of deformed space, taken to canonical space.
+
+    points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where no
+    view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); emptied [N], True where the field
+    must be read as empty.
+    """
+
+    points: Array
+    viewdirs: Array | None
+    stretch: Array | None
+    jacobian: Array
+    emptied: Mask
+
+
+@dataclass(frozen=True)
+class DeformedPoints:
+    """Canonical points, taken to deformed space.
+
+    points [N,3]; jacobian [N,3,3], d(deformed)/d(canonical); hidden [N], True where nothing in the deformed
+    scene shows the canonical point (deleted, or covered by moved content).
+    """
+
+    points: Array
+    jacobian: Array
+    hidden: Mask
+
+
+@dataclass(frozen=True)
+class EditStack:
+    """Edits e_1 ... e_n: the deformed field of e_k is the canonical field of e_(k+1).
+
+    A sample goes through phi_n first and phi_1 last. Edits that are not enabled, or change nothing, are
+    passed over.
+    """
+
+    edits: tuple[Edit, ...] = ()
+
+    def __init__(self, edits: Iterable[Edit] = ()) -> None:
+        object.__setattr__(self, "edits", tuple(edits))
+        for number, edit in enumerate(self.edits):
+            if not isinstance(edit, Edit):
+                raise EditError(f"an edit stack holds edits: item {number} is a {type(edit).__name__}")
+
+    def __len__(self) -> int:
+        return len(self.edits)
+
+    def __iter__(self) -> Iterator[Edit]:
+        return iter(self.edits)
+
+    def __getitem__(self, number: SupportsIndex) -> Edit:
+        return self.edits[number]
+
+    @property
+    def active(self) -> tuple[Edit, ...]:
+        """The edits that are enabled and change something, in order."""
+        return tuple(edit for edit in self.edits if edit.enabled and edit.changes_anything)
+
+    def append(self, edit: Edit) -> EditStack:
+        """The stack with one more edit at its end."""
+        return EditStack((*self.edits, edit))
+
+    def set(self, number: int, edit: Edit) -> EditStack:
+        """The stack with one edit replaced."""
+        edits = list(self.edits)
+        edits[number] = edit
+        return EditStack(edits)
+
+    def remove(self, number: int) -> EditStack:
+        """The stack without one edit."""
+        edits = list(self.edits)
+        del edits[number]
+        return EditStack(edits)
+
+    def move(self, number: int, to: int) -> EditStack:
+        """The stack with one edit taken out and put in at another place."""
+        edits = list(self.edits)
+        edits.insert(to, edits.pop(number))
+        return EditStack(edits)
+
+    @property
+    def boxes(self) -> Array:
+        """Boxes [B,2,3] (min, max) outside all of which no active edit changes anything.
+
+        Each is in its own edit's deformed space; a point outside all of them goes through the stack as it is.
+        """
+        return np.concatenate([np.zeros((0, 2, 3)), *(edit.boxes for edit in self.active)])
+
+    @property
+    def bounds(self) -> Array:
+        """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
+        return bounds_of(self.boxes)
+
+    def check(self) -> None:
+        """Raise `EditError` for the first active edit that cannot be evaluated."""
+        for edit in self.active:
+            edit.check()
+
+    def to_canonical(self, points: ArrayLike, viewdirs: ArrayLike | None = None) -> CanonicalSamples:
+        """Canonical samples of deformed points [N,3], with view directions [N,3] taken along if given.
+
+        Raises `EditError` where an active edit cannot be evaluated.
+        """
+        p = _points(points, "points").copy()
+        J = np.tile(np.eye(3), (len(p), 1, 1))
+        emptied = np.zeros(len(p), dtype=bool)
+        for edit in reversed(self.active):
+            rows = np.flatnonzero(_in_any(edit.boxes, p) & ~emptied)
+            mapped = edit.warp.to_canonical(p[rows])
+            p[rows], J[rows], emptied[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
+        if viewdirs is None:
+            return CanonicalSamples(p, None, None, J, emptied)
+        d = _points(viewdirs, "viewdirs")
+        if d.shape != p.shape:
+            raise EditError(f"viewdirs must have the shape of points, {list(p.shape)}, got {list(d.shape)}")
+        along = np.einsum("nij,nj->ni", J, d)
+        length = np.linalg.norm(along, axis=1)
+        return CanonicalSamples(p, along / length[:, None], length / np.linalg.norm(d, axis=1), J, emptied)
+
+    def to_deformed(self, points: ArrayLike) -> DeformedPoints:
+        """Deformed positions of canonical points [N,3]; the forward map.
+
+        A copy takes its points to the copy. Raises `EditError` where an active edit cannot be evaluated.
+        """
+        p = _points(points, "points").copy()
+        J = np.tile(np.eye(3), (len(p), 1, 1))
+        hidden = np.zeros(len(p), dtype=bool)
+        for edit in self.active:
+            cages = [edit.inner.aabb] if edit.outer is None else [edit.inner.aabb, edit.outer.aabb]
+            reach = np.concatenate([edit.boxes, np.stack(cages)])
+            rows = np.flatnonzero(_in_any(reach, p) & ~hidden)
+            mapped = edit.warp.to_deformed(p[rows])
+            p[rows], J[rows], hidden[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
+        return DeformedPoints(p, J, hidden)
+
+
+def _in_any(boxes: Array, p: Array) -> Mask:
+    inside = np.zeros(len(p), dtype=bool)
+    for low, high in boxes:
+        inside |= ((p >= low) & (p <= high)).all(axis=1)
+    return inside
+
+
+def _points(value: ArrayLike, name: str) -> Array:
+    p = np.asarray(value, dtype=np.float64)
+    if p.ndim != 2 or p.shape[1] != 3:
+        raise EditError(f"{name} must have shape [N,3], got {list(p.shape)}")
+    return p

@@ -1,0 +1,51 @@
+"""Continuous adjustment: the inner region moves, the shell around it gives way, nothing else changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.hexahedron import Array
+from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.warps.lattice import Lattice
+from cagefield.warps.maps import Mapped, Shell
+
+
+@dataclass(frozen=True)
+class ContinuousWarp:
+    """phi in V, phi' in V^o minus V, the identity outside V^o.
+
+    With a lattice, phi' in `to_canonical` is interpolated from it; V and the outside stay exact.
+    `to_deformed` is always exact, so with a lattice the round trip closes to the lattice's error.
+    """
+
+    inner: HexahedronMap
+    outer: Cage
+    shell: Shell
+    lattice: Lattice | None = None
+
+    def to_canonical(self, points: Array) -> Mapped:
+        """Deformed points [N,3] to canonical space."""
+        shell = self.lattice if self.lattice is not None else self.shell
+        return _by_region(points, self.inner, self.outer, shell.to_canonical)
+
+    def to_deformed(self, points: Array) -> Mapped:
+        """Canonical points [N,3] to deformed space."""
+        return _by_region(points, self.inner.inverse, self.outer, self.shell.to_deformed)
+
+
+def _by_region(
+    points: Array, inner: HexahedronMap, outer: Cage, shell: Callable[[Array], tuple[Array, Array]]
+) -> Mapped:
+    mapped = Mapped.identity(points)
+    in_outer = outer.contains(points)
+    rows = np.flatnonzero(in_outer)
+    in_inner, inner_points, inner_J = inner(points[rows])
+    mapped.put(rows[in_inner], inner_points, inner_J)
+    rest = rows[~in_inner]
+    if len(rest):
+        mapped.put(rest, *shell(points[rest]))
+    return mapped

@@ -1,0 +1,64 @@
+"""What every map returns, and what a shell and a warp must offer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.hexahedron import Array, Mask
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Points after a map, its Jacobians, and the points that have no counterpart.
+
+    points [N,3]; jacobian [N,3,3], d(mapped)/d(given); lost [N]: to canonical space, deformed points that are
+    empty; to deformed space, canonical points that nothing in the deformed scene shows. Lost points are
+    returned where they were, with the identity as Jacobian.
+    """
+
+    points: Array
+    jacobian: Array
+    lost: Mask
+
+    @classmethod
+    def identity(cls, points: Array) -> Mapped:
+        """The points as they are (the same values, bit for bit), each with the identity as Jacobian."""
+        jacobian = np.tile(np.eye(3), (len(points), 1, 1))
+        return cls(points.copy(), jacobian, np.zeros(len(points), dtype=bool))
+
+    def put(self, rows: NDArray[np.intp] | Mask, points: Array, jacobian: Array) -> None:
+        """Write the map's values for some rows."""
+        self.points[rows], self.jacobian[rows] = points, jacobian
+
+
+class Shell(Protocol):
+    """A map of V^o minus V onto V^o minus V^c: equal to phi on the faces of V, the identity on those of V^o.
+
+    Points handed to it lie in the closed shell; what it does with others is not specified.
+    """
+
+    def to_canonical(self, points: Array) -> tuple[Array, Array]:
+        """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3]."""
+
+    def to_deformed(self, points: Array) -> tuple[Array, Array]:
+        """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3]; the inverse."""
+
+    def least_ratio(self) -> float:
+        """Least det J of `to_deformed` over the shell; <= 0 where the shell folds."""
+
+    def problem(self) -> str | None:
+        """Why the shell is not one to one, in words that continue "the trilinear shell ...", or None."""
+
+
+class Warp(Protocol):
+    """The map of one edit, all regions together."""
+
+    def to_canonical(self, points: Array) -> Mapped:
+        """Deformed points [N,3] to canonical space."""
+
+    def to_deformed(self, points: Array) -> Mapped:
+        """Canonical points [N,3] to deformed space."""
