@@ -139,16 +139,21 @@ class Edit:
         return bounds_of(self.boxes)
 
     @cached_property
-    def warp(self) -> Warp:
-        """The map of this edit. Raises `EditError` as `check` does."""
+    def exact_warp(self) -> Warp:
+        """The map of this edit without its lattice. Raises `EditError` as `check` does."""
         self.check()
         inner = HexahedronMap(self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
             return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source)
-        exact = ContinuousWarp(inner, self.outer, self._shell(self.deformed))
-        if self.lattice is None:
+        return ContinuousWarp(inner, self.outer, self._shell(self.deformed))
+
+    @cached_property
+    def warp(self) -> Warp:
+        """The map of this edit, through its lattice if it has one. Raises `EditError` as `check` does."""
+        exact = self.exact_warp
+        if self.lattice is None or not isinstance(exact, ContinuousWarp):
             return exact
-        lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, self.outer, self.lattice)
+        lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)
         return replace(exact, lattice=lattice)
 
     def check(self) -> None:

@@ -1,0 +1,429 @@
+"""The maps of an edit stack for one sample, inside Quadrants kernels, in float32.
+
+An edit is one row of `params`. Its regions are hexahedra, each a record of `RECORD` numbers: an affine flag;
+W [3,3] and c [3] with y = W (p - c); the box of the hexahedron in y; the bend K [4,3] of
+y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta, xi in [-1,1]^3; and the monomial coefficients
+C [8,3] of its image in canonical space (see `cagefield.hexahedron`). Records: 0 is V with its image V^c,
+1 is V^o for a continuous edit and V^c for a discrete one, 2 to 7 are the sides of the trilinear shell.
+
+The float64 reference of everything here is `Edit.warp` and `EditStack.to_canonical`.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import quadrants as qd
+from numpy.typing import NDArray
+
+from cagefield import devices, hexahedron
+from cagefield.cages import Cage
+from cagefield.errors import EditError
+from cagefield.hexahedron import Array
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.discrete import DiscreteWarp
+from cagefield.warps.maps import Warp
+from cagefield.warps.trilinear_shell import TrilinearShell
+
+vec3 = qd.math.vec3
+mat3 = qd.types.matrix(3, 3, qd.f32)
+Params = qd.types.ndarray(dtype=qd.f32, ndim=2)
+Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
+
+# Columns of `params`.
+BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
+FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
+CONTINUOUS = 8  # 1, or 0 for a discrete edit
+RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly
+OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no further than 2^24
+TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
+RECORDS = 24
+AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
+WIDTH = RECORDS + 8 * RECORD
+
+EDGE = 1e-6
+"""A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""
+
+BOX_SLACK = 1e-5
+"""Boxes are this share of their size larger than the edit, so that no float32 sample inside it is missed."""
+
+
+class PackedEdit(Protocol):
+    """What of an edit is packed."""
+
+    @property
+    def exact_warp(self) -> Warp: ...
+
+    @property
+    def lattice(self) -> int | None: ...
+
+    @property
+    def boxes(self) -> Array: ...
+
+
+class PackedStack(Protocol):
+    """What of an edit stack is packed."""
+
+    @property
+    def active(self) -> Sequence[PackedEdit]: ...
+
+
+@dataclass(frozen=True)
+class DeviceStack:
+    """An edit stack packed for kernels.
+
+    params [max(E,1), WIDTH] float32; lattice [M,3] float32, all edits' nodes one after the other (x fastest),
+    displacements in world units; n_edits E; boxes [B,2,3] float32 (min, max), one or two for each edit,
+    outside all of which a sample is canonical as it is.
+    """
+
+    params: NDArray[np.float32]
+    lattice: NDArray[np.float32]
+    n_edits: int
+    boxes: NDArray[np.float32]
+
+    @classmethod
+    def from_stack(cls, stack: PackedStack) -> "DeviceStack":
+        """The stack's enabled edits that change something. Raises `EditError` where one cannot be evaluated.
+
+        Lattices are sampled here, by the kernel, and kept for as long as their edit lives.
+        """
+        edits = stack.active
+        params = np.zeros((max(len(edits), 1), WIDTH), dtype=np.float32)
+        lattices: list[NDArray[np.float32]] = []
+        offset = 0
+        for row, edit in zip(params, edits, strict=False):
+            _pack(row, edit)
+            if edit.lattice is not None and isinstance(edit.exact_warp, ContinuousWarp):
+                nodes = _lattice(edit, row)
+                row[RESOLUTION] = edit.lattice
+                row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
+                offset += len(nodes)
+                lattices.append(nodes)
+        nodes = np.concatenate(lattices) if lattices else np.zeros((1, 3), dtype=np.float32)
+        boxes = [np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits]
+        return cls(params, nodes, len(edits), np.concatenate(boxes).astype(np.float32))
+
+    def to_canonical(
+        self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+        """(points [N,3], viewdirs [N,3], stretch [N], emptied [N]) of samples, by `map_sample`."""
+        devices.start()
+        n = len(points)
+        out = np.empty((n, 8), dtype=np.float32)
+        samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
+        if n:
+            _map_samples(samples, out, self.params, self.lattice, self.n_edits)
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
+
+
+@qd.func
+def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
+    """(canonical point, canonical unit view direction, stretch |J d|, emptied 0 or 1) of a deformed sample.
+
+    d is unit. An emptied sample is returned where it was when it was found empty.
+    """
+    q = p
+    v = d
+    stretch = 1.0
+    emptied = 0
+    mapped = 0
+    for n in range(n_edits):
+        e = n_edits - 1 - n
+        if emptied == 0 and in_box(q, params, e, BOX):
+            q, v, emptied = map_edit(q, v, params, lattice, e)
+            mapped = 1
+    if mapped == 1:
+        stretch = v.norm()
+        v = v / qd.max(stretch, 1e-20)
+    return q, v, stretch, emptied
+
+
+@qd.func
+def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32):
+    """(canonical point, J d, emptied) of a sample through edit e alone."""
+    first = qd.cast(params[e, FIRST], qd.i32)
+    last = qd.cast(params[e, LAST], qd.i32)
+    resolution = qd.cast(params[e, RESOLUTION], qd.i32)
+    emptied = 0
+    hit = -1
+    best = 1e30
+    at = vec3(0.0, 0.0, 0.0)
+    use_lattice = 0
+    for h in range(first, last):
+        xi, error = locate(p, params, e, RECORDS + h * RECORD)
+        if h >= 2:
+            if error < best:
+                best = error
+                hit = h
+                at = xi
+            if error <= EDGE:
+                break
+        elif h == 0:
+            if error <= EDGE:
+                hit = 0
+                at = xi
+                break
+        else:
+            inside = error <= EDGE
+            if params[e, CONTINUOUS] < 0.5:
+                emptied = qd.cast(inside, qd.i32)
+            elif not inside:
+                break
+            elif resolution > 0:
+                use_lattice = 1
+                break
+    q = p
+    v = d
+    if use_lattice == 1:
+        q, v = interpolate(p, d, params, lattice, e, resolution)
+    elif hit >= 0:
+        q, v = image(at, d, params, e, RECORDS + hit * RECORD)
+    return q, v, emptied
+
+
+@qd.func
+def in_box(p: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
+    """True where p lies in the box (min, max) stored at a column."""
+    return (
+        p.x >= params[e, at]
+        and p.y >= params[e, at + 1]
+        and p.z >= params[e, at + 2]
+        and p.x <= params[e, at + 3]
+        and p.y <= params[e, at + 4]
+        and p.z <= params[e, at + 5]
+    )
+
+
+@qd.func
+def read3(params: qd.template(), e: qd.i32, at: qd.i32):
+    """Three neighbouring columns as a vector."""
+    return vec3(params[e, at], params[e, at + 1], params[e, at + 2])
+
+
+@qd.func
+def times(params: qd.template(), e: qd.i32, at: qd.i32, v: vec3):
+    """The matrix [3,3] stored row by row at a column, times v."""
+    return vec3(
+        params[e, at] * v.x + params[e, at + 1] * v.y + params[e, at + 2] * v.z,
+        params[e, at + 3] * v.x + params[e, at + 4] * v.y + params[e, at + 5] * v.z,
+        params[e, at + 6] * v.x + params[e, at + 7] * v.y + params[e, at + 8] * v.z,
+    )
+
+
+@qd.func
+def locate(p: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
+    """(xi, error): p's coordinates in a hexahedron, clamped to [-1,1]^3, and how far off that is.
+
+    The error is the distance to the cube plus the residual of Newton's method, both in units of xi; 0 for a
+    point inside.
+    """
+    y = times(params, e, at + MATRIX, p - read3(params, e, at + CENTRE))
+    xi = y
+    error = 0.0
+    if params[e, at + AFFINE] < 0.5:
+        if in_box(y, params, e, at + LOW):
+            a = read3(params, e, at + BEND)
+            b = read3(params, e, at + BEND + 3)
+            c = read3(params, e, at + BEND + 6)
+            g = read3(params, e, at + BEND + 9)
+            xi = qd.max(qd.min(y, 1.0), -1.0)
+            for _ in range(16):
+                r = xi + xi.x * xi.y * a + xi.x * xi.z * b + xi.y * xi.z * c + xi.x * xi.y * xi.z * g - y
+                step = bend_solve(a, b, c, g, xi, r)
+                new = qd.max(qd.min(xi - step, 1.4), -1.4)
+                moved = qd.abs(new - xi).max()
+                xi = new
+                # Quadratic convergence: the step after one of 1e-4 is at rounding level.
+                if moved < 1e-4:
+                    break
+            r = xi + xi.x * xi.y * a + xi.x * xi.z * b + xi.y * xi.z * c + xi.x * xi.y * xi.z * g - y
+            error = qd.abs(r).max()
+            if error < 2e-6:
+                error = 0.0
+        else:
+            error = 10.0
+    error += qd.max(qd.abs(xi).max() - 1.0, 0.0)
+    return qd.max(qd.min(xi, 1.0), -1.0), error
+
+
+@qd.func
+def bend_solve(a: vec3, b: vec3, c: vec3, g: vec3, xi: vec3, r: vec3):
+    """(dy/dxi)^-1 r for the bend a xi eta + b xi zeta + c eta zeta + g xi eta zeta, by Cramer's rule."""
+    u = vec3(1.0, 0.0, 0.0) + xi.y * a + xi.z * b + xi.y * xi.z * g
+    v = vec3(0.0, 1.0, 0.0) + xi.x * a + xi.z * c + xi.x * xi.z * g
+    w = vec3(0.0, 0.0, 1.0) + xi.x * b + xi.y * c + xi.x * xi.y * g
+    vw = v.cross(w)
+    det = u.dot(vw)
+    if qd.abs(det) < 1e-6:
+        det = 1e-6 if det >= 0.0 else -1e-6
+    return vec3(r.dot(vw), r.dot(w.cross(u)), r.dot(u.cross(v))) / det
+
+
+@qd.func
+def image(xi: vec3, d: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
+    """(canonical point, J d) at coordinates xi of a hexahedron."""
+    c = at + IMAGE
+    along = times(params, e, at + MATRIX, d)
+    c1 = read3(params, e, c + 3)
+    c2 = read3(params, e, c + 6)
+    c4 = read3(params, e, c + 12)
+    q = read3(params, e, c) + xi.x * c1 + xi.y * c2 + xi.z * c4
+    if params[e, at + AFFINE] < 0.5:
+        along = bend_solve(
+            read3(params, e, at + BEND),
+            read3(params, e, at + BEND + 3),
+            read3(params, e, at + BEND + 6),
+            read3(params, e, at + BEND + 9),
+            xi,
+            along,
+        )
+        c3 = read3(params, e, c + 9)
+        c5 = read3(params, e, c + 15)
+        c6 = read3(params, e, c + 18)
+        c7 = read3(params, e, c + 21)
+        q += xi.x * xi.y * c3 + xi.x * xi.z * c5 + xi.y * xi.z * c6 + xi.x * xi.y * xi.z * c7
+        c1 += xi.y * c3 + xi.z * c5 + xi.y * xi.z * c7
+        c2 += xi.x * c3 + xi.z * c6 + xi.x * xi.z * c7
+        c4 += xi.x * c5 + xi.y * c6 + xi.x * xi.y * c7
+    return q, along.x * c1 + along.y * c2 + along.z * c4
+
+
+@qd.func
+def interpolate(
+    p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, resolution: qd.i32
+):
+    """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
+    g = times(params, e, TO_NODES + 3, p - read3(params, e, TO_NODES))
+    s = times(params, e, TO_NODES + 3, d)
+    top = qd.cast(resolution - 1, qd.f32)
+    g = qd.max(qd.min(g, top), 0.0)
+    cell = qd.min(qd.cast(g, qd.i32), resolution - 2)
+    f = g - qd.cast(cell, qd.f32)
+    offset = qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
+    n = offset + (cell.z * resolution + cell.y) * resolution + cell.x
+    plane = resolution * resolution
+    v000 = lattice[n]
+    v010 = lattice[n + resolution]
+    v001 = lattice[n + plane]
+    v011 = lattice[n + plane + resolution]
+    x00 = lattice[n + 1] - v000
+    x10 = lattice[n + resolution + 1] - v010
+    x01 = lattice[n + plane + 1] - v001
+    x11 = lattice[n + plane + resolution + 1] - v011
+    w00 = v000 + f.x * x00
+    w10 = v010 + f.x * x10
+    w01 = v001 + f.x * x01
+    w11 = v011 + f.x * x11
+    y0 = w10 - w00
+    y1 = w11 - w01
+    z0 = w00 + f.y * y0
+    z1 = w01 + f.y * y1
+    x0 = x00 + f.y * (x10 - x00)
+    x1 = x01 + f.y * (x11 - x01)
+    q = p + z0 + f.z * (z1 - z0)
+    v = d + s.x * (x0 + f.z * (x1 - x0)) + s.y * (y0 + f.z * (y1 - y0)) + s.z * (z1 - z0)
+    return q, v
+
+
+@qd.kernel
+def _map_samples(samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32):
+    for i in range(samples.shape[0]):
+        p, d, stretch, emptied = map_sample(
+            read3(samples, i, 0), read3(samples, i, 3), params, lattice, n_edits
+        )
+        for a in qd.static(range(3)):
+            out[i, a] = p[a]
+            out[i, 3 + a] = d[a]
+        out[i, 6] = stretch
+        out[i, 7] = qd.cast(emptied, qd.f32)
+
+
+@qd.kernel
+def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
+    for n in range(nodes.shape[0]):
+        i = n % resolution
+        j = (n // resolution) % resolution
+        k = n // (resolution * resolution)
+        p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
+        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0)
+        nodes[n] = q - p
+
+
+_lattices: "WeakKeyDictionary[Any, NDArray[np.float32]]" = WeakKeyDictionary()
+
+
+def _lattice(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The nodes [R^3,3] of a continuous edit's lattice, from its packed row with resolution 0."""
+    known = _lattices.get(edit)
+    if known is None:
+        warp, resolution = edit.exact_warp, edit.lattice
+        if not isinstance(warp, ContinuousWarp) or resolution is None:
+            raise EditError("only a continuous edit has a lattice")
+        devices.start()
+        origin, frame = warp.outer.frame
+        known = np.empty((resolution**3, 3), dtype=np.float32)
+        none = np.zeros((1, 3), dtype=np.float32)
+        _sample_lattice(
+            known,
+            np.ascontiguousarray(row[None]),
+            none,
+            vec3(*origin.tolist()),
+            mat3(frame.tolist()),
+            resolution,
+        )
+        known.setflags(write=False)
+        _lattices[edit] = known
+    return known
+
+
+def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
+    """Write an edit into its row of `params`, with its shell exact."""
+    boxes = edit.boxes
+    row[BOX : BOX + 6] = _widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    warp = edit.exact_warp
+    if isinstance(warp, DiscreteWarp):
+        row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.keep_source else 2
+        if warp.inner is not None:
+            _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+        _record(row, 1, warp.source.corners)
+        return
+    if not isinstance(warp, ContinuousWarp):
+        raise EditError(f"a {type(warp).__name__} has no kernel")
+    if not isinstance(warp.shell, TrilinearShell):
+        raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
+    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 8, 1
+    _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+    _record(row, 1, warp.outer.corners)
+    for n in range(6):
+        _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
+    origin, frame = warp.outer.frame
+    row[TO_NODES : TO_NODES + 3] = origin
+    if edit.lattice is not None:
+        row[TO_NODES + 3 : TO_NODES + 12] = ((edit.lattice - 1) * np.linalg.inv(frame)).ravel()
+
+
+def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array | None = None) -> None:
+    """Write the record of a hexahedron [8,3] and, if it has one, of its image [8,3]."""
+    C = hexahedron.coefficients(corners)
+    D = C if onto is None else hexahedron.coefficients(onto)
+    W = np.linalg.inv(C[[1, 2, 4]].T)
+    bend = C[[3, 5, 6, 7]] @ W.T
+    y = (corners - C[0]) @ W.T
+    # Affine only where the image is, too: an affine record skips the image's bend.
+    size = np.abs(D[[1, 2, 4]]).max()
+    affine = np.abs(bend).max() < 1e-7 and np.abs(D[[3, 5, 6, 7]]).max() < 1e-7 * size
+    slack = 1e-5 * (y.max(axis=0) - y.min(axis=0))
+    at = RECORDS + number * RECORD
+    row[at : at + RECORD] = np.concatenate(
+        [[affine], W.ravel(), C[0], y.min(axis=0) - slack, y.max(axis=0) + slack, bend.ravel(), D.ravel()]
+    )
+
+
+def _widened(boxes: Array) -> Array:
+    slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)[:, None]
+    return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)
