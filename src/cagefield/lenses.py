@@ -121,7 +121,7 @@ def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
     before = np.full_like(target, np.inf)
     for _ in range(100):
         error = _curve(r, k) - target
-        if np.all(np.abs(error) <= 1e-15 * (1.0 + target)):
+        if np.all(np.abs(error) <= 4e-15 * (1.0 + target)):
             break
         low, high = np.where(error <= 0, r, low), np.where(error >= 0, r, high)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -1,0 +1,7 @@
+"""Data sets: posed photos from transforms.json, LLFF and COLMAP."""
+
+from __future__ import annotations
+
+from cagefield.datasets.dataset import Dataset, View, load_dataset
+
+__all__ = ["Dataset", "View", "load_dataset"]

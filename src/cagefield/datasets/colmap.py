@@ -1,0 +1,155 @@
+"""COLMAP models, binary or text, with their photos; read by pycolmap (extra `cagefield[colmap]`).
+
+COLMAP's cameras look along +z with +y down, and pixel (0,0) has its centre at (.5,.5): axes y and z are
+flipped, intrinsics are taken as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.cameras import Camera
+from cagefield.datasets.llff import stored_camera
+from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
+from cagefield.datasets.region import cube_of_interest, levelling_rotation
+from cagefield.datasets.views import Dataset, View, hold_out, report_missing
+from cagefield.errors import CameraError, DatasetError
+from cagefield.lenses import Lens
+
+MODEL_FILES = ("cameras.bin", "cameras.txt")
+
+_MODEL_FOLDERS = ("sparse/0", "sparse", "colmap/sparse/0", ".")
+
+
+def find_model(path: Path) -> Path | None:
+    """The folder at or below `path` that holds a COLMAP model, None where there is none."""
+    for folder in (path / name for name in _MODEL_FOLDERS):
+        if any((folder / file).is_file() for file in MODEL_FILES):
+            return folder
+    return None
+
+
+def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
+    """The unbounded data set of a COLMAP model at `path`, `path`/sparse/0 or `path`/sparse.
+
+    Every `holdout`-th view tests. Photos are looked for in `images`, `images_2`, ... of the nearest folder
+    upwards from the model that has them, by their names in the model. Lens distortion is kept. The world is
+    rotated so that up is +z (see `levelling_rotation`); the sparse points bound the cube of interest.
+    """
+    model_folder = find_model(path)
+    if model_folder is None:
+        places = ", ".join(_MODEL_FOLDERS)
+        raise DatasetError(f"{path}: no COLMAP model (cameras.bin or cameras.txt) in {places}")
+    model = _read_model(model_folder)
+    images = [model.image(image_id) for image_id in model.reg_image_ids()]
+    if not images:
+        raise DatasetError(f"{model_folder}: the model has no registered images; run COLMAP's mapper again")
+    root = next((f for f in _upwards(model_folder) if photo_folders(f)), None)
+    if root is None:
+        raise DatasetError(f"{model_folder}: no folder images in it or up to three levels above it")
+    poses = np.stack([_pose(image) for image in images])
+    levelling = np.eye(4)
+    levelling[:3, :3] = levelling_rotation(poses)
+    cameras = {camera_id: _camera(model_folder, camera) for camera_id, camera in model.cameras.items()}
+
+    folders = photo_folders(root)
+    used = [cameras[image.camera_id] for image in images]
+    factor = choose_downscale(max(max(c.width, c.height) for c in used), downscale, folders)
+    usable = sorted((f for f in folders if factor % f == 0), reverse=True)
+    views, missing = [], []
+    for image, pose in zip(images, levelling @ poses, strict=True):
+        stored, photo = _photo(folders, usable, image.name)
+        if photo is None:
+            missing.append(image.name)
+            continue
+        where = f"{model_folder}: image {image.name}"
+        try:
+            camera = cameras[image.camera_id].with_c2w(pose)
+        except CameraError as error:
+            raise DatasetError(f"{where}: {error}") from error
+        view = View(image.name, stored_camera(where, camera, photo, stored), photo)
+        views.append(view.downscaled(factor // stored))
+    report_missing(root, sorted(missing), len(images))
+    train, test = hold_out(views, holdout)
+    points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3) @ levelling[:3, :3].T
+    return Dataset(
+        name=root.resolve().name,
+        path=root,
+        train=train,
+        test=test,
+        val=(),
+        unbounded=True,
+        bounds=cube_of_interest([view.camera for view in views], points=points),
+        white_background=False,
+        source_to_world=levelling,
+    )
+
+
+def _read_model(folder: Path) -> Any:
+    try:
+        import pycolmap
+    except ImportError:
+        raise DatasetError(
+            f"{folder}: reading a COLMAP model needs pycolmap; run pip install 'cagefield[colmap]'"
+        ) from None
+    try:
+        return pycolmap.Reconstruction(folder)
+    except Exception as error:  # pycolmap raises whatever C++ threw
+        raise DatasetError(f"{folder}: pycolmap cannot read the model ({error}); export it again") from error
+
+
+def _upwards(folder: Path) -> Sequence[Path]:
+    return [folder, *folder.resolve().parents[:3]]
+
+
+def _photo(folders: dict[int, Path], factors: Sequence[int], name: str) -> tuple[int, Path | None]:
+    """The photo `name` at the first of `factors` that has it; shrunk ones may have another extension."""
+    for factor in factors:
+        photo = find_photo(folders[factor] / name)
+        if photo is None and factor > 1:
+            photo = find_photo((folders[factor] / name).with_suffix(""))
+        if photo is not None:
+            return factor, photo
+    return 1, None
+
+
+def _pose(image: Any) -> npt.NDArray[np.float64]:
+    """OpenGL camera-to-world matrix [4,4]."""
+    rigid = image.cam_from_world
+    matrix = np.asarray((rigid() if callable(rigid) else rigid).matrix(), dtype=np.float64)
+    rotation, translation = matrix[:, :3], matrix[:, 3]
+    pose = np.eye(4)
+    pose[:3, :3] = rotation.T * (1.0, -1.0, -1.0)
+    pose[:3, 3] = -rotation.T @ translation
+    return pose
+
+
+def _camera(folder: Path, camera: Any) -> Camera:
+    """The COLMAP camera in the identity pose."""
+    name, p = camera.model.name, [float(value) for value in camera.params]
+    model: Lens = "pinhole"
+    if name in ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL"):
+        fx, fy, cx, cy, distortion = p[0], p[0], p[1], p[2], p[3:]
+    elif name in ("PINHOLE", "OPENCV", "OPENCV_FISHEYE"):
+        fx, fy, cx, cy, distortion = *p[:4], p[4:]
+    else:
+        raise DatasetError(
+            f"{folder}: camera {camera.camera_id} has the COLMAP camera model {name}, which cannot be read; "
+            "run colmap image_undistorter, or reconstruct with SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, "
+            "RADIAL, OPENCV or OPENCV_FISHEYE"
+        )
+    if name == "OPENCV_FISHEYE":
+        model = "opencv_fisheye"
+    elif distortion:  # k1 [, k2 [, p1, p2]]
+        model, distortion = "opencv", [*distortion, 0.0, 0.0, 0.0][:4]
+    try:
+        return Camera(
+            np.eye(4), camera.width, camera.height, fx, fy, cx, cy, model=model, distortion=tuple(distortion)
+        )
+    except CameraError as error:
+        raise DatasetError(f"{folder}: camera {camera.camera_id}: {error}") from error

@@ -1,0 +1,50 @@
+"""Opening a data set of posed photos, whatever dialect it is in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
+from cagefield.datasets.llff import POSES_FILE, load_llff
+from cagefield.datasets.transforms import load_transforms
+from cagefield.datasets.views import Dataset, View
+from cagefield.errors import DatasetError
+
+__all__ = ["Dataset", "View", "load_dataset"]
+
+
+def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int = 8) -> Dataset:
+    """The data set at `path`: a folder, or the file in it that describes the cameras.
+
+    The first of these that a folder has is read: transforms_train.json (NeRF-synthetic), transforms.json
+    (Instant-NGP, nerfstudio), poses_bounds.npy (LLFF), a COLMAP model in sparse/0, sparse or the folder
+    itself. Naming the file, or the model's folder, overrides that order.
+
+    `downscale` shrinks the photos by that factor; None takes the smallest power of two that brings the longer
+    side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
+    name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
+
+    Raises DatasetError, with file, key and cure, for anything that cannot be read.
+    """
+    path = Path(path).expanduser()
+    if not path.exists():
+        raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
+    if path.is_file():
+        if path.suffix == ".json":
+            return load_transforms(path, downscale, holdout)
+        if path.name == POSES_FILE:
+            return load_llff(path, downscale, holdout)
+        if path.name in MODEL_FILES:
+            return load_colmap(path.parent, downscale, holdout)
+        raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
+    if any((path / name).is_file() for name in ("transforms_train.json", "transforms.json")):
+        return load_transforms(path, downscale, holdout)
+    if (path / POSES_FILE).is_file():
+        return load_llff(path, downscale, holdout)
+    if find_model(path) is not None:
+        return load_colmap(path, downscale, holdout)
+    raise DatasetError(
+        f"{path}: no camera file; looked for transforms.json, transforms_train.json, {POSES_FILE} and a "
+        "COLMAP model (sparse/0/cameras.bin or .txt). Photos alone have no poses: "
+        "run COLMAP or ns-process-data on them"
+    )

@@ -1,0 +1,132 @@
+"""Photo files: finding them, their size, and their pixels shrunk by a box filter."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, UnidentifiedImageError
+
+from cagefield.errors import DatasetError
+
+EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
+
+_DEEP_MODES = ("I", "F")  # and "I;16...": more than 8 bits a channel
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a photo file says before its pixels are read."""
+
+    width: int
+    height: int
+    alpha: bool
+
+
+def find_photo(path: Path) -> Path | None:
+    """`path` where it is a file, else the file of that name with an image extension appended, else None."""
+    if path.is_file():
+        return path
+    for extension in EXTENSIONS:
+        for spelling in (extension, extension.upper()):
+            candidate = path.with_name(path.name + spelling)
+            if candidate.is_file():
+                return candidate
+    return None
+
+
+def read_header(path: Path) -> Header:
+    """Size of the photo and whether it has an alpha channel.
+
+    Raises DatasetError where it is not an 8-bit image.
+    """
+    with _opened(path) as image:
+        return Header(image.width, image.height, _has_alpha(image))
+
+
+def is_cut_out(path: Path) -> bool:
+    """Whether the photo has an alpha channel with at least one pixel that is not opaque."""
+    return read_header(path).alpha and bool(read_photo(path)[..., 3].min() < 255)
+
+
+def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
+    """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha: means of `factor` x `factor` pixels of the file.
+
+    Columns and rows left over at the right and bottom are dropped. With alpha, colours are averaged
+    premultiplied.
+
+    Raises DatasetError where the file cannot be read.
+    """
+    with _opened(path) as image:
+        try:
+            pixels = image.convert("RGBA" if _has_alpha(image) else "RGB")
+        except (OSError, SyntaxError, ValueError) as error:
+            raise DatasetError(f"{path}: the image cannot be decoded ({error}); replace the file") from error
+    if factor == 1:
+        return np.array(pixels)
+    box = (0, 0, pixels.width // factor * factor, pixels.height // factor * factor)
+    if pixels.mode == "RGB":
+        return np.array(pixels.reduce(factor, box))
+    straight = np.asarray(pixels.crop(box), dtype=np.float32)
+    blocks = straight.reshape(box[3] // factor, factor, box[2] // factor, factor, 4)
+    alpha = blocks[..., 3:].mean(axis=(1, 3))
+    premultiplied = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3))
+    rgb = np.divide(premultiplied, alpha, out=np.zeros_like(premultiplied), where=alpha > 0)
+    return np.rint(np.concatenate([rgb, alpha], axis=2)).astype(np.uint8)
+
+
+def photo_folders(root: Path) -> dict[int, Path]:
+    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}."""
+    folders = {1: root / "images"} if (root / "images").is_dir() else {}
+    for folder in sorted(root.glob("images_*")):
+        if folder.is_dir() and (number := re.fullmatch(r"images_([1-9]\d*)", folder.name)):
+            folders[int(number[1])] = folder
+    return folders
+
+
+def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, Path] | None = None) -> int:
+    """The factor to shrink by: `downscale`, or the least power of two that leaves at most 800 pixels a side.
+
+    `stored` are the factors at which photos exist on disk (see `photo_folders`): the result is a multiple of
+    one.
+
+    Raises DatasetError for a factor that is not a whole number from 1, or that no stored folder divides.
+    """
+    factors = sorted(stored) if stored else [1]
+    if downscale is None:
+        factor = 1
+        while longer_side > LONGER_SIDE * factor or all(factor % f for f in factors):
+            factor *= 2
+            if factor > longer_side:
+                return factors[0]
+        return factor
+    if isinstance(downscale, bool) or int(downscale) != downscale or not 1 <= downscale <= longer_side:
+        raise DatasetError(f"downscale must be a whole number from 1 to {longer_side}, got {downscale}")
+    if all(downscale % f for f in factors):
+        have = ", ".join(folder.name for folder in (stored or {}).values())
+        raise DatasetError(
+            f"downscale {downscale} cannot be made from the photos there are ({have}); use one of these"
+        )
+    return int(downscale)
+
+
+def _opened(path: Path) -> Image.Image:
+    try:
+        image = Image.open(path)
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise DatasetError(
+            f"{path}: not a readable image ({error}); replace the file or remove its frame"
+        ) from error
+    if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
+        raise DatasetError(
+            f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
+        )
+    return image
+
+
+def _has_alpha(image: Image.Image) -> bool:
+    return image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info

@@ -1,0 +1,119 @@
+"""Posed photos: one photo with its camera (`View`), and a capture of them (`Dataset`)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.cameras import Camera
+from cagefield.datasets.photos import read_photo
+from cagefield.errors import DatasetError
+
+FloatArray = npt.NDArray[np.float64]
+
+_NAMED = 100  # missing files named in the warning, at most
+
+
+@dataclass(frozen=True)
+class View:
+    """One posed photo: `camera` belongs to the image that `load` returns, shrunk by `downscale`."""
+
+    name: str
+    camera: Camera
+    image_path: Path
+    downscale: int = 1
+
+    def load(self) -> npt.NDArray[np.uint8]:
+        """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha, box-filtered to the camera's size.
+
+        Raises DatasetError where the file cannot be read or has another size than it had when the data set
+        was opened.
+        """
+        pixels = read_photo(self.image_path, self.downscale)
+        if pixels.shape[:2] != (self.camera.height, self.camera.width):
+            raise DatasetError(
+                f"{self.image_path}: {pixels.shape[1]}x{pixels.shape[0]} pixels after shrinking by "
+                f"{self.downscale}, the camera has {self.camera.width}x{self.camera.height}; reopen it"
+            )
+        return pixels
+
+    def downscaled(self, factor: int) -> View:
+        """The same photo shrunk by a further `factor`."""
+        return replace(self, camera=self.camera.downscaled(factor), downscale=self.downscale * factor)
+
+
+def _identity() -> FloatArray:
+    return np.eye(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """A capture: posed photos for training, testing and validation, and the region of space worth modelling.
+
+    `bounds` [2,3] (min, max in world units) is the box that holds the whole scene, or, where `unbounded`, the
+    cube of interest: the inner box of a contraction. `white_background` says that the photos are cut-outs
+    (RGBA), composited on white by convention. `source_to_world` [4,4] maps the coordinates of the
+    reconstruction that the files came from to this data set's world: the levelling rotation for LLFF and
+    COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity.
+    """
+
+    name: str
+    path: Path
+    train: tuple[View, ...]
+    test: tuple[View, ...]
+    val: tuple[View, ...]
+    unbounded: bool
+    bounds: FloatArray
+    white_background: bool
+    source_to_world: FloatArray = field(default_factory=_identity)
+
+    def __post_init__(self) -> None:
+        for name, shape in (("bounds", (2, 3)), ("source_to_world", (4, 4))):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != shape or not np.isfinite(array).all():
+                raise DatasetError(f"{name} must be {list(shape)} finite numbers, got {array.tolist()}")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if not np.all(self.bounds[0] < self.bounds[1]):
+            raise DatasetError(f"bounds must grow from bounds[0] to bounds[1], got {self.bounds.tolist()}")
+        if not self.train:
+            raise DatasetError(f"{self.path}: no training views; check the split")
+
+
+def hold_out(views: Sequence[View], every: int) -> tuple[tuple[View, ...], tuple[View, ...]]:
+    """Training and test views: sorted by name, the first and each `every`-th after it test; 0 holds none out.
+
+    A single view trains. Raises DatasetError for `every` = 1 or below 0.
+    """
+    if isinstance(every, bool) or int(every) != every or every < 0 or every == 1:
+        raise DatasetError(f"holdout must be 0 (no test views) or a whole number from 2, got {every}")
+    ordered = sorted(views, key=lambda view: view.name)
+    if every == 0 or len(ordered) == 1:
+        return tuple(ordered), ()
+    return tuple(v for i, v in enumerate(ordered) if i % every), tuple(ordered[::every])
+
+
+def report_missing(path: Path, missing: Sequence[str], total: int) -> None:
+    """Warns once, by count and name, of frames whose photo is missing.
+
+    Raises DatasetError where none is left.
+    """
+    if not missing:
+        return
+    names = ", ".join(missing[:_NAMED]) + (
+        f" and {len(missing) - _NAMED} more" if len(missing) > _NAMED else ""
+    )
+    if len(missing) == total:
+        raise DatasetError(
+            f"{path}: none of the photos of its {total} frames is there; put them where "
+            f"the file says: {names}"
+        )
+    warnings.warn(
+        f"{path}: {len(missing)} of {total} frames are left out, their photos are missing: {names}",
+        stacklevel=4,
+    )

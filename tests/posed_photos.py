@@ -1,0 +1,78 @@
+"""Tiny captures with a known answer: black photos with a bright spot where one world point must appear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from cagefield.datasets import View
+
+POINT = np.array([0.15, -0.1, 0.2])
+WIDTH, HEIGHT = 96, 64
+
+
+def ring(n: int, radius: float = 4.0, sweep: float = 2 * np.pi) -> list[np.ndarray]:
+    """OpenGL camera-to-world matrices on a ring, level, looking at (0, 0, 0) from above."""
+    poses = []
+    for azimuth in sweep * np.arange(n) / n:
+        eye = radius * np.array([np.cos(azimuth), np.sin(azimuth), 0.5])
+        back = eye / np.linalg.norm(eye)
+        right = np.cross((0, 0, 1), back) / np.linalg.norm(np.cross((0, 0, 1), back))
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, np.cross(back, right), back, eye], axis=1)
+        poses.append(pose)
+    return poses
+
+
+def project(pose, point, focal, axis, k=(0.0, 0.0), p=(0.0, 0.0), fisheye=None):
+    """Pixel position of a world point, written out from OpenCV's documentation."""
+    x, y, z = np.linalg.inv(pose)[:3] @ (*point, 1.0) * (1, -1, -1)
+    if fisheye is not None:
+        r = np.hypot(x, y)
+        t = np.arctan2(r, z)
+        t *= 1 + sum(coefficient * t ** (2 * n + 2) for n, coefficient in enumerate(fisheye))
+        x, y = t * x / r, t * y / r
+    else:
+        x, y = x / z, y / z
+        s = x * x + y * y
+        g = 1 + k[0] * s + k[1] * s * s
+        x, y = (
+            g * x + 2 * p[0] * x * y + p[1] * (s + 2 * x * x),
+            g * y + p[0] * (s + 2 * y * y) + 2 * p[1] * x * y,
+        )
+    return np.array([focal[0] * x + axis[0], focal[1] * y + axis[1]])
+
+
+def spot(position, width=WIDTH, height=HEIGHT, radius=3.0) -> np.ndarray:
+    """uint8 [H,W,3] with a Gaussian spot at pixel coordinates `position`."""
+    x, y = np.arange(width) + 0.5 - position[0], (np.arange(height) + 0.5 - position[1])[:, None]
+    return np.repeat(
+        np.rint(255 * np.exp(-(x**2 + y**2) / (2 * radius**2))).astype(np.uint8)[..., None], 3, axis=2
+    )
+
+
+def save(path: Path, pixels: np.ndarray) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(pixels).save(path)
+
+
+def save_cut_out(path: Path, width=WIDTH, height=HEIGHT) -> None:
+    pixels = np.zeros((height, width, 4), dtype=np.uint8)
+    pixels[height // 4 : height // 2, width // 4 : width // 2] = (200, 100, 50, 255)
+    save(path, pixels)
+
+
+def assert_spot_is_where_the_camera_says(view: View, point=POINT) -> None:
+    """The bright spot's centroid in the loaded photo is the projection of `point`.
+
+    8-bit rounding over the spot's 200 pixels moves a centroid by a few hundredths of a pixel.
+    """
+    weights = view.load()[..., 0].astype(float)
+    weights[weights < 8] = 0
+    x = (weights.sum(axis=0) * (np.arange(view.camera.width) + 0.5)).sum() / weights.sum()
+    y = (weights.sum(axis=1) * (np.arange(view.camera.height) + 0.5)).sum() / weights.sum()
+    positions, depth = view.camera.project(np.asarray(point, dtype=float)[None])
+    assert depth[0] > 0
+    np.testing.assert_allclose((x, y), positions[0], atol=0.05)

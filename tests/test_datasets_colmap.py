@@ -1,0 +1,170 @@
+"""COLMAP: models written by pycolmap, binary and text, in every camera model that is read."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cagefield.datasets import load_dataset
+from cagefield.errors import DatasetError
+from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
+
+pycolmap = pytest.importorskip(
+    "pycolmap", reason="COLMAP models are read by pycolmap (extra cagefield[colmap])"
+)
+
+TILT = Rotation.from_euler("XYZ", (0.7, -0.4, 1.1)).as_matrix()
+F, C = (90.0, 94.0), (46.0, 33.5)
+SQUARE = (90.0, 90.0)
+CAMERAS = {  # COLMAP parameters, and the same for the oracle
+    "SIMPLE_PINHOLE": ((90.0, *C), {"focal": SQUARE}),
+    "PINHOLE": ((*F, *C), {"focal": F}),
+    "SIMPLE_RADIAL": ((90.0, *C, 0.12), {"focal": SQUARE, "k": (0.12, 0.0)}),
+    "RADIAL": ((90.0, *C, 0.12, -0.07), {"focal": SQUARE, "k": (0.12, -0.07)}),
+    "OPENCV": ((*F, *C, 0.12, -0.07, 0.004, -0.003), {"focal": F, "k": (0.12, -0.07), "p": (0.004, -0.003)}),
+    "OPENCV_FISHEYE": (
+        (*F, *C, 0.06, -0.02, 0.004, -0.001),
+        {"focal": F, "fisheye": (0.06, -0.02, 0.004, -0.001)},
+    ),
+}
+
+
+def _write(
+    folder: Path, model="PINHOLE", text=False, n=9, where="sparse/0", factors=(1,), params=None
+) -> None:
+    """A capture in a tilted world with a cloud of 300 points within half a unit of the origin."""
+    params, oracle = (params, {"focal": F}) if params is not None else CAMERAS[model]
+    reconstruction = pycolmap.Reconstruction()
+    camera = pycolmap.Camera(model=model, width=WIDTH, height=HEIGHT, params=params, camera_id=1)
+    reconstruction.add_camera_with_trivial_rig(camera)
+    for index, pose in enumerate(ring(n)):
+        position = project(pose, POINT, axis=C, **oracle)
+        for factor in factors:
+            images = folder / ("images" if factor == 1 else f"images_{factor}")
+            pixels = spot(position / factor, WIDTH // factor, HEIGHT // factor, 3 / factor)
+            save(images / f"cam/{index:02}.png", pixels)
+        tilted = TILT @ pose[:3] * (1, -1, -1, 1)  # OpenCV axes
+        rotation = tilted[:, :3].T
+        rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), -rotation @ tilted[:, 3])
+        image = pycolmap.Image(name=f"cam/{index:02}.png", camera_id=1, image_id=index + 1)
+        reconstruction.add_image_with_trivial_frame(image, rigid)
+    for point in np.random.default_rng(0).uniform(-0.5, 0.5, (300, 3)):
+        reconstruction.add_point3D(TILT @ point, pycolmap.Track(), np.zeros(3, dtype=np.uint8))
+    target = folder / where
+    target.mkdir(parents=True, exist_ok=True)
+    (reconstruction.write_text if text else reconstruction.write_binary)(target)
+
+
+@pytest.mark.parametrize("text", [False, True], ids=["binary", "text"])
+@pytest.mark.parametrize("model", CAMERAS)
+def test_the_point_is_where_the_camera_says(tmp_path, model, text):
+    _write(tmp_path, model, text)
+    data = load_dataset(tmp_path)
+    assert [v.name for v in data.test] == ["cam/00.png", "cam/08.png"] and len(data.train) == 7
+    assert data.unbounded and not data.white_background and data.name == tmp_path.name
+    point = data.source_to_world[:3, :3] @ TILT @ POINT
+    for view in (*data.train, *data.test):
+        assert_spot_is_where_the_camera_says(view, point)
+        assert view.camera.c2w[2, 0] == pytest.approx(0, abs=1e-9) and view.camera.c2w[2, 1] > 0  # level
+    # levelled, the cloud's cube is turned about z: between 0.5 and 0.5 sqrt(2) wide to each side
+    np.testing.assert_allclose(data.bounds.mean(axis=0), 0, atol=0.02)
+    assert 0.45 < data.bounds[1, 0] < 0.71
+
+
+@pytest.mark.parametrize("where", ["sparse/0", "sparse", ".", "colmap/sparse/0"])
+def test_places_of_the_model(tmp_path, where):
+    _write(tmp_path, where=where, n=3)
+    for path in (tmp_path, tmp_path / where, tmp_path / where / "cameras.bin"):
+        data = load_dataset(path)
+        assert data.path.resolve() == tmp_path.resolve()
+        assert len(data.train) == 2
+
+
+@pytest.mark.parametrize(
+    ("factors", "downscale", "folder", "shrink"),
+    [
+        ((1, 4), 4, "images_4", 1),
+        ((1, 4), 2, "images", 2),
+        ((1, 2), 4, "images_2", 2),
+        ((4,), None, "images_4", 1),
+    ],
+)
+def test_the_nearest_stored_size_is_used(tmp_path, factors, downscale, folder, shrink):
+    _write(tmp_path, "OPENCV", n=3, factors=factors)
+    data = load_dataset(tmp_path, downscale=downscale)
+    point = data.source_to_world[:3, :3] @ TILT @ POINT
+    for view in data.train:
+        assert view.image_path.parents[1].name == folder and view.downscale == shrink
+        assert_spot_is_where_the_camera_says(view, point)
+
+
+def test_a_frame_missing_from_the_stored_size_comes_from_the_full_one(tmp_path):
+    _write(tmp_path, n=3, factors=(1, 4))
+    (tmp_path / "images_4/cam/01.png").unlink()
+    (tmp_path / "images_4/cam/02.png").rename(tmp_path / "images_4/cam/02.bmp")
+    views = load_dataset(tmp_path, downscale=4).train
+    assert [v.image_path.relative_to(tmp_path).as_posix() for v in views] == [
+        "images/cam/01.png",
+        "images_4/cam/02.bmp",
+    ]
+    assert [v.load().shape for v in views] == [(HEIGHT // 4, WIDTH // 4, 3)] * 2
+
+
+def test_missing_photos_are_named_and_none_left_is_an_error(tmp_path):
+    _write(tmp_path, n=4)
+    (tmp_path / "images/cam/02.png").unlink()
+    with pytest.warns(UserWarning, match=r"1 of 4 frames are left out, their photos are missing: cam/02.png"):
+        data = load_dataset(tmp_path)
+    assert [v.name for v in data.train] == ["cam/01.png", "cam/03.png"]
+    for photo in (tmp_path / "images/cam").iterdir():
+        photo.unlink()
+    with pytest.raises(DatasetError, match="none of the photos of its 4 frames is there"):
+        load_dataset(tmp_path)
+
+
+def test_other_camera_models_are_refused(tmp_path):
+    _write(tmp_path, "FULL_OPENCV", params=(*F, *C, *[0.01] * 8), n=2)
+    with pytest.raises(
+        DatasetError, match=r"camera 1 has the COLMAP camera model FULL_OPENCV, which cannot be read"
+    ):
+        load_dataset(tmp_path)
+
+
+def test_impossible_intrinsics_and_sizes(tmp_path):
+    _write(tmp_path / "a", params=(-1.0, 94.0, *C), n=2)
+    with pytest.raises(
+        DatasetError, match=r"camera 1: fx must be a positive focal length in pixels, got -1.0"
+    ):
+        load_dataset(tmp_path / "a")
+    _write(tmp_path / "b", n=2)
+    save(tmp_path / "b/images/cam/01.png", np.zeros((HEIGHT // 2, WIDTH, 3), dtype=np.uint8))
+    with pytest.raises(
+        DatasetError, match=r"image cam/01.png: .* is 32 pixels high, the intrinsics say 64; use"
+    ):
+        load_dataset(tmp_path / "b")
+
+
+def test_damaged_and_missing_parts(tmp_path):
+    _write(tmp_path / "a", n=2, text=True)
+    file = tmp_path / "a/sparse/0/images.txt"
+    file.unlink()
+    with pytest.raises(DatasetError, match=r"sparse/0: pycolmap cannot read the model .*export it again"):
+        load_dataset(tmp_path / "a")
+    _write(tmp_path / "b", n=2, factors=())
+    with pytest.raises(DatasetError, match="no folder images in it or up to three levels above it"):
+        load_dataset(tmp_path / "b")
+    _write(tmp_path / "c", n=0)
+    (tmp_path / "c/images").mkdir()
+    with pytest.raises(DatasetError, match="the model has no registered images"):
+        load_dataset(tmp_path / "c")
+
+
+def test_without_pycolmap_the_cure_is_named(tmp_path, monkeypatch):
+    _write(tmp_path, n=2)
+    monkeypatch.setitem(sys.modules, "pycolmap", None)
+    with pytest.raises(DatasetError, match=r"needs pycolmap; run pip install 'cagefield\[colmap\]'"):
+        load_dataset(tmp_path)
