@@ -53,7 +53,7 @@ class Cage:
     """
 
     corners: Array
-    pivot: Array = field(default=None, kw_only=True)  # type: ignore[assignment]
+    pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         corners = _read_only(self.corners, (8, 3), "cage corners")
@@ -119,7 +119,7 @@ class Cage:
 
     @property
     def frame(self) -> tuple[Array, Array]:
-        """(origin [3], edge vectors as columns [3,3]) of the least box in the affine frame that holds the cage."""
+        """(origin [3], edge vectors as columns [3,3]) of the least box along `affine` that holds the cage."""
         A, b = self.affine
         if self.is_affine:
             return b, A
@@ -278,7 +278,7 @@ def outside_by(cage: Cage, point: ArrayLike) -> tuple[str, float]:
 
 
 def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -> float:
-    """Signed distance of p from the bilinear face with corners `ids`, along the normal at the nearest point."""
+    """Signed distance of p from the bilinear face with corners `ids`, along its normal nearest to p."""
     v = cage.corners[list(ids)]
     axis = next(a for a in range(3) if len({k >> a & 1 for k in ids}) == 1)
     a, b = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9))

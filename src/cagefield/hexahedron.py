@@ -40,42 +40,68 @@ def coefficients(corners: Array) -> Array:
 
 def points(corners: Array, u: Array) -> Array:
     """x(u) [N,3] for u [N,3] in a hexahedron with corners [8,3]."""
-    return _evaluate(coefficients(corners), 2.0 * u - 1.0)
+    return np.ascontiguousarray(_evaluate(coefficients(corners), 2.0 * u.T - 1.0).T)
 
 
 def jacobian(corners: Array, u: Array) -> Array:
     """dx/du [N,3,3] at u [N,3]; column j is the derivative along u_j."""
-    return 2.0 * _derivative(coefficients(corners), 2.0 * u - 1.0)
+    columns = _derivative(coefficients(corners), 2.0 * u.T - 1.0)  # [3 (u_j), 3 (x_i), N]
+    return np.ascontiguousarray(2.0 * np.transpose(columns, (2, 1, 0)))
 
 
 def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     """u [N,3] with x(u) = targets [N,3], and a mask [N] of the points where such a u was found.
 
-    Where a target has a preimage in [0,1]^3 that preimage is returned; elsewhere the root that Newton's
-    method reaches from the affine guess, which may be any root or none (mask False). Damped Newton with the
-    analytic Jacobian; targets that lie in the hull of the corners and did not reach a root in [0,1]^3 are
-    tried again from the centres of those of the 512 sub-hexahedra whose boxes hold them, so a hexahedron
-    with positive determinant misses none of its points.
+    Every target that has a preimage in [0,1]^3 gets it, if the determinant is positive over the hexahedron.
+    Others get a preimage outside the cube, or none (mask False, u unspecified); targets outside the hull of
+    the corners are not tried. Damped Newton with the analytic Jacobian from the affine guess; targets that
+    it did not take to [0,1]^3 are tried again from the centres of those of the 512 sub-hexahedra whose boxes
+    hold them, so that no preimage in the cube is missed.
     """
     C = coefficients(corners)
-    W = np.linalg.inv(C[[1, 2, 4]].T)
+    W = centre_inverse(C)
     y = (targets - C[0]) @ W.T
     K = C[[3, 5, 6, 7]] @ W.T  # y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta
     if np.abs(K).max() < 1e-14:  # a parallelepiped up to rounding
         return 0.5 * (y + 1.0), np.isfinite(y).all(axis=1)
+    local = (corners - C[0]) @ W.T
+    rows = np.flatnonzero(_in_hull(local, y))
+    y = y[rows]
     xi = np.empty_like(y)
     found = np.empty(len(y), dtype=bool)
     for start in range(0, len(y), _CHUNK):
         part = slice(start, start + _CHUNK)
-        xi[part], found[part] = _newton(K, y[part], y[part].copy())
-    local = (corners - C[0]) @ W.T
-    outside = np.abs(xi).max(axis=1, initial=0.0) > 1.0 + 2.0 * _INSIDE
-    retry = np.flatnonzero((~found | outside) & _in_hull(local, y))
+        xi[part], found[part] = _newton(K, y[part], y[part].clip(-1.0, 1.0))
+    retry = np.flatnonzero(~found | (np.abs(xi).max(axis=1, initial=0.0) > 1.0 + 2.0 * _INSIDE))
     if len(retry):
         better, where = _newton_from_cells(K, local, y[retry])
         xi[retry[where]] = better[where]
         found[retry[where]] = True
-    return 0.5 * (xi + 1.0), found
+    u, mask = np.full(targets.shape, np.nan), np.zeros(len(targets), dtype=bool)
+    u[rows], mask[rows] = 0.5 * (xi + 1.0), found
+    return u, mask
+
+
+def centre_inverse(C: Array) -> Array:
+    """W [3,3], the inverse of dx/dxi at the centre of the hexahedron with monomial coefficients C [8,3].
+
+    A singular one, as only folded hexahedra have, is moved off zero by 1e-9 of its size.
+    """
+    J = C[[1, 2, 4]].T
+    size = np.abs(J).max()
+    if abs(np.linalg.det(J / size)) < 1e-15:
+        J = J + 1e-9 * size * np.eye(3)
+    return np.asarray(np.linalg.inv(J))
+
+
+def invert(matrices: Array) -> Array:
+    """The inverses [N,3,3] of matrices [N,3,3], by cofactors; singular ones have it moved off zero."""
+    rows = [matrices[:, i].T for i in range(3)]
+    size = np.abs(matrices).max(axis=(1, 2), initial=1e-300)
+    a, b, c = (row / size for row in rows)
+    cofactors = [_cross(b, c), _cross(c, a), _cross(a, b)]
+    det = _off_zero((a * cofactors[0]).sum(axis=0), 1e-30)
+    return np.ascontiguousarray(np.transpose(np.stack(cofactors) / (det * size), (2, 1, 0)))
 
 
 def inside(u: Array, found: Mask) -> Mask:
@@ -118,82 +144,94 @@ def is_positive(bernstein: Array, depth: int = 6) -> bool:
 
 
 def _evaluate(C: Array, xi: Array) -> Array:
-    x, y, z = xi[:, :1], xi[:, 1:2], xi[:, 2:]
-    return C[0] + C[1] * x + y * (C[2] + C[3] * x) + z * (C[4] + C[5] * x + y * (C[6] + C[7] * x))
+    """x [3,N] at xi [3,N]; the component axis comes first so that numpy's inner loops are long."""
+    x, y, z = xi
+    c = C[:, :, None]
+    return np.asarray(c[0] + c[1] * x + y * (c[2] + c[3] * x) + z * (c[4] + c[5] * x + y * (c[6] + c[7] * x)))
 
 
-def _derivative(C: Array, xi: Array) -> Array:
-    x, y, z = xi[:, :1], xi[:, 1:2], xi[:, 2:]
-    return np.stack(
-        [
-            C[1] + C[3] * y + z * (C[5] + C[7] * y),
-            C[2] + C[3] * x + z * (C[6] + C[7] * x),
-            C[4] + C[5] * x + y * (C[6] + C[7] * x),
-        ],
-        axis=2,
+def _derivative(C: Array, xi: Array) -> tuple[Array, Array, Array]:
+    """The three columns [3,N] of dx/dxi at xi [3,N]."""
+    x, y, z = xi
+    c = C[:, :, None]
+    return (
+        c[1] + c[3] * y + z * (c[5] + c[7] * y),
+        c[2] + c[3] * x + z * (c[6] + c[7] * x),
+        c[4] + c[5] * x + y * (c[6] + c[7] * x),
     )
 
 
-def _newton(K: Array, y: Array, xi: Array) -> tuple[Array, Mask]:
-    """Roots xi [N,3] of xi + K-terms = y from the given start, and a mask of those with residual < 1e-11."""
+def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
+    """Roots xi [N,3] of xi + K-terms = y [N,3] from a start, and a mask of those with residual < 1e-11."""
     C = np.concatenate([np.zeros((1, 3)), np.eye(3)[:2], K[:1], np.eye(3)[2:], K[1:]])
+    y, xi = y.T.copy(), start.T.copy()
     residual = _evaluate(C, xi) - y
-    size = np.abs(residual).max(axis=1)
-    active = np.flatnonzero(size > 0.0)
-    for _ in range(60):
+    size = np.abs(residual).max(axis=0)
+    # Below this the residual is the rounding of its own evaluation.
+    arrived = 4e-16 * (1.0 + np.abs(y).max(axis=0, initial=0.0))
+    active = np.flatnonzero(size > arrived)
+    for _ in range(40):
         if len(active) == 0:
             break
-        J = _derivative(C, xi[active])
-        step = _solve(J, residual[active])
+        step = _solve(_derivative(C, xi[:, active]), residual[:, active])
         # A step of more than one cell leaves the region in which the linearisation says anything.
-        step /= np.maximum(1.0, np.abs(step).max(axis=1, keepdims=True) / 2.0)
-        scale = np.ones((len(active), 1))
-        for _ in range(12):
-            trial = xi[active] - scale * step
-            new = _evaluate(C, trial) - y[active]
-            new_size = np.abs(new).max(axis=1)
-            worse = ~(new_size < size[active])
-            if not worse.any():
-                break
-            scale[worse] *= 0.5
-        better = ~worse
-        moved = active[better]
-        xi[moved], residual[moved], size[moved] = trial[better], new[better], new_size[better]
-        # At rounding level no step improves the residual any more: that point has arrived (or is stuck).
-        active = moved[size[moved] > 1e-16]
-    return xi, np.asarray(size < 1e-11)
+        step /= np.maximum(1.0, np.abs(step).max(axis=0) / 2.0)
+        before = size[active]
+        _line_search(C, y, xi, residual, size, active, step)
+        # What creeps is stuck at a fold outside the hexahedron, or has arrived.
+        active = active[(size[active] < 0.9 * before) & (size[active] > arrived[active])]
+    return np.ascontiguousarray(xi.T), np.asarray(size < 1e-11)
 
 
-def _newton_from_cells(K: Array, local: Array, y: Array, depth: int = 3) -> tuple[Array, Mask]:
-    """Roots in [-1,1]^3 found from the centres of sub-hexahedra whose boxes hold y, and their mask."""
-    rows = np.arange(len(y))
-    cells = np.broadcast_to(local, (len(y), 8, 3))
-    low = np.full((len(y), 3), -1.0)
-    for level in range(depth):
-        half = 0.5**level
-        children, starts, owners = [], [], []
-        for octant in BITS:
-            weights = 0.5 * (octant + BITS)  # u of the child's corners in the parent
-            child = np.einsum("kc,ncd->nkd", _weights(weights), cells)
-            slack = 1e-9
-            holds = np.all(
-                (y[rows] >= child.min(axis=1) - slack) & (y[rows] <= child.max(axis=1) + slack), axis=1
-            )
-            children.append(child[holds])
-            starts.append(low[holds] + half * octant)
-            owners.append(rows[holds])
-        cells, low, rows = np.concatenate(children), np.concatenate(starts), np.concatenate(owners)
+def _line_search(
+    C: Array, y: Array, xi: Array, residual: Array, size: Array, rows: NDArray[np.intp], step: Array
+) -> None:
+    """Move the given columns of xi [3,N] by -step, halved until the residual falls, in place."""
+    for _ in range(8):
+        trial = xi[:, rows] - step
+        new = _evaluate(C, trial) - y[:, rows]
+        new_size = np.abs(new).max(axis=0)
+        better = new_size < size[rows]
+        moved = rows[better]
+        xi[:, moved], residual[:, moved], size[moved] = trial[:, better], new[:, better], new_size[better]
+        # What no longer improves at rounding level has arrived.
+        worse = ~better & (size[rows] > 1e-14)
+        if not worse.any():
+            return
+        rows, step = rows[worse], 0.5 * step[:, worse]
+
+
+def _newton_from_cells(K: Array, local: Array, y: Array) -> tuple[Array, Mask]:
+    """Roots in [-1,1]^3 found from the centres of the sub-hexahedra whose boxes hold y, and their mask.
+
+    A sub-hexahedron lies in the box of its own eight corners; 8, 64 and 512 of them are gone through.
+    """
+    g = np.linspace(0.0, 1.0, 9)
+    nodes = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
+    net = points(local, nodes).reshape(9, 9, 9, 3)
+    slack = 1e-9
+    rows, cell = np.arange(len(y)), np.zeros((len(y), 3), dtype=np.intp)
+    for stride in (4, 2, 1):
+        coarse = net[::stride, ::stride, ::stride]
+        corners = np.stack([coarse[_ends(i), :, :][:, _ends(j), :][:, :, _ends(k)] for i, j, k in BITS])
+        low, high = corners.min(axis=0) - slack, corners.max(axis=0) + slack
+        cell = (2 * cell[:, None] + BITS.astype(np.intp)).reshape(-1, 3)
+        rows = np.repeat(rows, 8)
+        at = tuple(cell.T)
+        holds = ((y[rows] >= low[at]) & (y[rows] <= high[at])).all(axis=1)
+        rows, cell = rows[holds], cell[holds]
     best = np.zeros((len(y), 3))
     done = np.zeros(len(y), dtype=bool)
-    xi, found = _newton(K, y[rows], low + 0.5 ** (depth - 1) * 0.5)
+    middle: Array = np.asarray((cell + 0.5) / 4.0 - 1.0, dtype=np.float64)
+    xi, found = _newton(K, y[rows], middle)
     good = found & np.asarray(np.abs(xi).max(axis=1, initial=0.0) <= 1.0 + 2.0 * _INSIDE)
     best[rows[good]], done[rows[good]] = xi[good], True
     return best, done
 
 
-def _weights(u: Array) -> Array:
-    """Trilinear weights [N,8] at u [N,3]."""
-    return np.asarray(np.where(BITS[None] == 1.0, u[:, None], 1.0 - u[:, None]).prod(axis=2))
+def _ends(bit: float) -> slice:
+    """All nodes of an axis but the last (0) or the first (1)."""
+    return slice(1, None) if bit else slice(None, -1)
 
 
 def _in_hull(local: Array, y: Array) -> Mask:
@@ -206,16 +244,24 @@ def _in_hull(local: Array, y: Array) -> Mask:
     reach = local @ n.T
     slack = 1e-9 * np.abs(reach).max(axis=0)
     along = y @ n.T
-    return np.all((along >= reach.min(axis=0) - slack) & (along <= reach.max(axis=0) + slack), axis=1)
+    inside = (along >= reach.min(axis=0) - slack) & (along <= reach.max(axis=0) + slack)
+    return np.asarray(inside.all(axis=1))
 
 
-def _solve(J: Array, r: Array) -> Array:
-    """J^-1 r [N,3] by Cramer's rule, with singular J moved off zero (the line search guards the step)."""
-    a, b, c = J[:, :, 0], J[:, :, 1], J[:, :, 2]
-    bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-    det = np.einsum("nd,nd->n", a, bc)
-    det = np.where(np.abs(det) < 1e-12, np.where(det < 0.0, -1e-12, 1e-12), det)
-    return np.stack([(v * r).sum(axis=1) / det for v in (bc, ca, ab)], axis=1)
+def _solve(J: tuple[Array, Array, Array], r: Array) -> Array:
+    """J^-1 r [3,N] by Cramer's rule; singular J are moved off zero (the line search guards the step)."""
+    a, b, c = J
+    bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
+    det = _off_zero((a * bc).sum(axis=0), 1e-12)
+    return np.stack([(v * r).sum(axis=0) / det for v in (bc, ca, ab)])
+
+
+def _off_zero(values: Array, least: float) -> Array:
+    return np.where(np.abs(values) < least, np.copysign(least, values), values)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _triples() -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp], Array]:

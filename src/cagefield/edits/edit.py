@@ -77,7 +77,11 @@ class Edit:
             try:
                 cage = operation.apply(cage)
             except CageError as error:
-                raise self._error(f"operation {number} ({operation.noun} {operation}): {error}") from None
+                message = f"operation {number}, {operation.noun} {operation}: {error}"
+                safe = largest_safe(lambda t, c=cage, o=operation: _is_valid(o, t, c))  # type: ignore[misc]
+                raise self._error(
+                    message + (f"; {_share(safe)} of it is safe" if safe > 0.0 else "")
+                ) from None
         return cage
 
     def translate(self, by: ArrayLike) -> Edit:
@@ -201,15 +205,15 @@ class Edit:
             before = self.replace(operations=self.operations[: number - 1])
             if before._problem(before.deformed) is None:
                 operation = self.operations[number - 1]
-                fraction = np.floor(100.0 * before._largest_part(operation)) / 100.0
-                return f"; {fraction:.2f} of this {operation.noun} (operation {number}, {operation}) is safe"
+                share = _share(before._largest_part(operation))
+                return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 
     def _problem(self, deformed: Cage) -> _Problem | None:
         """Why the edit cannot be evaluated with its inner cage at `deformed`, or None."""
         if self.adjustment == "discrete" or self.outer is None:
             return None
-        u, inside = self.outer.coordinates(deformed.corners)
+        inside = self.outer.contains(deformed.corners)
         if not inside.all():
             distances = [outside_by(self.outer, corner) for corner in deformed.corners]
             k = max(np.flatnonzero(~inside), key=lambda corner: distances[corner][1])
@@ -255,7 +259,9 @@ class Edit:
             raise self._error("a delete has no operations and keeps no source")
         low, high = LATTICE_RANGE
         if self.lattice is not None and not (
-            isinstance(self.lattice, int) and not isinstance(self.lattice, bool) and low <= self.lattice <= high
+            isinstance(self.lattice, int)
+            and not isinstance(self.lattice, bool)
+            and low <= self.lattice <= high
         ):
             raise self._error(
                 f"lattice must be None (exact) or a whole number of nodes per axis from {low} to {high}"
@@ -272,11 +278,22 @@ class _Problem:
     cure: str
 
 
+def _is_valid(operation: Operation, t: float, cage: Cage) -> bool:
+    try:
+        operation.part(t).apply(cage)
+    except CageError:
+        return False
+    return True
+
+
+def _share(fraction: float) -> str:
+    """A share as text, rounded down so that what is said to be safe is."""
+    return f"{np.floor(100.0 * fraction) / 100.0:.2f}"
+
+
 def bounds_of(boxes: Array) -> Array:
     """The box [2,3] that holds boxes [B,2,3]; (inf, -inf) for none."""
-    return np.stack(
-        [boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)]
-    )
+    return np.stack([boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)])
 
 
 def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:

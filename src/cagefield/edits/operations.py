@@ -139,7 +139,7 @@ class MoveCorner:
         return MoveCorner(self.corner, _times(self.by, t))
 
     def __str__(self) -> str:
-        return f"corner {self.corner} by {_show(self.by)}"
+        return f"of corner {self.corner} by {_show(self.by)}"
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class MoveEdge:
         return MoveEdge(self.edge, _times(self.by, t))
 
     def __str__(self) -> str:
-        return f"edge {self.edge} by {_show(self.by)}"
+        return f"of edge {self.edge} by {_show(self.by)}"
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class MoveFace:
         return MoveFace(self.face, _times(self.by, t))
 
     def __str__(self) -> str:
-        return f"face {self.face} by {_show(self.by)}"
+        return f"of face {self.face} by {_show(self.by)}"
 
 
 Operation: TypeAlias = Translate | Rotate | Scale | Shear | MoveCorner | MoveEdge | MoveFace

@@ -18,9 +18,9 @@ from cagefield.hexahedron import Array, Mask
 class CanonicalSamples:
     """Samples of deformed space, taken to canonical space.
 
-    points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where no
-    view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); emptied [N], True where the field
-    must be read as empty.
+    points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where
+    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); emptied [N], True where the
+    field must be read as empty.
     """
 
     points: Array

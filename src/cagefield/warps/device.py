@@ -21,7 +21,6 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices, hexahedron
-from cagefield.cages import Cage
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
 from cagefield.warps.continuous import ContinuousWarp
@@ -411,7 +410,7 @@ def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array |
     """Write the record of a hexahedron [8,3] and, if it has one, of its image [8,3]."""
     C = hexahedron.coefficients(corners)
     D = C if onto is None else hexahedron.coefficients(onto)
-    W = np.linalg.inv(C[[1, 2, 4]].T)
+    W = hexahedron.centre_inverse(C)
     bend = C[[3, 5, 6, 7]] @ W.T
     y = (corners - C[0]) @ W.T
     # Affine only where the image is, too: an affine record skips the image's bend.
@@ -425,5 +424,6 @@ def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array |
 
 
 def _widened(boxes: Array) -> Array:
-    slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)[:, None]
+    rounding = 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)
+    slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + rounding[:, None]
     return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)

@@ -46,14 +46,14 @@ class HexahedronMap:
 
 def between(corners: Array, onto: Array, u: Array) -> tuple[Array, Array]:
     """(x_onto(u) [N,3], Jacobian [N,3,3]) of the map that keeps u, from one hexahedron onto another."""
-    J = hexahedron.jacobian(onto, u) @ np.linalg.inv(hexahedron.jacobian(corners, u))
+    J = hexahedron.jacobian(onto, u) @ hexahedron.invert(hexahedron.jacobian(corners, u))
     return hexahedron.points(onto, u), J
 
 
 def _affine_between(source: Cage, target: Cage) -> tuple[Array, Array] | None:
     """(A, b) that takes the corners of one cage to those of the other, or None."""
     C, D = hexahedron.coefficients(source.corners), hexahedron.coefficients(target.corners)
-    A = D[[1, 2, 4]].T @ np.linalg.inv(C[[1, 2, 4]].T)
+    A = D[[1, 2, 4]].T @ hexahedron.centre_inverse(C)
     bend = D[[3, 5, 6, 7]] - C[[3, 5, 6, 7]] @ A.T
     if np.abs(bend).max() > 1e-12 * np.abs(D[[1, 2, 4]]).max():
         return None

@@ -7,6 +7,7 @@ from functools import cached_property
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cagefield import hexahedron
 from cagefield.cages import Cage
@@ -85,8 +86,8 @@ class TrilinearShell:
         if not hexahedron.is_positive(C):
             side = SIDES[_worst(C)]
             return (
-                f"is folded before any operation, at side {side}: leave a gap between the cages on every side,"
-                " and turn the inner cage's axes towards the outer cage's"
+                f"is folded before any operation, at side {side}: leave a gap between the cages on every"
+                " side, and turn the inner cage's axes towards the outer cage's"
             )
         if not hexahedron.is_positive(D - LEAST_RATIO * C):
             return f"folds at side {SIDES[_worst(D - LEAST_RATIO * C)]}"
@@ -125,7 +126,7 @@ def _through(source: Array, target: Array, points: Array) -> tuple[Array, Array]
         violation = np.where(found, np.maximum(-u, u - 1.0).max(axis=1).clip(0.0), np.inf)
         better = violation < best[rows]
         best[rows[better]], side[rows[better]], coordinates[rows[better]] = violation[better], n, u[better]
-    if not np.isfinite(best).all():  # between two hexahedra, or outside the shell: the nearest of a coarse net
+    if not np.isfinite(best).all():  # outside the shell, or in a fold
         rows = np.flatnonzero(~np.isfinite(best))
         side[rows], coordinates[rows] = _nearest(source, points[rows])
     coordinates = coordinates.clip(0.0, 1.0)  # a violation is a rounding of a face shared by two hexahedra
@@ -136,7 +137,7 @@ def _through(source: Array, target: Array, points: Array) -> tuple[Array, Array]
     return mapped, J
 
 
-def _nearest(hexahedra: Array, points: Array) -> tuple[Array, Array]:
+def _nearest(hexahedra: Array, points: Array) -> tuple[NDArray[np.intp], Array]:
     """(hexahedron number [N], u [N,3]) of the node of a 9^3 net in each hexahedron nearest to each point."""
     g = np.linspace(0.0, 1.0, 9)
     u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -155,9 +156,7 @@ def _matching_turn(inner_axes: Array, outer_axes: Array) -> list[int]:
             # Ties go to the first turn tried, which is the identity.
             if parity * signs.prod() > 0.0 and fit > best + 1e-9:
                 best = fit
-                order = [
-                    sum((k >> a & 1 ^ int(signs[a] < 0)) << axes[a] for a in range(3)) for k in range(8)
-                ]
+                order = [sum((k >> a & 1 ^ int(signs[a] < 0)) << axes[a] for a in range(3)) for k in range(8)]
     return order
 
 
