@@ -67,7 +67,7 @@ class Scene:
 
     @classmethod
     def open(cls, path: Path | str) -> Scene:
-        """The scene in the folder `path`.
+        """The scene in the folder `path`; edits that cannot be evaluated are an error when it is rendered.
 
         Raises:
             SceneError: the folder or one of its files is missing, damaged or of a newer version; the message
@@ -82,7 +82,7 @@ class Scene:
             if not (folder / name).is_file():
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
         cameras = _read_cameras(folder / _CAMERAS)
-        edits = load_edits(folder / _EDITS)
+        edits = load_edits(folder / _EDITS, check=False)
         return cls(VoxelField.load(folder / _FIELD), edits, cameras, background)
 
     def save(self, path: Path | str, overwrite: bool = False) -> None:

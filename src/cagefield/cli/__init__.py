@@ -58,7 +58,7 @@ def _parse(args: list[str]) -> Command | int:
     import tyro
 
     from cagefield.cli.demo import Demo
-    from cagefield.cli.edit import EditScene
+    from cagefield.cli.edit import ApplyEdits
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
     from cagefield.cli.render import Render
@@ -68,7 +68,7 @@ def _parse(args: list[str]) -> Command | int:
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
         | Annotated[Train, tyro.conf.subcommand("train")]
-        | Annotated[EditScene, tyro.conf.subcommand("edit")]
+        | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]
     )

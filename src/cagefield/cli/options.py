@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import shutil
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -72,12 +75,56 @@ def check_file(path: Path, overwrite: bool) -> None:
         raise CagefieldError(f"{path} exists already; give another name, or --overwrite")
 
 
-def track(items: Sequence[T] | Iterable[T], what: str, total: int | None = None) -> Iterator[T]:
-    """The items, with a progress bar on stderr while they are taken."""
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
+    """A function (done, total, note) that moves a bar on stderr; it does nothing where stderr is no terminal."""
     from rich.console import Console
-    from rich.progress import track as bar
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    yield from bar(
-        items, description=what, total=total, console=console, transient=True, disable=not console.is_terminal
+    columns = TextColumn(what), BarColumn(), TimeRemainingColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("")
+
+        def move(done: float, total: float, note: str = "") -> None:
+            bar.update(task, completed=done, total=total, description=note)
+
+        yield move
+
+
+def track(items: Iterable[T], total: int, what: str) -> Iterator[T]:
+    """The items, with a bar while they are taken."""
+    with progress_bar(what) as move:
+        for index, item in enumerate(items, start=1):
+            yield item
+            move(index, total, f"{index}/{total}")
+
+
+@contextmanager
+def replaced_folder(path: Path, mark: str, overwrite: bool) -> Iterator[Path]:
+    """A folder name beside `path` to be written: takes the place of `path` on success, is removed on failure.
+
+    What is at `path` is replaced only with `overwrite`, and only if it holds the file `mark`.
+
+    Raises:
+        CagefieldError: something is there that may not be replaced.
+    """
+    target = path.resolve()
+    check_folder(path, overwrite)
+    there = target.is_dir() and any(target.iterdir())
+    if there and not (target / mark).is_file():
+        raise CagefieldError(f"folder {path} holds no {mark} and is left as it is; give another folder")
+    draft, retired = (
+        target.with_name(f".{target.name}.{role}-{uuid.uuid4().hex[:8]}") for role in ("new", "old")
     )
+    try:
+        yield draft
+        if target.exists():
+            target.rename(retired)
+        draft.rename(target)
+    except BaseException:
+        shutil.rmtree(draft, ignore_errors=True)
+        if retired.exists() and not target.exists():
+            retired.rename(target)
+        raise
+    shutil.rmtree(retired, ignore_errors=True)

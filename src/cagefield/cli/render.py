@@ -84,7 +84,7 @@ class Render:
                 f"{self.out} is one picture, the views are {len(cameras)}; give a folder or --views"
             )
         devices.start(self.device)
-        pictures = track(self._pictures(scene, cameras), "Rendering", len(cameras))
+        pictures = track(self._pictures(scene, cameras), len(cameras), "Rendering")
         if video:
             write_video(self.out, (in_one_row(picture) for picture in pictures), fps)
         else:

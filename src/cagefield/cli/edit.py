@@ -1,0 +1,54 @@
+"""`cagefield edit`: an edit file applied to a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from cagefield.cli.options import Flag, OptionalOutput
+from cagefield.errors import CagefieldError
+
+
+@dataclass(frozen=True)
+class ApplyEdits:
+    """Apply an edit file to a scene: the field stays, the scene's edits are replaced by the file's."""
+
+    scene: tyro.conf.Positional[Path]
+    """Scene folder."""
+    edits: tyro.conf.Positional[Path]
+    """Edit file, YAML or JSON."""
+    out: OptionalOutput = None
+    """New scene folder; left out, the scene itself is changed, which needs --overwrite."""
+    append: Flag = False
+    """Put the file's edits after those the scene has, instead of in their place."""
+    check: Flag = False
+    """Only say what would change; write nothing."""
+    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Replace the scene that is there."""
+
+    def run(self) -> None:
+        """Checks every edit, writes the scene, prints what changes."""
+        from cagefield.cli.report import describe_edits
+        from cagefield.edits import EditStack
+        from cagefield.edits.files import load_edits
+        from cagefield.scene import Scene, check_destination
+
+        destination = self.out or self.scene
+        if self.out is None and not (self.overwrite or self.check):
+            raise CagefieldError(
+                f"without -o the scene {self.scene} itself would change; give -o NEW_SCENE, or --overwrite"
+            )
+        scene = Scene.open(self.scene)
+        stack = load_edits(self.edits)
+        if self.append:
+            stack = EditStack([*scene.edits, *stack])
+        stack.check()
+        lines = describe_edits(stack, scene.field)
+        if not self.check:
+            check_destination(destination, self.overwrite)
+            scene.with_edits(stack).save(destination, self.overwrite)
+        print("\n".join(lines))
+        print(f"{'checked, nothing written' if self.check else f'scene written to {destination}'}")

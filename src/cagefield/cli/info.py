@@ -1,0 +1,46 @@
+"""`cagefield info`: what a scene folder holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Info:
+    """What a scene holds: field, cameras, edits and whether they can be evaluated."""
+
+    scene: tyro.conf.Positional[Path]
+    """Scene folder."""
+
+    def run(self) -> None:
+        """Prints one line per fact."""
+        from cagefield.cli.report import describe_edits
+        from cagefield.scene import Scene
+
+        scene = Scene.open(self.scene)
+        field = scene.field
+        nx, ny, nz = field.resolution
+        stored = len(field.vertices)
+        size = field.bounds[1] - field.bounds[0]
+        megabytes = sum(file.stat().st_size for file in self.scene.iterdir() if file.is_file()) / 1e6
+        print(f"scene       {self.scene} (version {scene.version}, {megabytes:.1f} MB)")
+        print(f"field       {nx} x {ny} x {nz} voxels, {stored} stored ({stored / (nx * ny * nz):.1%})")
+        kind = "box of interest in unbounded space" if field.contracted else "box"
+        print(
+            f"            {kind} of {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} around {_point(field.center)}"
+        )
+        print(f"            voxel edge {max(field.voxel_size):.4g}, colour SH degree {field.sh_degree}")
+        background = "none" if scene.background is None else _point(scene.background)
+        print(f"background  {background}")
+        for split, cameras in scene.cameras.items():
+            sizes = sorted({f"{camera.width}x{camera.height}" for camera in cameras})
+            print(f"cameras     {split}: {len(cameras)} {', '.join(sizes)}".rstrip())
+        for line in describe_edits(scene.edits, field):
+            print(f"edits       {line}")
+
+
+def _point(values: object) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"  # type: ignore[attr-defined]

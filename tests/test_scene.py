@@ -1,0 +1,212 @@
+"""Scene folders: what is written is what is read, damage is named, and a failed write changes nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cagefield import Cage, Edit, EditStack, Scene
+from cagefield.cameras import Camera
+from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
+from cagefield.scene import check_destination
+from scenes import ball_field, ball_scene, files_of
+
+
+def test_round_trip_is_exact(tmp_path: Path) -> None:
+    inner = Cage.box((0.1, 0.0, 0.0), 0.4)
+    edit = Edit(inner, Cage.box((0.1, 0.0, 0.0), 1.2), name="push").translate((0.1, 0.0, 0.05))
+    scene = ball_scene().with_edits(EditStack([edit, Edit.delete(Cage.box((0.4, 0.4, 0.4), 0.2))]))
+    scene.save(tmp_path / "scene")
+    assert {file.name for file in (tmp_path / "scene").iterdir()} == {
+        "field.safetensors",
+        "edits.yaml",
+        "cameras.json",
+        "scene.json",
+    }
+    again = Scene.open(tmp_path / "scene")
+    assert again.edits == scene.edits
+    assert again.cameras == scene.cameras
+    assert (again.background, again.version) == (scene.background, scene.version)
+    for name in ("bounds", "vertices", "density", "sh"):
+        np.testing.assert_array_equal(getattr(again.field, name), getattr(scene.field, name))
+    assert [path.name for path in tmp_path.iterdir()] == ["scene"]
+
+
+def test_background_none_survives(tmp_path: Path) -> None:
+    Scene(ball_field(), background=None).save(tmp_path / "scene")
+    assert Scene.open(tmp_path / "scene").background is None
+
+
+def test_existing_scene_needs_overwrite(tmp_path: Path) -> None:
+    path = tmp_path / "scene"
+    ball_scene().save(path)
+    before = files_of(path)
+    other = Scene(ball_field(density=3.0), background=(0.0, 0.0, 0.0))
+    with pytest.raises(SceneError, match="exists already; give a new folder, or --overwrite"):
+        other.save(path)
+    assert files_of(path) == before
+    (path / "renders").mkdir()
+    (path / "renders" / "mine.png").write_bytes(b"mine")
+    other.save(path, overwrite=True)
+    assert Scene.open(path).background == (0.0, 0.0, 0.0)
+    assert (path / "renders" / "mine.png").read_bytes() == b"mine"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
+
+
+def test_other_folders_and_files_are_never_replaced(tmp_path: Path) -> None:
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    (photos / "1.png").write_bytes(b"photo")
+    with pytest.raises(SceneError, match="holds no scene and is left as it is"):
+        ball_scene().save(photos, overwrite=True)
+    assert (photos / "1.png").read_bytes() == b"photo"
+    with pytest.raises(SceneError, match="is a file; give a new folder"):
+        ball_scene().save(photos / "1.png", overwrite=True)
+    (tmp_path / "empty").mkdir()
+    ball_scene().save(tmp_path / "empty")
+    assert check_destination(tmp_path / "new", overwrite=False) == (tmp_path / "new").resolve()
+
+
+def test_failed_write_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "scene"
+    ball_scene().save(path)
+    before = files_of(path)
+
+    def disk_full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("cagefield.scene.save_edits", disk_full)
+    with pytest.raises(OSError, match="No space left"):
+        ball_scene().save(path, overwrite=True)
+    assert files_of(path) == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
+
+
+def test_failed_swap_puts_the_old_scene_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "scene"
+    ball_scene().save(path)
+    before = files_of(path)
+    rename = Path.rename
+
+    def refuse_new(self: Path, target: Path) -> Path:
+        if ".new-" in self.name:
+            raise PermissionError(13, "Permission denied", str(self))
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", refuse_new)
+    with pytest.raises(PermissionError):
+        Scene(ball_field(density=3.0)).save(path, overwrite=True)
+    assert files_of(path) == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
+
+
+def test_missing_scene_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="nowhere does not exist; give the folder that"):
+        Scene.open(tmp_path / "nowhere")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(SceneError, match="is a file, not a folder"):
+        Scene.open(tmp_path / "file")
+    with pytest.raises(SceneError, match=r"holds no scene\.json: it is not a scene"):
+        Scene.open(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["field.safetensors", "edits.yaml", "cameras.json"])
+def test_missing_file_is_named(tmp_path: Path, name: str) -> None:
+    ball_scene().save(tmp_path / "scene")
+    (tmp_path / "scene" / name).unlink()
+    with pytest.raises(SceneError, match=f"{name} is missing; copy it back"):
+        Scene.open(tmp_path / "scene")
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "message"),
+    [
+        ("field.safetensors", FieldError, r"field\.safetensors: not a readable field file .*truncated"),
+        ("cameras.json", SceneError, r"cameras\.json is not readable JSON"),
+        ("scene.json", SceneError, r"scene\.json is not readable JSON"),
+    ],
+)
+def test_truncated_file_is_named(
+    tmp_path: Path, name: str, error: type[CagefieldError], message: str
+) -> None:
+    ball_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / name
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    with pytest.raises(error, match=message):
+        Scene.open(tmp_path / "scene")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"version": 2}, "version is 2, this cagefield reads up to 1; upgrade cagefield"),
+        ({"version": "1"}, "version is '1', expected a whole number"),
+        ({"version": 0}, "version is 0, expected a whole number"),
+        ({"format": "other"}, "format is 'other', expected \"cagefield-scene\""),
+        ({"background": [0, 0, 2]}, r"scene\.json: background must be three numbers in \[0, 1\]"),
+        ({"background": "pink"}, r"scene\.json: background must be"),
+    ],
+)
+def test_bad_manifest_is_named(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    ball_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / "scene.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), **changes}))
+    with pytest.raises(SceneError, match=message):
+        Scene.open(tmp_path / "scene")
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"train": {}}, '"train" must be a list of cameras'),
+        ({"test": [3]}, r"test\[0\] is no camera"),
+        ({"test": [{"c2w": 1}]}, r"test\[0\] is no camera: a camera lacks the key"),
+        ([], "must hold a JSON object"),
+    ],
+)
+def test_bad_cameras_are_named(tmp_path: Path, document: object, message: str) -> None:
+    ball_scene().save(tmp_path / "scene")
+    (tmp_path / "scene" / "cameras.json").write_text(json.dumps(document))
+    with pytest.raises(SceneError, match=message):
+        Scene.open(tmp_path / "scene")
+
+
+def test_nan_in_a_camera_is_named(tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / "cameras.json"
+    document = json.loads(file.read_text())
+    document["train"][1]["c2w"][0][3] = float("nan")
+    file.write_text(json.dumps(document))
+    with pytest.raises(SceneError, match=r"train\[1\] is no camera: c2w\[0\]\[3\] is nan"):
+        Scene.open(tmp_path / "scene")
+
+
+def test_nan_in_the_field_is_named(tmp_path: Path) -> None:
+    from safetensors.numpy import load_file, save_file
+
+    ball_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / "field.safetensors"
+    tensors = load_file(file)
+    tensors["density"][7] = np.nan
+    save_file(tensors, file, metadata={"kind": "VoxelField", "version": "1", "contracted": "0"})
+    with pytest.raises(FieldError, match=r"field\.safetensors: density must be finite, vertex 7"):
+        Scene.open(tmp_path / "scene")
+
+
+def test_bad_edits_are_named(tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "scene")
+    (tmp_path / "scene" / "edits.yaml").write_text("version: 1\nedits:\n  - wrong: 1\n")
+    with pytest.raises(EditError, match=r"edits\.yaml"):
+        Scene.open(tmp_path / "scene")
+
+
+def test_invalid_scene_values() -> None:
+    with pytest.raises(CagefieldError, match=r"background must be three numbers in \[0, 1\]"):
+        Scene(ball_field(), background=(0.0, 0.0, 1.5))
+    with pytest.raises(SceneError, match="scene version is 2; this cagefield writes version 1"):
+        Scene(ball_field(), version=2)
+    with pytest.raises(CameraError):
+        Camera.from_fov(np.full((4, 4), np.nan), 4, 4, 1.0)
