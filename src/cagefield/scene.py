@@ -15,8 +15,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import shutil
-import uuid
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +26,7 @@ from cagefield.edits import EditStack
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.voxel import VoxelField
+from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
 
 if TYPE_CHECKING:
@@ -95,22 +94,15 @@ class Scene:
             SceneError: something else is there, or a scene and no `overwrite`.
         """
         target = check_destination(path, overwrite)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        staging = _sibling(target, "new")
-        staging.mkdir()
-        try:
-            self.field.save(staging / _FIELD)
-            save_edits(self.edits, staging / _EDITS)
+        with replaced_folder(target, _FILES) as draft:
+            self.field.save(draft / _FIELD)
+            save_edits(self.edits, draft / _EDITS)
             _write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
-                staging / _CAMERAS,
+                draft / _CAMERAS,
             )
             manifest = {"format": FORMAT, "version": self.version, "background": self.background}
-            _write_json(manifest, staging / _MANIFEST)
-            _swap(staging, target)
-        except BaseException:
-            shutil.rmtree(staging, ignore_errors=True)
-            raise
+            _write_json(manifest, draft / _MANIFEST)
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack."""
@@ -183,31 +175,6 @@ def is_scene(path: Path | str) -> bool:
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("format") == FORMAT
-
-
-def _swap(staging: Path, target: Path) -> None:
-    """Puts `staging` in the place of `target`; foreign files move over before the old folder goes."""
-    if not target.exists() or not any(target.iterdir()):
-        if target.exists():
-            target.rmdir()
-        staging.rename(target)
-        return
-    retired = _sibling(target, "old")
-    target.rename(retired)
-    try:
-        staging.rename(target)
-    except BaseException:
-        retired.rename(target)
-        raise
-    for entry in retired.iterdir():
-        if entry.name not in _FILES:
-            entry.rename(target / entry.name)
-    shutil.rmtree(retired)
-
-
-def _sibling(target: Path, role: str) -> Path:
-    """A hidden path beside `target` that nobody else uses."""
-    return target.parent / f".{target.name}.{role}-{uuid.uuid4().hex[:12]}"
 
 
 def _read_manifest(folder: Path) -> tuple[float, float, float] | None:

@@ -28,9 +28,9 @@ class Info:
         megabytes = sum(file.stat().st_size for file in self.scene.iterdir() if file.is_file()) / 1e6
         print(f"scene       {self.scene} (version {scene.version}, {megabytes:.1f} MB)")
         print(f"field       {nx} x {ny} x {nz} voxels, {stored} stored ({stored / (nx * ny * nz):.1%})")
-        kind = "box of interest in unbounded space" if field.contracted else "box"
+        kind = "unbounded, box of interest" if field.contracted else "box"
         print(
-            f"            {kind} of {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} around {_point(field.center)}"
+            f"            {kind} {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} around {_point(field.center)}"
         )
         print(f"            voxel edge {max(field.voxel_size):.4g}, colour SH degree {field.sh_degree}")
         background = "none" if scene.background is None else _point(scene.background)

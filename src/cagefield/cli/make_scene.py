@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from cagefield.cli.options import Output, progress_bar, replaced_folder
+from cagefield.cli.options import Output, check_folder, progress_bar
+
+_MARK = "transforms_train.json"
+_OWN = (_MARK, "transforms_test.json", "transforms_val.json", "train", "test", "val")
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,12 @@ class MakeScene:
     def run(self) -> None:
         """Renders the photos and says where they are."""
         from cagefield.datasets.procedural import make_scene, procedural_scene
+        from cagefield.folders import replaced_folder
 
         scene = procedural_scene(self.name)
+        check_folder(self.out, self.overwrite, _MARK)
         with (
-            replaced_folder(self.out, "transforms_train.json", self.overwrite) as draft,
+            replaced_folder(self.out.resolve(), _OWN) as draft,
             progress_bar("Photos") as move,
         ):
             make_scene(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,12 +57,18 @@ def parse_background(text: str | None) -> str | tuple[float, float, float] | Non
     return red, green, blue
 
 
-def check_folder(path: Path, overwrite: bool) -> None:
-    """Passes where `path` is new or an empty folder, or any folder with `overwrite`."""
+def check_folder(path: Path, overwrite: bool, mark: str | None = None) -> None:
+    """Passes where `path` is new or an empty folder; with `overwrite` any (that holds the file `mark`).
+
+    Raises:
+        CagefieldError: something is there that may not be replaced.
+    """
     if path.exists() and not path.is_dir():
         raise CagefieldError(f"{path} is a file; give a folder")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
         raise CagefieldError(f"folder {path} exists already and is not empty; give a new one, or --overwrite")
+    if mark is not None and path.is_dir() and any(path.iterdir()) and not (path / mark).is_file():
+        raise CagefieldError(f"folder {path} holds no {mark} and is left as it is; give a new one")
 
 
 def check_file(path: Path, overwrite: bool) -> None:
@@ -77,7 +81,7 @@ def check_file(path: Path, overwrite: bool) -> None:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
-    """A function (done, total, note) that moves a bar on stderr; it does nothing where stderr is no terminal."""
+    """A function (done, total, note) that moves a bar on stderr; nothing is shown off a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -98,33 +102,3 @@ def track(items: Iterable[T], total: int, what: str) -> Iterator[T]:
         for index, item in enumerate(items, start=1):
             yield item
             move(index, total, f"{index}/{total}")
-
-
-@contextmanager
-def replaced_folder(path: Path, mark: str, overwrite: bool) -> Iterator[Path]:
-    """A folder name beside `path` to be written: takes the place of `path` on success, is removed on failure.
-
-    What is at `path` is replaced only with `overwrite`, and only if it holds the file `mark`.
-
-    Raises:
-        CagefieldError: something is there that may not be replaced.
-    """
-    target = path.resolve()
-    check_folder(path, overwrite)
-    there = target.is_dir() and any(target.iterdir())
-    if there and not (target / mark).is_file():
-        raise CagefieldError(f"folder {path} holds no {mark} and is left as it is; give another folder")
-    draft, retired = (
-        target.with_name(f".{target.name}.{role}-{uuid.uuid4().hex[:8]}") for role in ("new", "old")
-    )
-    try:
-        yield draft
-        if target.exists():
-            target.rename(retired)
-        draft.rename(target)
-    except BaseException:
-        shutil.rmtree(draft, ignore_errors=True)
-        if retired.exists() and not target.exists():
-            retired.rename(target)
-        raise
-    shutil.rmtree(retired, ignore_errors=True)
