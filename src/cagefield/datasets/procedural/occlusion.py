@@ -1,0 +1,62 @@
+"""Baked occlusion of a scene as modelled: corners and gaps are darker, as ambient light would have it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from cagefield.datasets.procedural.parts import Part
+
+
+class Occlusion:
+    """Openness in [0,1] of surface points of the scene as modelled, from a lattice of distances.
+
+    1 - sum_i w_i max(0, h_i - distance(p + h_i n)) / h_i: how much nearer other surfaces are than open space.
+    """
+
+    spacing = 0.025
+    taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
+
+    def __init__(self, parts: tuple[Part, ...]) -> None:
+        self._parts = parts
+
+    @cached_property
+    def _lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(origin [3], distances [X,Y,Z]) of the union of the parts, up to the reach of the last tap."""
+        reach = self.taps[-1][0] + self.spacing
+        lows = np.min([part.bounds[0] for part in self._parts], 0) - reach
+        highs = np.max([part.bounds[1] for part in self._parts], 0) + reach
+        axes = [np.arange(lo, hi + self.spacing, self.spacing) for lo, hi in zip(lows, highs, strict=True)]
+        lattice = np.full([len(axis) for axis in axes], reach, np.float32)
+        for part in self._parts:
+            for primitive in part.primitives:
+                for pose in part.motion @ primitive.poses:
+                    half = np.abs(pose[:3, :3]) @ np.array(primitive.shape.extent) + reach
+                    near = tuple(
+                        slice(*np.searchsorted(axis, (c - h, c + h)))
+                        for axis, c, h in zip(axes, pose[:3, 3], half, strict=True)
+                    )
+                    grid = np.meshgrid(
+                        *(axis[cut] for axis, cut in zip(axes, near, strict=True)), indexing="ij"
+                    )
+                    points = np.stack(grid).reshape(3, -1)
+                    inverse = np.linalg.inv(pose)
+                    local = (inverse[:3, :3] @ points + inverse[:3, 3:]).astype(np.float32)
+                    # a stretched shape: the smallest scale gives a lower bound
+                    factor = np.linalg.svd(pose[:3, :3], compute_uv=False)[-1]
+                    distance = primitive.shape.distance(local) * np.float32(factor)
+                    lattice[near] = np.minimum(lattice[near], distance.reshape(grid[0].shape))
+        return lows.astype(np.float32), lattice
+
+    def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Openness [N] at points [N,3] with unit normals [N,3], both as modelled."""
+        origin, lattice = self._lattice
+        openness = np.ones(len(points), np.float32)
+        for height, weight in self.taps:
+            at = (points + np.float32(height) * normals - origin).T / np.float32(self.spacing)
+            distance = map_coordinates(lattice, at, order=1, mode="nearest")
+            openness -= np.float32(weight / height) * np.clip(height - distance, 0, height)
+        return np.clip(openness, 0, 1)

@@ -1,0 +1,204 @@
+"""Scenes of named parts that can be really moved: the ground truth of edits.
+
+World: z up, the object within about [-1,1]^3. Angles are radians, intrinsic XYZ, right-handed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield.cameras import Camera
+from cagefield.datasets.procedural.occlusion import Occlusion
+from cagefield.datasets.procedural.parts import Part, Placed, affine
+from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
+from cagefield.datasets.procedural.tracing import trace
+from cagefield.errors import SceneError
+from cagefield.rendering.frame import Background, Frame
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProceduralScene:
+    """Named parts, where they are, and how they are lit; every change returns a new scene.
+
+    modelled  the parts as first built: baked occlusion is theirs, whatever moves later
+    relit     True: a turned part is lit anew, as in the world. False: a part carries its colours like an
+              edited radiance field, colour(p, d) = modelled colour(canonical point, canonical direction).
+    lowest    elevation in degrees of the lowest camera that make_scene places
+    """
+
+    name: str
+    parts: tuple[Part, ...]
+    modelled: tuple[Part, ...] = ()
+    relit: bool = True
+    lowest: float = 5.0
+
+    def __post_init__(self) -> None:
+        names = [part.name for part in self.parts]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise SceneError(f"part names must differ; {', '.join(twice)} is used twice in scene {self.name}")
+        if not self.modelled:
+            object.__setattr__(self, "modelled", self.parts)
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        return tuple(part.name for part in self.parts)
+
+    @property
+    def bounds(self) -> Array:
+        """Box [2,3] that holds all parts."""
+        boxes = np.stack([part.bounds for part in self.parts])
+        return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    def part_bounds(self, part: str | Sequence[str]) -> Array:
+        """Box [2,3] that holds a part, or several parts, where they are now."""
+        boxes = np.stack([self.parts[i].bounds for i in self._indices(part)])
+        return np.stack([boxes[:, 0].min(0), boxes[:, 1].max(0)])
+
+    def part_box(self, part: str | Sequence[str], margin: float = 0.01) -> tuple[Array, Array]:
+        """(center [3], size [3]) of a box around a part or parts, `margin` larger on every side."""
+        low, high = self.part_bounds(part)
+        return (low + high) / 2, high - low + 2 * margin
+
+    def move(
+        self,
+        part: str | Sequence[str],
+        *,
+        translate: ArrayLike = (0, 0, 0),
+        rotate: ArrayLike = (0, 0, 0),
+        scale: ArrayLike = 1.0,
+        pivot: ArrayLike | None = None,
+    ) -> ProceduralScene:
+        """Scene whose part (or parts, together) went p -> pivot + translate + R S (p - pivot).
+
+        rotate in radians, intrinsic XYZ; scale a number or one per world axis; pivot defaults to the centre
+        of part_bounds, where a cage around the part has its centre. Raises SceneError for unknown parts and
+        for scales that are not positive.
+        """
+        moved = self._motion(part, translate, rotate, scale, pivot)
+        chosen = self._indices(part)
+        return self._with(
+            replace(p, motion=moved @ p.motion) if i in chosen else p for i, p in enumerate(self.parts)
+        )
+
+    def remove(self, part: str | Sequence[str]) -> ProceduralScene:
+        """Scene without a part or parts. Raises SceneError for unknown parts and when none would be left."""
+        chosen = self._indices(part)
+        if len(chosen) == len(self.parts):
+            raise SceneError(f"scene {self.name} must keep at least one part")
+        return self._with(p for i, p in enumerate(self.parts) if i not in chosen)
+
+    def duplicate(
+        self,
+        part: str | Sequence[str],
+        *,
+        translate: ArrayLike = (0, 0, 0),
+        rotate: ArrayLike = (0, 0, 0),
+        scale: ArrayLike = 1.0,
+        pivot: ArrayLike | None = None,
+        suffix: str = " copy",
+    ) -> ProceduralScene:
+        """Scene with a moved copy of a part or parts, named with the suffix; arguments as for `move`."""
+        moved = self._motion(part, translate, rotate, scale, pivot)
+        copies = [
+            replace(self.parts[i], name=self.parts[i].name + suffix, motion=moved @ self.parts[i].motion)
+            for i in self._indices(part)
+        ]
+        return self._with((*self.parts, *copies))
+
+    def carrying_light(self) -> ProceduralScene:
+        """This scene with `relit` False: moved parts keep the colours they had as modelled."""
+        return replace(self, relit=False)
+
+    def photograph(self, camera: Camera, *, supersample: int = 2, background: Background = "none") -> Frame:
+        """Frame of the surfaces, each pixel the mean of supersample^2 rays.
+
+        opacity is the share of rays that meet a surface, depth and normals the means over those.
+        Raises SceneError for supersample < 1.
+        """
+        if supersample < 1:
+            raise SceneError(f"supersample must be at least 1, not {supersample}")
+        height, width = camera.height, camera.width
+        fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
+        _, directions = fine.rays()
+        hits = trace(self.placed, camera.origin, directions)
+        rgb, normals = np.zeros((2, *directions.shape), np.float32)
+        origin = camera.origin.astype(np.float32)
+        for index, item in enumerate(self.placed):
+            rows = np.flatnonzero(hits.primitive == index)
+            if len(rows):
+                points = origin + hits.t[rows, None] * directions[rows]
+                rgb[rows], normals[rows] = surface(
+                    item,
+                    points,
+                    hits.instance[rows],
+                    directions[rows],
+                    openness=self.occlusion,
+                    relit=self.relit,
+                )
+        seen = np.isfinite(hits.t)
+
+        def mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
+            blocks = values.reshape(height, supersample, width, supersample, -1)
+            averaged: NDArray[np.float32] = blocks.mean((1, 3), dtype=np.float32)
+            return averaged
+
+        opacity = mean(seen.astype(np.float32))[..., 0]
+        depth = mean(np.where(seen, hits.t, np.float32(0)))[..., 0]
+        depth = np.where(opacity > 0, depth / np.maximum(opacity, np.float32(1e-6)), np.float32(np.inf))
+        normal = mean(normals)
+        length = np.linalg.norm(normal, axis=-1, keepdims=True)
+        normal = normal / np.where(length > 0, length, 1)
+        return Frame.from_premultiplied(mean(rgb), opacity, depth, normals=normal, background=background)
+
+    def field(self, eps: float = 0.004) -> SurfaceField:
+        """This scene as a radiance field whose surfaces are about `eps` (world units) soft."""
+        if not 0 < eps < np.inf:
+            raise SceneError(f"eps must be positive, not {eps}")
+        reach = SHELL * eps
+        low, high = self.bounds
+        bounds = np.stack([low - reach, high + reach])
+        return SurfaceField(self.placed, self.occlusion, self.relit, eps, bounds)
+
+    def _indices(self, part: str | Sequence[str]) -> tuple[int, ...]:
+        wanted = (part,) if isinstance(part, str) else tuple(part)
+        unknown = [name for name in wanted if name not in self.part_names]
+        if unknown or not wanted:
+            raise SceneError(
+                f"scene {self.name} has no part {', '.join(map(repr, unknown)) or '()'}; "
+                f"its parts are {', '.join(self.part_names)}"
+            )
+        return tuple(self.part_names.index(name) for name in wanted)
+
+    def _motion(
+        self, part: str | Sequence[str], translate: Any, rotate: Any, scale: Any, pivot: Any
+    ) -> Array:
+        factors = np.asarray(scale, np.float64)
+        if factors.shape not in ((), (3,)) or not (np.isfinite(factors).all() and (factors > 0).all()):
+            raise SceneError(f"scale must be positive, one number or three, not {scale!r}")
+        center = self.part_bounds(part).mean(0) if pivot is None else pivot
+        return affine(translate, rotate, factors, center)
+
+    def _with(self, parts: Iterable[Part]) -> ProceduralScene:
+        scene = replace(self, parts=tuple(parts))
+        # the occlusion of the modelled parts is shared by all scenes made from them
+        scene.__dict__["occlusion"] = self.occlusion
+        return scene
+
+    @cached_property
+    def placed(self) -> tuple[Placed, ...]:
+        """All primitives where they are now."""
+        return tuple(Placed.build(part, primitive) for part in self.parts for primitive in part.primitives)
+
+    @cached_property
+    def occlusion(self) -> Occlusion:
+        """Baked occlusion of the scene as modelled (computed on first use)."""
+        return Occlusion(self.modelled)

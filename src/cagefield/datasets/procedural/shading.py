@@ -1,0 +1,53 @@
+"""Light of the procedural scenes: directional only, so that a part moved without turning looks the same.
+
+rgb = texture * occlusion * (sky and ground light + wrapped Lambert of two lights) + a Blinn-Phong highlight.
+There are no cast shadows. Occlusion belongs to the scene as modelled and travels with the parts.
+Colours are combined as sRGB-encoded values, like the radiance a field is trained on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+
+
+def _unit(x: float, y: float, z: float) -> Float32:
+    vector = np.array([x, y, z], np.float32)
+    return vector / np.float32(np.linalg.norm(vector))
+
+
+SKY = np.array([0.69, 0.71, 0.75], np.float32)
+GROUND = np.array([0.47, 0.44, 0.41], np.float32)
+KEY_DIRECTION, KEY_COLOR = _unit(0.55, -0.45, 0.8), np.array([0.47, 0.45, 0.41], np.float32)
+FILL_DIRECTION, FILL_COLOR = _unit(-0.8, 0.45, 0.25), np.array([0.12, 0.13, 0.16], np.float32)
+WRAP = 0.3
+"""Share by which the key light reaches around the terminator."""
+
+
+def shade(
+    albedo: Float32,
+    normals: Float32,
+    viewdirs: Float32,
+    *,
+    occlusion: Float32,
+    gloss: tuple[float, float],
+) -> Float32:
+    """rgb [N,3] in [0,1] of surface points.
+
+    albedo [N,3]; normals [N,3] unit, outwards; viewdirs [N,3] unit, from the camera; occlusion [N] in [0,1]
+    (1 is open); gloss: strength and exponent of the highlight.
+    """
+    up = 0.5 + 0.5 * normals[:, 2]
+    ambient = GROUND + (SKY - GROUND) * up[:, None]
+    key = np.maximum((normals @ KEY_DIRECTION + WRAP) / (1 + WRAP), 0)
+    fill = np.maximum(normals @ FILL_DIRECTION, 0)
+    light = ambient * occlusion[:, None]
+    light = light + (key * (0.4 + 0.6 * occlusion))[:, None] * KEY_COLOR + fill[:, None] * FILL_COLOR
+    halfway = KEY_DIRECTION - viewdirs
+    halfway = halfway / np.sqrt(np.einsum("ni,ni->n", halfway, halfway))[:, None]
+    facing = np.maximum(np.einsum("ni,ni->n", normals, halfway), 1e-6)
+    highlight = np.float32(gloss[0]) * facing ** np.float32(gloss[1]) * occlusion
+    out: Float32 = np.clip(albedo * light + highlight[:, None], 0, 1).astype(np.float32)
+    return out
