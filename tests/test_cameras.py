@@ -141,6 +141,32 @@ def test_project_equals_colmap(lens):
     np.testing.assert_allclose(depth, local[:, 2], atol=1e-12)
 
 
+def test_all_six_opencv_coefficients_in_closed_form():
+    k1, k2, p1, p2, k3, k4 = coefficients = (0.1, 0.2, 0.03, 0.04, 0.5, 0.6)
+    x, y, s = 0.5, -0.25, 0.3125
+    g = 1 + k1 * s + k2 * s**2 + k3 * s**3 + k4 * s**4
+    expected = (g * x + 2 * p1 * x * y + p2 * (s + 2 * x * x), g * y + p1 * (s + 2 * y * y) + 2 * p2 * x * y)
+    image = lenses.project(np.array([[1.0, -0.5, 2.0]]), "opencv", coefficients)
+    np.testing.assert_allclose(image[0], expected, rtol=1e-14)
+    np.testing.assert_allclose(
+        lenses.project(np.array([[1.0, -0.5, 2.0]]), "opencv", coefficients[:4])[0],
+        lenses.project(np.array([[1.0, -0.5, 2.0]]), "opencv", (*coefficients[:4], 0.0, 0.0))[0],
+    )
+
+
+def test_newtons_jacobian_is_the_derivative():
+    coefficients, h = (0.1, 0.2, 0.03, 0.04, 0.5, 0.6), 1e-6
+    plane = np.random.default_rng(4).uniform(-0.7, 0.7, (30, 2))
+    dx, dy = (
+        (lenses._distort(plane + h * e, coefficients) - lenses._distort(plane - h * e, coefficients))
+        / (2 * h)
+        for e in np.eye(2)
+    )
+    a, b, d = lenses._distort_jacobian(plane, coefficients)
+    # central differences: h^2 times third derivatives of order 100, and rounding 1e-16 / h
+    np.testing.assert_allclose(np.stack([a, b, b, d]), np.stack([*dx.T, *dy.T]), atol=1e-8)
+
+
 def test_points_without_an_image_are_nan():
     camera = _camera("pinhole")
     behind = camera.origin - camera.forward
@@ -155,6 +181,11 @@ def test_points_without_an_image_are_nan():
     # a fisheye sees behind itself
     image = lenses.project(np.array([[1.0, 0, -1]]), "opencv_fisheye", (0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(image, [[0.75 * np.pi, 0]])
+    # t (1 - 0.3 t^2) folds at 1.054 rad
+    angles = np.array([1.05, 1.06])
+    rim = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], axis=1)
+    image = lenses.project(rim, "opencv_fisheye", (-0.3, 0.0, 0.0, 0.0))
+    assert image[0, 0] == pytest.approx(1.05 * (1 - 0.3 * 1.05**2)) and np.isnan(image[1]).all()
 
 
 def test_pixels_outside_the_lens_warn_or_raise():
@@ -325,11 +356,12 @@ def test_camera_rejects(changes, message):
         Camera(**{**values, **changes})
 
 
-def test_poses_printed_with_four_decimals_are_accepted_and_stay_consistent():
-    camera = _camera("phone").with_c2w(np.round(_pose(), 4))
+def test_poses_printed_with_three_decimals_are_accepted_and_stay_consistent():
+    camera = _camera("phone").with_c2w(np.round(_pose(), 3))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         origins, directions = camera.rays()
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=2e-7)
     positions, _ = camera.project(origins + 2 * directions.astype(np.float64))
     np.testing.assert_allclose(positions, _centres(camera), atol=2e-4)
 

@@ -72,6 +72,15 @@ def _synthetic(folder: Path, splits=(("train", 5), ("test", 3), ("val", 2)), cut
         )
 
 
+def _cut_outs(folder: Path, **changes) -> Path:
+    """RGBA photos taken from a ring of radius 10, in one transforms.json."""
+    frames = []
+    for index, pose in enumerate(ring(8, radius=10.0)):
+        save_cut_out(folder / f"{index}.png")
+        frames.append({"file_path": f"{index}.png", "transform_matrix": pose.tolist()})
+    return _write(folder / "transforms.json", {"fl_x": 80.0, "frames": frames, **changes})
+
+
 def _nerfstudio(folder: Path, n: int = 6, fisheye: bool = False, **changes) -> Path:
     """A nerfstudio capture with intrinsics in every frame."""
     frames = []
@@ -210,17 +219,14 @@ def test_aabb_scale_decides_what_is_unbounded(tmp_path):
     assert not data.unbounded
     # Instant-NGP maps x to 0.33 x + 0.5 and keeps the unit cube
     np.testing.assert_allclose(data.bounds, [[-0.5 / 0.33] * 3, [0.5 / 0.33] * 3])
+    data = load_dataset(_cut_outs(tmp_path / "cut out", aabb_scale=4))
+    assert data.unbounded and data.white_background
     data = load_dataset(_ngp(tmp_path, aabb_scale=1, scale=0.5, offset=[0.5, 0.25, 0.0]))
     np.testing.assert_allclose(data.bounds, [[-1, -0.5, 0], [1, 1.5, 2]])
 
 
 def test_cut_outs_without_aabb_scale_are_bounded_by_the_cube_of_interest(tmp_path):
-    frames = []
-    for index, pose in enumerate(ring(8, radius=10.0)):
-        save_cut_out(tmp_path / f"{index}.png")
-        frames.append({"file_path": f"{index}.png", "transform_matrix": pose.tolist()})
-    _write(tmp_path / "transforms.json", {"fl_x": 80.0, "frames": frames})
-    data = load_dataset(tmp_path)
+    data = load_dataset(_cut_outs(tmp_path))
     half = 0.7 * 10 * math.sqrt(1.25)  # all cameras are that far from the point they look at, the origin
     assert not data.unbounded and data.white_background
     np.testing.assert_allclose(data.bounds, [[-half] * 3, [half] * 3], atol=1e-6)
@@ -228,7 +234,7 @@ def test_cut_outs_without_aabb_scale_are_bounded_by_the_cube_of_interest(tmp_pat
 
 @pytest.mark.parametrize("fisheye", [False, True])
 def test_nerfstudio_frames_have_their_own_intrinsics(tmp_path, fisheye):
-    _nerfstudio(tmp_path, fisheye=fisheye)
+    _nerfstudio(tmp_path, fisheye=fisheye, cx=1.0, k1=0.5, fl_x=7.0)  # the frames' own win over the file's
     data = load_dataset(tmp_path)
     assert data.unbounded
     assert len({view.camera.fx for view in data.train}) == 5

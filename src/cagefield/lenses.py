@@ -143,13 +143,25 @@ def _distort(plane: Array, coefficients: Sequence[float]) -> Array:
     )
 
 
+def _distort_jacobian(plane: Array, coefficients: Sequence[float]) -> tuple[Array, Array, Array]:
+    """Entries a, b, d [N] each of the symmetric Jacobian [[a, b], [b, d]] of `_distort`."""
+    x, y = plane.T
+    p1, p2 = coefficients[2], coefficients[3]
+    s = x * x + y * y
+    k = _radial("opencv", coefficients)
+    g = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))
+    g_slope = 2.0 * (k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3])))  # dg/dx = g_slope x
+    a = g + g_slope * x * x + 2 * p1 * y + 6 * p2 * x
+    b = g_slope * x * y + 2 * p1 * x + 2 * p2 * y
+    d = g + g_slope * y * y + 6 * p1 * y + 2 * p2 * x
+    return a, b, d
+
+
 def _undistort(
     image: Array, start: Array, start_reached: Mask, coefficients: Sequence[float]
 ) -> tuple[Array, Mask]:
     """The points whose opencv image is `image` [N,2], by damped Newton from `start`, and which were found."""
-    k = _radial("opencv", coefficients)
-    fold = _fold(k, _FLAT_LIMIT)
-    p1, p2 = coefficients[2], coefficients[3]
+    fold = _fold(_radial("opencv", coefficients), _FLAT_LIMIT)
     plane = start
     residual = _distort(plane, coefficients) - image
     size = np.hypot(*residual.T)
@@ -158,19 +170,15 @@ def _undistort(
     for _ in range(60):
         if np.all((size <= tolerance) | (damping < 1e-6)):
             break
-        x, y = plane.T
-        s = x * x + y * y
-        g = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))
-        g_slope = 2.0 * (k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3])))  # dg/dx = g_slope x
-        a = g + g_slope * x * x + 2 * p1 * y + 6 * p2 * x
-        b = g_slope * x * y + 2 * p1 * x + 2 * p2 * y  # the Jacobian [[a, b], [b, d]] is symmetric
-        d = g + g_slope * y * y + 6 * p1 * y + 2 * p2 * x
-        with np.errstate(divide="ignore", invalid="ignore"):
+        a, b, d = _distort_jacobian(plane, coefficients)
+        with np.errstate(
+            all="ignore"
+        ):  # a singular Jacobian gives a step that is not finite, hence not better
             u, v = residual.T
             step = np.stack([d * u - b * v, a * v - b * u], axis=1) / (a * d - b * b)[:, None]
-        trial = plane - damping[:, None] * step
-        trial_residual = _distort(trial, coefficients) - image
-        trial_size = np.hypot(*trial_residual.T)
+            trial = plane - damping[:, None] * step
+            trial_residual = _distort(trial, coefficients) - image
+            trial_size = np.hypot(*trial_residual.T)
         better = (trial_size < size) & (np.hypot(*trial.T) <= fold)
         plane = np.where(better[:, None], trial, plane)
         residual = np.where(better[:, None], trial_residual, residual)
