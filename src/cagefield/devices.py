@@ -5,9 +5,10 @@ Quadrants is imported here and in the kernel modules only, never by ``import cag
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 from typing import Any, Literal, get_args
-
 
 from cagefield.errors import DeviceError
 
@@ -38,6 +39,7 @@ def start(device: str = "auto") -> str:
     os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
     import quadrants as qd
 
+    qd.set_logging_level("error")
     archs: dict[str, Any] = {"cpu": qd.cpu, "cuda": qd.cuda, "metal": qd.metal, "vulkan": qd.vulkan}
     if device == "auto":
         chosen = next((name for name in ("cuda", "metal") if _supported(archs[name])), "cpu")
@@ -46,7 +48,8 @@ def start(device: str = "auto") -> str:
     else:
         raise DeviceError(f'device {device!r} is not available on this machine; use device="cpu" or "auto"')
     try:
-        qd.init(arch=archs[chosen], offline_cache=True, log_level="error", enable_fallback=False)
+        with contextlib.redirect_stdout(io.StringIO()):
+            qd.init(arch=archs[chosen], offline_cache=True, log_level="error", enable_fallback=False)
     except Exception as error:
         raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
     _started = chosen

@@ -1,0 +1,212 @@
+"""VoxelField: a sparse voxel grid of density and spherical-harmonic colour.
+
+Notation: a grid of nx x ny x nz *vertices* spans `bounds`; vertex (i, j, k) has the linear index
+(i*ny + j)*nz + k. Only M vertices are stored; the others are empty (density 0, and their colour counts as
+0.5 grey). Between vertices, density and colour coefficients are interpolated trilinearly:
+
+    sigma(p) = max(0, sum_v b_v(p) density_v)
+    rgb(p, d) = clip(0.5 + sum_l Y_l(d) sum_v b_v(p) sh_v,l , 0, 1)
+
+With `contracted`, `bounds` is the box of interest and the grid spans the contracted cube (-2, 2)^3 of
+`cagefield.fields.contraction`, hence all of space.
+
+This module is the readable float64 reference. `cagefield.rendering.march` is the fused version.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield import sh as spherical_harmonics
+from cagefield.errors import FieldError
+from cagefield.fields.contraction import contract
+
+FORMAT_VERSION = "1"
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelField:
+    """A sparse voxel grid of density and SH colour over `bounds` (canonical space, world units).
+
+    Attributes:
+        bounds: [2,3] float64, lower and upper corner; the box of interest when `contracted`.
+        resolution: (nx, ny, nz) vertices along each axis, at least 2 each.
+        vertices: [M] int64, strictly increasing linear indices of the stored vertices.
+        density: [M] float32, per world unit; negative values are allowed and interpolate before the clamp
+            at 0.
+        sh: [M, (degree+1)^2, 3] float32 colour coefficients.
+        contracted: True for an unbounded scene.
+
+    Raises:
+        FieldError: shapes that do not fit, indices out of range or out of order, NaN or infinity.
+    """
+
+    bounds: NDArray[np.float64]
+    resolution: tuple[int, int, int]
+    vertices: NDArray[np.int64]
+    density: NDArray[np.float32]
+    sh: NDArray[np.float32]
+    contracted: bool = False
+
+    def __post_init__(self) -> None:
+        fix = object.__setattr__
+        fix(self, "bounds", _frozen(self.bounds, np.float64))
+        fix(self, "resolution", tuple(int(n) for n in self.resolution))
+        fix(self, "vertices", _frozen(self.vertices, np.int64))
+        fix(self, "density", _frozen(self.density, np.float32))
+        fix(self, "sh", _frozen(self.sh, np.float32))
+        self._validate()
+
+    def _validate(self) -> None:
+        if self.bounds.shape != (2, 3) or not np.isfinite(self.bounds).all():
+            raise FieldError(f"bounds must be 2 finite corners [2,3], got shape {self.bounds.shape}")
+        if not (self.bounds[1] > self.bounds[0]).all():
+            raise FieldError(f"bounds must have lower < upper on every axis, got {self.bounds.tolist()}")
+        if len(self.resolution) != 3 or min(self.resolution) < 2 or max(self.resolution) > 2048:
+            raise FieldError(f"resolution must be 3 numbers from 2 to 2048, got {self.resolution}")
+        count = len(self.vertices)
+        if self.vertices.ndim != 1 or self.density.shape != (count,):
+            raise FieldError(
+                f"vertices and density must be [M], got {self.vertices.shape} and {self.density.shape}"
+            )
+        if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1] not in (1, 4, 9) or self.sh.shape[2] != 3:
+            raise FieldError(f"sh must be [{count}, 1|4|9, 3] (degree 0 to 2), got {self.sh.shape}")
+        total = int(np.prod(self.resolution))
+        if count and (self.vertices[0] < 0 or self.vertices[-1] >= total or (np.diff(self.vertices) <= 0).any()):
+            raise FieldError(f"vertices must be strictly increasing and within [0, {total})")
+        for name, values in (("density", self.density), ("sh", self.sh)):
+            if not np.isfinite(values).all():
+                bad = int(np.argwhere(~np.isfinite(values.reshape(count, -1)).all(axis=1))[0, 0])
+                raise FieldError(f"{name} must be finite, vertex {bad} of {count} is not; train or bake the field again")
+
+    @property
+    def sh_degree(self) -> int:
+        """Degree of the colour's spherical harmonics, 0 to 2."""
+        return {1: 0, 4: 1, 9: 2}[self.sh.shape[1]]
+
+    @property
+    def grid_bounds(self) -> NDArray[np.float64]:
+        """Corners [2,3] of the vertex grid: world units, or contracted units when `contracted`."""
+        if self.contracted:
+            return np.array([[-2.0] * 3, [2.0] * 3])
+        return self.bounds
+
+    @property
+    def voxel_size(self) -> NDArray[np.float64]:
+        """Edge lengths [3] of a voxel: world units (inside the box of interest when `contracted`)."""
+        size = (self.grid_bounds[1] - self.grid_bounds[0]) / (np.array(self.resolution) - 1)
+        return size * self.half_size if self.contracted else size
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Centre [3] of `bounds`."""
+        return np.asarray(self.bounds.mean(axis=0))
+
+    @property
+    def half_size(self) -> NDArray[np.float64]:
+        """Half of the edge lengths [3] of `bounds`."""
+        return np.asarray((self.bounds[1] - self.bounds[0]) / 2)
+
+    def grid_coordinates(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Positions [N,3] in units of vertices: 0 at the first vertex, resolution - 1 at the last."""
+        points = np.asarray(positions, dtype=np.float64)
+        if self.contracted:
+            points = contract((points - self.center) / self.half_size)
+        lower, upper = self.grid_bounds
+        return np.asarray((points - lower) / (upper - lower) * (np.array(self.resolution) - 1))
+
+    def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(sigma [N] per world unit, rgb [N,3]) at positions [N,3] (canonical) seen along unit viewdirs [N,3].
+
+        Sigma is 0 outside the grid.
+        """
+        g = self.grid_coordinates(positions)
+        n = np.array(self.resolution)
+        inside = ((g >= 0) & (g <= n - 1)).all(axis=1)
+        base = np.clip(np.floor(g).astype(np.int64), 0, n - 2)
+        frac = g - base
+        raw = np.zeros(len(g))
+        coefficients = np.zeros((len(g), *self.sh.shape[1:]))
+        for corner in range(8):
+            offset = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1])
+            slot, stored = self.lookup(base + offset)
+            weight = np.where(offset == 1, frac, 1 - frac).prod(axis=1) * stored
+            raw += weight * self.density[slot]
+            coefficients += weight[:, None, None] * self.sh[slot]
+        basis = spherical_harmonics.basis(np.asarray(viewdirs), self.sh_degree)
+        rgb = np.clip(0.5 + np.einsum("nl,nlc->nc", basis, coefficients), 0, 1)
+        sigma = np.where(inside, np.maximum(raw, 0), 0)
+        return sigma.astype(np.float32), rgb.astype(np.float32)
+
+    def lookup(self, vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """(slot [N], stored [N]) of grid vertices [N,3]; slot is 0 where the vertex is not stored."""
+        if len(self.vertices) == 0:
+            raise FieldError("the field is empty: it stores no vertex; train it longer or prune less")
+        _, ny, nz = self.resolution
+        linear = (vertex[:, 0] * ny + vertex[:, 1]) * nz + vertex[:, 2]
+        slot = np.minimum(np.searchsorted(self.vertices, linear), len(self.vertices) - 1)
+        stored = self.vertices[slot] == linear
+        return np.where(stored, slot, 0), stored
+
+    def save(self, path: str | Path) -> None:
+        """Writes the field to a safetensors file (float32); the folder must exist."""
+        from safetensors.numpy import save_file
+
+        tensors = {
+            "bounds": self.bounds,
+            "resolution": np.array(self.resolution, dtype=np.int64),
+            "vertices": self.vertices,
+            "density": self.density,
+            "sh": self.sh,
+        }
+        metadata = {"kind": "VoxelField", "version": FORMAT_VERSION, "contracted": str(int(self.contracted))}
+        save_file({k: np.ascontiguousarray(v) for k, v in tensors.items()}, str(path), metadata=metadata)
+
+    @classmethod
+    def load(cls, path: str | Path) -> VoxelField:
+        """The field in a safetensors file.
+
+        Raises:
+            FieldError: the file is missing, truncated, of another kind or newer than this version.
+        """
+        from safetensors import SafetensorError, safe_open
+
+        if not Path(path).is_file():
+            raise FieldError(f"{path}: no such field file; train one with `cagefield train DATA -o SCENE`")
+        try:
+            with safe_open(str(path), framework="numpy") as file:
+                metadata = file.metadata() or {}
+                tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        except (SafetensorError, OSError) as error:
+            raise FieldError(f"{path}: not a readable field file ({error}); it may be truncated, write it again") from error
+        if metadata.get("kind") != "VoxelField":
+            raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected 'VoxelField'")
+        if metadata.get("version") != FORMAT_VERSION:
+            raise FieldError(
+                f"{path}: field format {metadata.get('version')!r}, this cagefield reads {FORMAT_VERSION!r}; update cagefield"
+            )
+        missing = {"bounds", "resolution", "vertices", "density", "sh"} - tensors.keys()
+        if missing:
+            raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")
+        try:
+            return cls(
+                bounds=tensors["bounds"],
+                resolution=tuple(tensors["resolution"].tolist()),
+                vertices=tensors["vertices"],
+                density=tensors["density"],
+                sh=tensors["sh"],
+                contracted=metadata.get("contracted") == "1",
+            )
+        except FieldError as error:
+            raise FieldError(f"{path}: {error}") from error
+
+
+def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array

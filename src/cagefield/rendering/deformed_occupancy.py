@@ -1,0 +1,177 @@
+"""The occupancy of an edited field, in deformed space.
+
+Only the blocks that meet an edit's box are looked at again. There the edits' maps are evaluated at block
+corners (every 2 cells); a corner is occupied when the canonical field has an occupied cell within
+
+    r = |J|_inf * 1 cell + 1/2 cell
+
+of its image (L-infinity norm), which covers the images of all points nearer to it than to another corner,
+to first order. A block is occupied when one of its 8 corners is; with discrete edits, whose maps jump, when
+one of the 64 corners in or next to it is.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import numpy as np
+import quadrants as qd
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.grid import U8, contract_point, contract_velocity, ivec3, vec3
+from cagefield.rendering.occupancy import BRICK, Occupancy
+from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
+
+MOST_CELLS = 12.0
+"""Largest r, in cells; a map that squeezes more than this looks that far only."""
+
+
+def deform(canonical: Occupancy, field: VoxelField, stack: DeviceStack, jumps: bool) -> Occupancy:
+    """The occupancy of `field` seen through the edits. `jumps` says that an edit is discrete."""
+    if stack.n_edits == 0:
+        return canonical
+    boxes = np.stack([_grid_box(field, box) for box in stack.boxes.astype(np.float64)])
+    lower = np.floor(boxes[:, 0].min(axis=0) / BRICK).astype(np.int64) * BRICK
+    upper = (np.floor(boxes[:, 1].max(axis=0) / BRICK).astype(np.int64) + 1) * BRICK
+    if field.contracted:
+        lower = np.maximum(lower, 0)
+        upper = np.minimum(upper, BRICK * np.array(canonical.codes.shape))
+    first = np.minimum(lower, canonical.origin)
+    last = np.maximum(upper, canonical.origin + 2 * np.array(canonical.blocks.shape))
+    blocks = np.zeros((last - first) // 2, bool)
+    at = (canonical.origin - first) // 2
+    shape = canonical.blocks.shape
+    blocks[at[0] : at[0] + shape[0], at[1] : at[1] + shape[1], at[2] : at[2] + shape[2]] = canonical.blocks
+
+    count = (upper - lower) // 2
+    touched = np.zeros(count, bool)
+    for box in boxes:
+        lo = np.maximum(np.floor(box[0] / 2).astype(int) - lower // 2, 0)
+        hi = np.minimum(np.floor(box[1] / 2).astype(int) + 1 - lower // 2, count)
+        touched[lo[0] : hi[0], lo[1] : hi[1], lo[2] : hi[2]] = True
+    corners = _corners(canonical, field, stack, lower, count + 1)
+    if jumps:
+        corners = ndimage.maximum_filter(corners, size=3, mode="nearest")
+    near = corners
+    for axis in range(3):
+        n = near.shape[axis]
+        near = np.take(near, range(n - 1), axis) | np.take(near, range(1, n), axis)
+    at = (lower - first) // 2
+    region = tuple(slice(a, a + n) for a, n in zip(at, count, strict=True))
+    blocks[region] = np.where(touched, near, blocks[region])
+    return Occupancy.from_blocks(first, blocks)
+
+
+def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A world-space box [2,3] in grid coordinates, a little larger; in a contracted field the box around it."""
+    if not field.contracted:
+        return field.grid_coordinates(box) + np.array([[-0.01], [0.01]])
+    t = np.linspace(0.0, 1.0, 9)
+    grid = np.stack(np.meshgrid(t, t, t, indexing="ij"), axis=-1).reshape(-1, 3)
+    g = field.grid_coordinates(box[0] + grid * (box[1] - box[0]))
+    return np.stack([g.min(axis=0) - BRICK, g.max(axis=0) + BRICK])
+
+
+def _corners(
+    canonical: Occupancy, field: VoxelField, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Occupied block corners [count], the first at grid coordinates `lower`."""
+    out = np.zeros(int(np.prod(count)), np.uint8)
+    n = np.array(field.resolution)
+    if field.contracted:
+        origin, scale = field.center, 1.0 / field.half_size
+    else:
+        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
+    _occupied_corners(
+        out,
+        np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
+        ivec3(*canonical.blocks.shape),
+        ivec3(*canonical.origin.tolist()),
+        ivec3(*lower.tolist()),
+        ivec3(*count.tolist()),
+        vec3(*origin.tolist()),
+        vec3(*scale.tolist()),
+        vec3(*((n - 1) / 4).tolist()),
+        stack.params,
+        stack.lattice,
+        stack.n_edits,
+        int(field.contracted),
+    )
+    return out.reshape(tuple(count)).astype(bool)
+
+
+@qd.func
+def uncontract_point(c: vec3):
+    """The inverse of `contract_point`, up to 1e-4 from the surface at infinity."""
+    m = qd.min(qd.abs(c).max(), 2.0 - 1e-4)
+    scale = 1.0
+    if m > 1.0:
+        scale = m / qd.abs(c).max() / (m * (2.0 - m))
+    return c * scale
+
+
+@qd.kernel
+def _occupied_corners(
+    out: U8,
+    blocks: U8,
+    blocks_shape: ivec3,
+    blocks_origin: ivec3,
+    lower: ivec3,
+    count: ivec3,
+    origin: vec3,
+    scale: vec3,
+    half: vec3,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    contracted: qd.i32,
+):
+    for n in range(count.x * count.y * count.z):
+        i = n // (count.y * count.z)
+        j = (n // count.z) % count.y
+        k = n % count.z
+        g = qd.cast(lower + 2 * ivec3(i, j, k), qd.f32)
+        p = vec3(0.0, 0.0, 0.0)
+        c = g / half - 2.0
+        if contracted == 1:
+            p = uncontract_point(c) / scale + origin
+        else:
+            p = g / scale + origin
+        reach = vec3(0.0, 0.0, 0.0)
+        image = g
+        empty = 0
+        for a in range(3):
+            # One cell along grid axis a, as a world-space displacement.
+            e = vec3(0.0, 0.0, 0.0)
+            if a == 0:
+                e.x = 1.0
+            elif a == 1:
+                e.y = 1.0
+            else:
+                e.z = 1.0
+            d = e / scale
+            if contracted == 1:
+                d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
+            length = qd.max(d.norm(), 1e-20)
+            q, v, stretch, emptied = map_sample(p, d / length, params, lattice, n_edits)
+            empty = emptied
+            along = v * stretch * length * scale
+            image = (q - origin) * scale
+            if contracted == 1:
+                along = contract_velocity(image, along) * half
+                image = (contract_point(image) + 2.0) * half
+            reach += qd.abs(along)
+        found = 0
+        if empty == 0:
+            r = qd.min(reach + 0.5, MOST_CELLS)
+            first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - blocks_origin // 2, 0)
+            last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - blocks_origin // 2, blocks_shape - 1)
+            x = first.x
+            while x <= last.x and found == 0:
+                for y in range(first.y, last.y + 1):
+                    for z in range(first.z, last.z + 1):
+                        if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
+                            found = 1
+                x += 1
+        out[n] = qd.cast(found, qd.u8)
+

@@ -1,0 +1,161 @@
+"""A VoxelField on the compute device: arrays, and the kernel functions that sample it.
+
+Notation: g = grid coordinates (0 at the first vertex), *cell* = the cube between 8 vertices, *brick* =
+4 x 4 x 4 cells. A vertex is stored under a *slot*; slot 0 is the empty vertex (density 0, colour 0), so a
+lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slot, basis-major, rgb inner.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from dataclasses import dataclass
+
+import numpy as np
+import quadrants as qd
+from numpy.typing import NDArray
+
+from cagefield.fields.voxel import VoxelField
+
+BRICK = 4
+
+F32 = qd.types.ndarray(dtype=qd.f32, ndim=1)
+I32 = qd.types.ndarray(dtype=qd.i32, ndim=1)
+U8 = qd.types.ndarray(dtype=qd.u8, ndim=1)
+vec3 = qd.types.vector(3, qd.f32)
+ivec3 = qd.types.vector(3, qd.i32)
+vec8 = qd.types.vector(8, qd.f32)
+ivec8 = qd.types.vector(8, qd.i32)
+
+SH_C0 = 0.28209479177387814
+SH_C1 = 0.4886025119029199
+SH_C2 = (1.0925484305920792, -1.0925484305920792, 0.31539156525252005, -1.0925484305920792, 0.5462742152960396)
+
+
+def to_device(values: NDArray[np.generic]) -> qd.ndarray:
+    """A flat device array with the values of a numpy array (float32, int32 or uint8)."""
+    flat = np.ascontiguousarray(values).reshape(-1)
+    if flat.size == 0:
+        flat = np.zeros(1, flat.dtype)
+    kinds = {np.dtype(np.float32): qd.f32, np.dtype(np.int32): qd.i32, np.dtype(np.uint8): qd.u8}
+    array = qd.ndarray(dtype=kinds[flat.dtype], shape=(flat.size,))
+    array.from_numpy(flat)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceGrid:
+    """A VoxelField's arrays on the device.
+
+    Attributes:
+        field: the field they come from.
+        index: [nx*ny*nz] int32, slot of each vertex, 0 where empty.
+        density: [M+1] float32.
+        sh: [(M+1) * K * 3] float32.
+    """
+
+    field: VoxelField
+    index: qd.ndarray
+    density: qd.ndarray
+    sh: qd.ndarray
+
+    @classmethod
+    def from_field(cls, field: VoxelField) -> "DeviceGrid":
+        """The arrays of a field, its slots ordered by brick so that neighbours lie close in memory."""
+        order = brick_order(field.vertices, field.resolution)
+        index = np.zeros(int(np.prod(field.resolution)), np.int32)
+        index[field.vertices[order]] = np.arange(1, len(order) + 1, dtype=np.int32)
+        density = np.concatenate([np.zeros(1, np.float32), field.density[order]])
+        sh = np.concatenate([np.zeros((1, *field.sh.shape[1:]), np.float32), field.sh[order]])
+        return cls(field, to_device(index), to_device(density), to_device(sh))
+
+
+def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -> NDArray[np.int64]:
+    """The permutation [M] that sorts linear vertex indices by brick, then by position inside the brick."""
+    _, ny, nz = resolution
+    x, rest = np.divmod(vertices, ny * nz)
+    y, z = np.divmod(rest, nz)
+    brick = ((x // BRICK) * (ny // BRICK + 1) + y // BRICK) * (nz // BRICK + 1) + z // BRICK
+    return np.asarray(np.lexsort((vertices, brick)))
+
+
+@qd.func
+def sh_basis(d: vec3, K: qd.template()):
+    """The K real spherical harmonics of the unit direction d, degree 0 to 2 (as `cagefield.sh.basis`)."""
+    b = qd.Vector.zero(qd.f32, K)
+    b[0] = SH_C0
+    if qd.static(K > 1):
+        b[1] = -SH_C1 * d.y
+        b[2] = SH_C1 * d.z
+        b[3] = -SH_C1 * d.x
+    if qd.static(K > 4):
+        b[4] = SH_C2[0] * d.x * d.y
+        b[5] = SH_C2[1] * d.y * d.z
+        b[6] = SH_C2[2] * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y)
+        b[7] = SH_C2[3] * d.x * d.z
+        b[8] = SH_C2[4] * (d.x * d.x - d.y * d.y)
+    return b
+
+
+@qd.func
+def corner_weights(f: vec3):
+    """The 8 trilinear weights of the fractions f; corner k = 4x + 2y + z, z fastest as in memory."""
+    e = 1.0 - f
+    a = e.x * e.y
+    b = e.x * f.y
+    c = f.x * e.y
+    d = f.x * f.y
+    return vec8(a * e.z, a * f.z, b * e.z, b * f.z, c * e.z, c * f.z, d * e.z, d * f.z)
+
+
+@qd.func
+def corner_slots(index: qd.template(), base: ivec3, ny: qd.i32, nz: qd.i32):
+    """The slots of a cell's 8 corners, in the order of `corner_weights`."""
+    i = (base.x * ny + base.y) * nz + base.z
+    j = i + ny * nz
+    return ivec8(index[i], index[i + 1], index[i + nz], index[i + nz + 1],
+                 index[j], index[j + 1], index[j + nz], index[j + nz + 1])  # fmt: skip
+
+
+@qd.func
+def gather_density(density: qd.template(), slots: ivec8, w: vec8):
+    """Interpolated density, before the clamp at 0."""
+    raw = 0.0
+    for c in qd.static(range(8)):
+        raw += w[c] * density[slots[c]]
+    return raw
+
+
+@qd.func
+def gather_rgb(sh: qd.template(), slots: ivec8, w: vec8, basis: qd.template(), K: qd.template()):
+    """Interpolated colour, 0.5 added, before the clamp to [0, 1]."""
+    rgb = vec3(0.5, 0.5, 0.5)
+    for c in qd.static(range(8)):
+        if slots[c] > 0:
+            at = slots[c] * (3 * K)
+            s = vec3(0.0, 0.0, 0.0)
+            for k in qd.static(range(K)):
+                s += basis[k] * vec3(sh[at + 3 * k], sh[at + 3 * k + 1], sh[at + 3 * k + 2])
+            rgb += w[c] * s
+    return rgb
+
+
+@qd.func
+def contract_point(q: vec3):
+    """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
+    m = qd.max(qd.abs(q).max(), 1.0)
+    return ((2.0 - 1.0 / m) / m) * q
+
+
+@qd.func
+def contract_velocity(q: vec3, d: vec3):
+    """d/dt of contract(q + t d) at t = 0."""
+    v = d
+    a = qd.abs(q)
+    m = a.max()
+    if m > 1.0:
+        dm = d.x * qd.math.sign(q.x)
+        if a.y >= m:
+            dm = d.y * qd.math.sign(q.y)
+        if a.z >= m:
+            dm = d.z * qd.math.sign(q.z)
+        v = ((2.0 - 1.0 / m) / m) * d + ((-2.0 + 2.0 / m) / (m * m)) * dm * q
+    return v

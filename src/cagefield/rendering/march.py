@@ -1,0 +1,247 @@
+"""The fused renderer of a VoxelField: one march per ray, empty space leapt over, early stop.
+
+Samples lie at t_in + (k + 1/2) h along each ray, h = `step` voxels; leaps move by whole steps, so that the
+picture does not depend on what was skipped. In a contracted field the step is `step` voxels of contracted
+length, so it grows with distance.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+from cagefield.rendering.grid import (
+    F32,
+    I32,
+    contract_point,
+    contract_velocity,
+    corner_slots,
+    corner_weights,
+    gather_density,
+    gather_rgb,
+    ivec3,
+    sh_basis,
+    vec3,
+)
+from cagefield.rendering.traverse import empty_run, safe_inverse, slab
+from cagefield.warps.device import Nodes, Params, map_sample
+
+mat3 = qd.types.matrix(3, 3, qd.f32)
+TILE = 8
+FAR = 100.0
+
+
+@qd.kernel
+def march_tiles(
+    out: F32,
+    directions: F32,
+    first_tile: qd.i32,
+    tiles: qd.i32,
+    width: qd.i32,
+    height: qd.i32,
+    rotation: mat3,
+    origin: vec3,
+    codes: I32,
+    brick_origin: ivec3,
+    brick_dims: ivec3,
+    index: I32,
+    density: F32,
+    sh: F32,
+    resolution: ivec3,
+    lower: vec3,
+    scale: vec3,
+    step: qd.f32,
+    near: qd.f32,
+    with_normals: qd.i32,
+    boxes: F32,
+    n_boxes: qd.i32,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    preserve_opacity: qd.i32,
+    K: qd.template(),
+    contracted: qd.template(),
+    edited: qd.template(),
+):
+    """Marches the pixels of tiles [first_tile, first_tile + tiles), 8 x 8 pixels each, row-major.
+
+    out: [height * width, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
+    directions: [height * width, 3] camera-space. Grid coordinates are (p - lower) * scale, or, when
+    contracted, `lower` is the centre, `scale` 1 / half size, and the result is contracted.
+
+    boxes: [n_boxes, 2, 3], the deformed-space boxes outside which no edit changes anything. The part of a ray
+    that may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `codes`
+    are those of the deformed field.
+    """
+    across = (width + TILE - 1) // TILE
+    qd.loop_config(block_dim=64)
+    for n in range(tiles * TILE * TILE):
+        tile = first_tile + n // (TILE * TILE)
+        i = (tile % across) * TILE + n % TILE
+        j = (tile // across) * TILE + (n // TILE) % TILE
+        if i < width and j < height:
+            pixel = j * width + i
+            d = rotation @ vec3(directions[3 * pixel], directions[3 * pixel + 1], directions[3 * pixel + 2])
+            basis = sh_basis(d, K)
+            go = (origin - lower) * scale
+            gd = d * scale
+            inverse = safe_inverse(gd)
+            half = 0.25 * qd.cast(resolution - 1, qd.f32)
+            t = near
+            t_end = 1e30
+            if qd.static(not contracted):
+                lo = qd.cast(brick_origin, qd.f32)
+                hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(brick_dims, qd.f32))
+                t = qd.max(hit.x, near) + 0.5 * step
+                t_end = hit.y
+            edit_in = 1e30
+            edit_out = -1e30
+            if qd.static(edited):
+                world = safe_inverse(d)
+                for k in range(n_boxes):
+                    at = 6 * k
+                    through = slab(
+                        origin,
+                        world,
+                        vec3(boxes[at], boxes[at + 1], boxes[at + 2]),
+                        vec3(boxes[at + 3], boxes[at + 4], boxes[at + 5]),
+                    )
+                    if through.x <= through.y:
+                        edit_in = qd.min(edit_in, through.x)
+                        edit_out = qd.max(edit_out, through.y)
+            T = 1.0
+            rgb = vec3(0.0, 0.0, 0.0)
+            normal = vec3(0.0, 0.0, 0.0)
+            depth = 0.0
+            while t < t_end and T > 1e-3:
+                q = go + t * gd
+                g = q
+                h = step
+                inv = inverse
+                leap = 1.0
+                limit = 1e30
+                if qd.static(contracted):
+                    v = contract_velocity(q, gd) * half
+                    g = (contract_point(q) + 2.0) * half
+                    inv = safe_inverse(v)
+                    h = step / qd.abs(v).max()
+                    m = qd.abs(q).max()
+                    if m > 1.0:
+                        leap = 0.5
+                        limit = 0.25 * m / qd.abs(gd).max()
+                    if m > FAR:
+                        t_end = t
+                run = empty_run(codes, g, inv, brick_origin, brick_dims)
+                if run >= 0.0:
+                    if qd.static(contracted):
+                        t += qd.max(qd.min(run * leap, limit), h)
+                    else:
+                        t += (qd.floor(run / step) + 1.0) * step
+                else:
+                    stretch = 1.0
+                    moved = 0
+                    alive = 1
+                    view = d
+                    if qd.static(edited):
+                        if t >= edit_in and t <= edit_out:
+                            p = origin + t * d
+                            canonical, view, stretch, emptied = map_sample(p, d, params, lattice, n_edits)
+                            if emptied == 1:
+                                alive = 0
+                            if qd.abs(canonical - p).max() > 0.0:
+                                moved = 1
+                                g = to_grid(canonical, lower, scale, half, contracted)
+                                if g.min() < 0.0 or (g - qd.cast(resolution - 1, qd.f32)).max() > 0.0:
+                                    alive = 0
+                    if alive == 1:
+                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
+                        slots = corner_slots(index, cell, resolution.y, resolution.z)
+                        f = g - qd.cast(cell, qd.f32)
+                        b = corner_weights(f)
+                        raw = gather_density(density, slots, b)
+                        if raw > 0.0:
+                            if preserve_opacity == 1:
+                                raw *= stretch
+                            keep = qd.exp(-raw * h)
+                            w = T * (1.0 - keep)
+                            T *= keep
+                            if w > 1e-4:
+                                c = vec3(0.0, 0.0, 0.0)
+                                if moved == 1:
+                                    c = gather_rgb(sh, slots, b, sh_basis(view, K), K)
+                                else:
+                                    c = gather_rgb(sh, slots, b, basis, K)
+                                rgb += w * qd.max(qd.min(c, 1.0), 0.0)
+                                depth += w * t
+                                if with_normals == 1:
+                                    slope = density_slope(density, slots, f)
+                                    if qd.static(contracted):
+                                        at_world = (origin + t * d - lower) * scale
+                                        slope = pull_back(slope * half, at_world) * scale
+                                    else:
+                                        slope = slope * scale
+                                    if qd.static(edited):
+                                        if moved == 1:
+                                            slope = through_edits(slope, origin + t * d, params, lattice, n_edits)
+                                    normal -= w * slope / qd.max(slope.norm(), 1e-12)
+                    t += h
+            at = 8 * pixel
+            for a in qd.static(range(3)):
+                out[at + a] = rgb[a]
+                out[at + 5 + a] = normal[a]
+            out[at + 3] = 1.0 - T
+            out[at + 4] = depth
+
+
+@qd.func
+def to_grid(p: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
+    """Grid coordinates of a canonical position."""
+    g = (p - lower) * scale
+    if qd.static(contracted):
+        g = (contract_point(g) + 2.0) * half
+    return g
+
+
+@qd.func
+def pull_back(slope: vec3, q: vec3):
+    """Gradient with respect to the normalised position q of a gradient with respect to contract(q)."""
+    return vec3(
+        slope.dot(contract_velocity(q, vec3(1.0, 0.0, 0.0))),
+        slope.dot(contract_velocity(q, vec3(0.0, 1.0, 0.0))),
+        slope.dot(contract_velocity(q, vec3(0.0, 0.0, 1.0))),
+    )
+
+
+@qd.func
+def through_edits(slope: vec3, p: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
+    """J^T slope: the gradient in deformed space at p of a gradient in canonical space."""
+    out = vec3(0.0, 0.0, 0.0)
+    for a in range(3):
+        axis = vec3(0.0, 0.0, 0.0)
+        if a == 0:
+            axis.x = 1.0
+        elif a == 1:
+            axis.y = 1.0
+        else:
+            axis.z = 1.0
+        _q, v, stretch, _emptied = map_sample(p, axis, params, lattice, n_edits)
+        along = slope.dot(v) * stretch
+        if a == 0:
+            out.x = along
+        elif a == 1:
+            out.y = along
+        else:
+            out.z = along
+    return out
+
+
+@qd.func
+def density_slope(density: qd.template(), slots: qd.template(), f: vec3):
+    """Gradient of the interpolated density in grid coordinates."""
+    r = qd.Vector.zero(qd.f32, 8)
+    for c in qd.static(range(8)):
+        r[c] = density[slots[c]]
+    e = 1.0 - f
+    x = (r[4] - r[0]) * e.y * e.z + (r[5] - r[1]) * e.y * f.z + (r[6] - r[2]) * f.y * e.z + (r[7] - r[3]) * f.y * f.z
+    y = (r[2] - r[0]) * e.x * e.z + (r[3] - r[1]) * e.x * f.z + (r[6] - r[4]) * f.x * e.z + (r[7] - r[5]) * f.x * f.z
+    z = (r[1] - r[0]) * e.x * e.y + (r[3] - r[2]) * e.x * f.y + (r[5] - r[4]) * f.x * e.y + (r[7] - r[6]) * f.x * f.y
+    return vec3(x, y, z)

@@ -1,0 +1,79 @@
+"""Which cells can be non-empty, as a grid of bricks that a ray can leap over.
+
+A brick is 4 x 4 x 4 cells. Its code is an int32:
+
+    1 ... 255          occupied; bit 4x + 2y + z says that the 2 x 2 x 2 sub-block (x, y, z) is occupied
+    256 * D            empty, and so is every brick within Chebyshev distance D - 1, D in 1 ... 16
+
+A ray in an empty brick leaves the cube of empty bricks around it in one leap; in an occupied brick it
+leaves an empty sub-block in one leap. A cell counts as occupied when one of its 8 corners is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.fields.voxel import VoxelField
+
+BRICK = 4
+MAX_LEAP = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Occupancy:
+    """Codes of a grid of bricks.
+
+    Attributes:
+        origin: [3] int, grid coordinates of the first brick's first cell, multiples of 4 (negative where
+            the brick grid reaches beyond the vertex grid).
+        blocks: [2bx, 2by, 2bz] bool, occupied 2 x 2 x 2 sub-blocks.
+        codes: [bx, by, bz] int32.
+    """
+
+    origin: NDArray[np.int64]
+    blocks: NDArray[np.bool_]
+    codes: NDArray[np.int32]
+
+    @classmethod
+    def from_blocks(cls, origin: NDArray[np.int64], blocks: NDArray[np.bool_]) -> Occupancy:
+        """The occupancy with these sub-blocks occupied."""
+        return cls(origin, blocks, encode(blocks))
+
+
+def encode(blocks: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Brick codes [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz]."""
+    bx, by, bz = (n // 2 for n in blocks.shape)
+    split = blocks.reshape(bx, 2, by, 2, bz, 2)
+    mask = np.zeros((bx, by, bz), np.int32)
+    for bit in range(8):
+        mask |= split[:, bit >> 2 & 1, :, bit >> 1 & 1, :, bit & 1].astype(np.int32) << bit
+    empty = mask == 0
+    if empty.all():
+        return np.full(mask.shape, 256 * MAX_LEAP, np.int32)
+    distance = np.minimum(ndimage.distance_transform_cdt(empty, metric="chessboard"), MAX_LEAP)
+    return np.where(empty, 256 * distance, mask).astype(np.int32)
+
+
+def of_field(field: VoxelField, threshold: float = 0.0) -> Occupancy:
+    """The occupancy of a field: vertices whose density exceeds `threshold` occupy the 8 cells around them."""
+    full = np.zeros(field.resolution, bool)
+    full.reshape(-1)[field.vertices[field.density > threshold]] = True
+    return of_vertices(full)
+
+
+def of_vertices(full: NDArray[np.bool_]) -> Occupancy:
+    """The occupancy of a grid [nx,ny,nz] of occupied vertices."""
+    bricks = [-(-(n - 1) // BRICK) for n in full.shape]
+    padded = np.zeros([n * BRICK + 1 for n in bricks], bool)
+    padded[: full.shape[0], : full.shape[1], : full.shape[2]] = full
+    # A sub-block of 2 cells touches the 3 vertices 2b, 2b+1, 2b+2 along each axis.
+    for axis in range(3):
+        even = np.take(padded, range(0, padded.shape[axis] - 1, 2), axis)
+        odd = np.take(padded, range(1, padded.shape[axis], 2), axis)
+        last = np.take(padded, range(2, padded.shape[axis], 2), axis)
+        padded = even | odd | last
+    return Occupancy.from_blocks(np.zeros(3, np.int64), padded)

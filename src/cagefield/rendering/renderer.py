@@ -1,0 +1,157 @@
+"""Renderer: pictures of a VoxelField seen through its edits, by the fused march."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield import devices
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.frame import Background, Frame
+
+if TYPE_CHECKING:
+    from cagefield.rendering.grid import DeviceGrid
+
+BAND = 4
+"""Rows of tiles rendered between two looks at `should_stop`."""
+
+
+class Renderer:
+    """Renders one field under one edit stack; the field's arrays stay on the device between frames.
+
+    `step` is the distance between samples in voxels. `with_edits` shares the field's arrays.
+    """
+
+    def __init__(
+        self,
+        field: VoxelField,
+        edits: EditStack | None = None,
+        *,
+        step: float = 0.5,
+        preserve_opacity: bool = False,
+        grid: DeviceGrid | None = None,
+    ) -> None:
+        """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
+        devices.start()
+        from cagefield.rendering import occupancy
+        from cagefield.rendering.grid import DeviceGrid
+
+        self.field = field
+        self.edits = edits if edits is not None else EditStack([])
+        self.step = float(step)
+        self.preserve_opacity = preserve_opacity
+        self._grid = grid if grid is not None else DeviceGrid.from_field(field)
+        self._canonical = occupancy.of_field(field)
+        self._pixels: dict[tuple[int, int], Any] = {}
+        self._directions: tuple[NDArray[np.float32], Any] | None = None
+        self._pack_edits()
+
+    def with_edits(self, edits: EditStack) -> Renderer:
+        """A renderer of the same field under other edits."""
+        other = object.__new__(Renderer)
+        other.__dict__.update(self.__dict__)
+        other.edits = edits
+        other._pack_edits()
+        return other
+
+    def _pack_edits(self) -> None:
+        from cagefield.rendering.deformed_occupancy import deform
+        from cagefield.rendering.grid import to_device
+        from cagefield.warps.device import DeviceStack
+
+        stack = DeviceStack.from_stack(self.edits)
+        jumps = any(edit.adjustment == "discrete" for edit in self.edits.active)
+        self._occupancy = deform(self._canonical, self.field, stack, jumps)
+        self._codes = to_device(self._occupancy.codes)
+        self._stack = stack
+        self._boxes = to_device(stack.boxes.astype(np.float32))
+
+    def render(
+        self,
+        camera: Camera,
+        *,
+        background: Background = "white",
+        normals: bool = False,
+        near: float = 0.0,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Frame | None:
+        """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles."""
+        from cagefield.rendering import march
+        from cagefield.rendering.grid import ivec3, to_device, vec3
+
+        field = self.field
+        local = camera.local_directions()
+        if self._directions is None or self._directions[0] is not local:
+            self._directions = (local, to_device(local))
+        width, height = camera.width, camera.height
+        out = self._buffer(width, height)
+        across, down = -(-width // march.TILE), -(-height // march.TILE)
+        n = np.array(field.resolution)
+        if field.contracted:
+            lower, scale = field.center, 1.0 / field.half_size
+            step = self.step
+        else:
+            lower, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
+            step = self.step / float(scale.max())
+        rows = down if should_stop is None else BAND
+        for row in range(0, down, rows):
+            if should_stop is not None and should_stop():
+                return None
+            march.march_tiles(
+                out,
+                self._directions[1],
+                row * across,
+                min(rows, down - row) * across,
+                width,
+                height,
+                march.mat3(camera.c2w[:3, :3].tolist()),
+                vec3(*camera.c2w[:3, 3].tolist()),
+                self._codes,
+                ivec3(*self._occupancy.origin.tolist()),
+                ivec3(*self._occupancy.codes.shape),
+                self._grid.index,
+                self._grid.density,
+                self._grid.sh,
+                ivec3(*field.resolution),
+                vec3(*lower.tolist()),
+                vec3(*scale.tolist()),
+                step,
+                near,
+                int(normals),
+                self._boxes,
+                len(self._stack.boxes),
+                self._stack.params,
+                self._stack.lattice,
+                self._stack.n_edits,
+                int(self.preserve_opacity),
+                field.sh.shape[1],
+                field.contracted,
+                self._stack.n_edits > 0,
+            )
+        return _frame(out.to_numpy().reshape(height, width, 8), background, normals)
+
+    def _buffer(self, width: int, height: int) -> Any:
+        import quadrants as qd
+
+        if (width, height) not in self._pixels:
+            self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
+        return self._pixels[(width, height)]
+
+
+def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> Frame:
+    opacity = marched[..., 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(opacity > 1e-6, marched[..., 4] / opacity, np.inf)
+    normals = None
+    if with_normals:
+        normals = marched[..., 5:8]
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), 0.0)
+    return Frame.from_premultiplied(
+        marched[..., :3], opacity, depth.astype(np.float32), normals=normals, background=background
+    )

@@ -1,0 +1,60 @@
+"""Kernel functions that walk a ray through the brick grid of `cagefield.rendering.occupancy`."""
+
+import quadrants as qd
+
+from cagefield.rendering.grid import ivec3, vec3
+
+vec2 = qd.types.vector(2, qd.f32)
+
+
+@qd.func
+def slab(origin: vec3, inverse: vec3, lower: vec3, upper: vec3):
+    """(t_in, t_out) of a ray with a box; empty when t_in >= t_out. `inverse` is 1 / direction."""
+    a = (lower - origin) * inverse
+    b = (upper - origin) * inverse
+    return vec2(qd.min(a, b).max(), qd.max(a, b).min())
+
+
+@qd.func
+def safe_inverse(d: vec3):
+    """1 / d with zero components replaced by a tiny one of positive sign."""
+    r = vec3(0.0, 0.0, 0.0)
+    for a in qd.static(range(3)):
+        x = d[a]
+        if qd.abs(x) < 1e-12:
+            x = 1e-12
+        r[a] = 1.0 / x
+    return r
+
+
+@qd.func
+def brick_code(codes: qd.template(), cell: ivec3, origin: ivec3, dims: ivec3):
+    """The code of the brick that holds a cell; cells outside the brick grid take the nearest brick."""
+    b = qd.max(qd.min((cell - origin) >> 2, dims - 1), 0)
+    return codes[(b.x * dims.y + b.y) * dims.z + b.z]
+
+
+@qd.func
+def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims: ivec3):
+    """The ray parameter to the exit of the empty block around grid coordinates g; -1 where it is occupied."""
+    cell = qd.cast(qd.floor(g), qd.i32) - origin
+    b = qd.max(qd.min(cell >> 2, dims - 1), 0)
+    code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
+    run = -1.0
+    lower = ivec3(0, 0, 0)
+    size = 0
+    if code >= 256:
+        d = code >> 8
+        lower = (b - (d - 1)) * 4
+        size = (2 * d - 1) * 4
+    else:
+        s = (cell >> 1) & 1
+        if (code >> (s.x * 4 + s.y * 2 + s.z)) & 1 == 0:
+            lower = (cell >> 1) << 1
+            size = 2
+    if size > 0:
+        lo = qd.cast(lower + origin, qd.f32)
+        a = (lo - g) * inverse
+        c = (lo + qd.cast(size, qd.f32) - g) * inverse
+        run = qd.max(qd.max(a, c).min(), 0.0)
+    return run

@@ -1,0 +1,404 @@
+"""Fused kernels of the voxel trainer: forward and backward march, Laplacian, diagonal Gauss-Newton update.
+
+Notation, per ray and channel: samples i with density s_i, step h_i, alpha_i = 1 - exp(-s_i h_i),
+transmittance T_i, weight w_i = T_i alpha_i, colour c_i; C = sum_i w_i c_i + T_end * background;
+residual r = gain * C - photo; remaining colour S_i = C - sum_{j<=i} w_j c_j. Then
+
+    dC/dc_i = w_i          dC/ds_i = h_i (T_{i+1} c_i - S_i)
+
+The first march computes C, the second the gradients from S_i; no samples are stored. b_v are trilinear
+weights. Each worker adds into its own accumulator, so that no atomics are needed on a CPU and the sums do
+not depend on timing; on a GPU one accumulator is shared, with atomic adds.
+
+Accumulator record of a slot (stride 4 + 3K): density gradient, density curvature sum_c (dC_c/ds)^2,
+colour curvature w^2, largest weight, then the 3K colour gradients (basis-major).
+"""
+
+import quadrants as qd
+
+from cagefield.rendering.grid import (
+    F32,
+    I32,
+    U8,
+    contract_point,
+    contract_velocity,
+    corner_slots,
+    corner_weights,
+    gather_density,
+    gather_rgb,
+    ivec3,
+    sh_basis,
+    vec3,
+)
+from cagefield.rendering.traverse import empty_run, safe_inverse, slab
+
+HEAD = 4
+DENSITY_GRADIENT, DENSITY_CURVATURE, COLOUR_CURVATURE, LARGEST_WEIGHT = range(HEAD)
+
+
+@qd.func
+def hash01(a: qd.u32, b: qd.u32):
+    """A pseudo-random number in [0, 1) of two counters (PCG output hash)."""
+    s = a * qd.u32(747796405) + b * qd.u32(2891336453) + qd.u32(277803737)
+    s = ((s >> ((s >> qd.u32(28)) + qd.u32(4))) ^ s) * qd.u32(277803737)
+    s = (s >> qd.u32(22)) ^ s
+    return qd.cast(s >> qd.u32(8), qd.f32) * (1.0 / 16777216.0)
+
+
+@qd.func
+def add(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
+    """target[at] += value, atomically on a GPU only."""
+    if qd.static(gpu):
+        qd.atomic_add(target[at], value)
+    else:
+        target[at] = target[at] + value
+
+
+@qd.kernel
+def march_batch(
+    patches: I32,
+    n_patches: qd.i32,
+    patch_size: qd.i32,
+    workers: qd.i32,
+    seed: qd.u32,
+    views: I32,
+    poses: F32,
+    gains: F32,
+    directions: F32,
+    pixels: U8,
+    codes: I32,
+    index: I32,
+    density: F32,
+    sh: F32,
+    accumulator: F32,
+    record: qd.i32,
+    losses: F32,
+    gain_sums: F32,
+    brick_dims: ivec3,
+    resolution: ivec3,
+    lower: vec3,
+    scale: vec3,
+    step: qd.f32,
+    near: qd.f32,
+    spread: qd.f32,
+    random_background: qd.i32,
+    background: vec3,
+    K: qd.template(),
+    contracted: qd.template(),
+    gpu: qd.template(),
+):
+    """Adds the gradients and curvatures of a batch of pixel patches to the accumulators.
+
+    patches: [P, 3] (view, column, row of the first pixel). views: [V, 4] (first pixel, width, first
+    direction, height). poses: [V, 12] rows of c2w. gains: [V, 3]. Writes losses [rays] (squared error) and
+    gain_sums [rays * 6] (C photo, C C per channel) for the exposure fit. World position p maps to grid
+    coordinates (p - lower) * scale; when contracted, `lower` is the centre, `scale` 1 / half size, and the
+    result is contracted.
+    """
+    rays = patch_size * patch_size
+    per = (n_patches + workers - 1) // workers
+    for worker in range(workers):
+        base = 0
+        if qd.static(not gpu):
+            base = worker * record
+        for patch in range(worker * per, qd.min((worker + 1) * per, n_patches)):
+            for r in range(rays):
+                ray = patch * rays + r
+                view = patches[3 * patch]
+                column = patches[3 * patch + 1] + r % patch_size
+                row = patches[3 * patch + 2] + r // patch_size
+                first = views[4 * view]
+                width = views[4 * view + 1]
+                pixel = row * width + column
+                losses[ray] = 0.0
+                for a in qd.static(range(6)):
+                    gain_sums[6 * ray + a] = 0.0
+                if row < views[4 * view + 3] and column < width:
+                    m = 12 * view
+                    at = 3 * (views[4 * view + 2] + pixel)
+                    l = vec3(directions[at], directions[at + 1], directions[at + 2])
+                    d = vec3(
+                        poses[m] * l.x + poses[m + 1] * l.y + poses[m + 2] * l.z,
+                        poses[m + 4] * l.x + poses[m + 5] * l.y + poses[m + 6] * l.z,
+                        poses[m + 8] * l.x + poses[m + 9] * l.y + poses[m + 10] * l.z,
+                    )
+                    o = vec3(poses[m + 3], poses[m + 7], poses[m + 11])
+                    gain = vec3(gains[3 * view], gains[3 * view + 1], gains[3 * view + 2])
+                    key = qd.cast(ray, qd.u32)
+                    bg = background
+                    if random_background == 1:
+                        for a in qd.static(range(3)):
+                            bg[a] = hash01(key, seed * qd.u32(4) + qd.u32(a + 1))
+                    px = 4 * (first + pixel)
+                    opacity = qd.cast(pixels[px + 3], qd.f32) / 255.0
+                    photo = vec3(0.0, 0.0, 0.0)
+                    for a in qd.static(range(3)):
+                        photo[a] = qd.cast(pixels[px + a], qd.f32) / 255.0 * opacity + (1.0 - opacity) * bg[a]
+                    basis = sh_basis(d, K)
+
+                    # Ray in grid coordinates (bounded) or normalised coordinates (contracted).
+                    go = (o - lower) * scale
+                    gd = d * scale
+                    inverse = safe_inverse(gd)
+                    half = 0.25 * qd.cast(resolution - 1, qd.f32)
+                    t_end = 1e30
+                    t_start = near
+                    if qd.static(not contracted):
+                        hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
+                        t_start = qd.max(hit.x, near)
+                        t_end = hit.y
+                    jitter = hash01(key, seed * qd.u32(4))
+                    if qd.static(not contracted):
+                        t_start += jitter * step
+                    else:
+                        v0 = contract_velocity(go + t_start * gd, gd)
+                        t_start += jitter * step / qd.abs(v0 * half).max()
+
+                    C = vec3(0.0, 0.0, 0.0)
+                    for march in qd.static(range(2)):
+                        T = 1.0
+                        acc = vec3(0.0, 0.0, 0.0)
+                        residual = vec3(0.0, 0.0, 0.0)
+                        if qd.static(march == 1):
+                            residual = gain * C - photo
+                        t = t_start
+                        while t < t_end and T > 1e-3:
+                            q = go + t * gd
+                            g = q
+                            h = step
+                            inv = inverse
+                            leap = 1.0
+                            limit = 1e30
+                            if qd.static(contracted):
+                                v = contract_velocity(q, gd) * half
+                                g = (contract_point(q) + 2.0) * half
+                                inv = safe_inverse(v)
+                                h = step / qd.abs(v).max()
+                                far = qd.abs(q).max()
+                                if far > 1.0:
+                                    leap = 0.5
+                                    limit = 0.25 * far / qd.abs(gd).max()
+                                if far > 100.0:
+                                    t_end = t
+                            run = empty_run(codes, g, inv, ivec3(0, 0, 0), brick_dims)
+                            if run >= 0.0:
+                                if qd.static(contracted):
+                                    t += qd.max(qd.min(run * leap, limit), h)
+                                else:
+                                    t += (qd.floor(run / step) + 1.0) * step
+                            else:
+                                cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
+                                slots = corner_slots(index, cell, resolution.y, resolution.z)
+                                b = corner_weights(g - qd.cast(cell, qd.f32))
+                                raw = gather_density(density, slots, b)
+                                if raw > 0.0:
+                                    keep = qd.exp(-raw * h)
+                                    w = T * (1.0 - keep)
+                                    T *= keep
+                                    if w > 1e-4:
+                                        colour = gather_rgb(sh, slots, b, basis, K)
+                                        c = qd.max(qd.min(colour, 1.0), 0.0)
+                                        acc += w * c
+                                        if qd.static(march == 1):
+                                            slope = h * gain * (T * c - (C - acc))
+                                            curvature = slope.dot(slope)
+                                            curvature += spread * h * qd.sqrt(curvature)
+                                            gradient = slope.dot(residual)
+                                            pull = residual * gain * w
+                                            for a in qd.static(range(3)):
+                                                if colour[a] < 0.0 and pull[a] > 0.0:
+                                                    pull[a] = 0.0
+                                                if colour[a] > 1.0 and pull[a] < 0.0:
+                                                    pull[a] = 0.0
+                                            ww = w * (w + spread * (1.0 - w))
+                                            for k in qd.static(range(8)):
+                                                if slots[k] > 0:
+                                                    to = base + slots[k] * (HEAD + 3 * K)
+                                                    add(accumulator, to, b[k] * gradient, gpu)
+                                                    add(accumulator, to + 1, b[k] * curvature, gpu)
+                                                    add(accumulator, to + 2, b[k] * ww, gpu)
+                                                    if qd.static(gpu):
+                                                        qd.atomic_max(accumulator[to + 3], b[k] * w)
+                                                    else:
+                                                        accumulator[to + 3] = qd.max(accumulator[to + 3], b[k] * w)
+                                                    for j in qd.static(range(K)):
+                                                        y = b[k] * basis[j]
+                                                        for a in qd.static(range(3)):
+                                                            add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
+                                t += h
+                        if qd.static(march == 0):
+                            C = acc + T * bg
+                        else:
+                            error = residual
+                            losses[ray] = error.dot(error)
+                            for a in qd.static(range(3)):
+                                gain_sums[6 * ray + a] = C[a] * photo[a]
+                                gain_sums[6 * ray + 3 + a] = C[a] * C[a]
+
+
+@qd.kernel
+def gauss_newton(
+    density: F32,
+    sh: F32,
+    state: F32,
+    weight: F32,
+    accumulator: F32,
+    record: qd.i32,
+    workers: qd.i32,
+    slots: qd.i32,
+    decay: qd.f32,
+    density_rate: qd.f32,
+    colour_rate: qd.f32,
+    largest_density_step: qd.f32,
+    density_floor: qd.f32,
+    colour_floor: qd.f32,
+    K: qd.template(),
+):
+    """One diagonal Gauss-Newton step of every slot the batch touched; empties the accumulators.
+
+    state: [slots, 2] running sums of density and colour curvature, decayed on each touch.
+    weight: [slots] the largest weight seen since the last pruning.
+    """
+    qd.loop_config(block_dim=256)
+    for slot in range(1, slots):
+        stride = qd.static(HEAD + 3 * K)
+        h_density = 0.0
+        h_colour = 0.0
+        for worker in range(workers):
+            at = worker * record + slot * stride
+            h_density += accumulator[at + 1]
+            h_colour += accumulator[at + 2]
+        if h_colour > 0.0:
+            s0 = state[2 * slot] * decay + h_density
+            s1 = state[2 * slot + 1] * decay + h_colour
+            state[2 * slot] = s0
+            state[2 * slot + 1] = s1
+            g_density = 0.0
+            w = weight[slot]
+            for worker in range(workers):
+                at = worker * record + slot * stride
+                g_density += accumulator[at]
+                w = qd.max(w, accumulator[at + 3])
+                for a in qd.static(range(HEAD)):
+                    accumulator[at + a] = 0.0
+            weight[slot] = w
+            change = density_rate * g_density / (s0 + density_floor)
+            density[slot] = density[slot] - qd.max(qd.min(change, largest_density_step), -largest_density_step)
+            rate = colour_rate / (s1 + colour_floor)
+            for j in qd.static(range(3 * K)):
+                g = 0.0
+                for worker in range(workers):
+                    at = worker * record + slot * stride + HEAD + j
+                    g += accumulator[at]
+                    accumulator[at] = 0.0
+                sh[slot * (3 * K) + j] = sh[slot * (3 * K) + j] - rate * g
+
+
+@qd.kernel
+def touched_patches(
+    touched: I32,
+    patches: I32,
+    n_patches: qd.i32,
+    patch_size: qd.i32,
+    views: I32,
+    poses: F32,
+    directions: F32,
+    codes: I32,
+    brick_dims: ivec3,
+    lower: vec3,
+    scale: vec3,
+    resolution: ivec3,
+    near: qd.f32,
+):
+    """Sets touched[p] to 1 where any ray of patch p meets an occupied block of a bounded grid, else 0."""
+    for patch in range(n_patches):
+        found = 0
+        for r in range(patch_size * patch_size):
+            view = patches[3 * patch]
+            column = patches[3 * patch + 1] + r % patch_size
+            row = patches[3 * patch + 2] + r // patch_size
+            if found == 0 and row < views[4 * view + 3] and column < views[4 * view + 1]:
+                m = 12 * view
+                at = 3 * (views[4 * view + 2] + row * views[4 * view + 1] + column)
+                l = vec3(directions[at], directions[at + 1], directions[at + 2])
+                d = vec3(
+                    poses[m] * l.x + poses[m + 1] * l.y + poses[m + 2] * l.z,
+                    poses[m + 4] * l.x + poses[m + 5] * l.y + poses[m + 6] * l.z,
+                    poses[m + 8] * l.x + poses[m + 9] * l.y + poses[m + 10] * l.z,
+                )
+                go = (vec3(poses[m + 3], poses[m + 7], poses[m + 11]) - lower) * scale
+                gd = d * scale
+                inverse = safe_inverse(gd)
+                hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
+                t = qd.max(hit.x, near)
+                nudge = 0.05 / qd.abs(gd).max()
+                while t < hit.y and found == 0:
+                    run = empty_run(codes, go + t * gd, inverse, ivec3(0, 0, 0), brick_dims)
+                    if run < 0.0:
+                        found = 1
+                    t += run + nudge
+        touched[patch] = found
+
+
+@qd.kernel
+def laplacian(
+    density: F32,
+    sh: F32,
+    index: I32,
+    vertex_at: I32,
+    accumulator: F32,
+    slots: qd.i32,
+    resolution: ivec3,
+    density_weight: qd.f32,
+    colour_weight: qd.f32,
+    K: qd.template(),
+):
+    """Adds the gradient and curvature of weight/2 * sum over stored neighbours (x - x_n)^2 to touched slots.
+
+    Touched: the first accumulator has a colour curvature. Neighbours are the 6 along the axes.
+    """
+    qd.loop_config(block_dim=256)
+    for slot in range(1, slots):
+        stride = qd.static(HEAD + 3 * K)
+        to = slot * stride
+        if accumulator[to + 2] > 0.0:
+            at = vertex_at[slot]
+            nyz = resolution.y * resolution.z
+            x = at // nyz
+            rest = at - x * nyz
+            y = rest // resolution.z
+            z = rest - y * resolution.z
+            count = 0.0
+            s = qd.Vector.zero(qd.f32, 3 * K)
+            d = 0.0
+            for n in qd.static(range(6)):
+                other = 0
+                if qd.static(n == 0):
+                    if x > 0:
+                        other = index[at - nyz]
+                if qd.static(n == 1):
+                    if x < resolution.x - 1:
+                        other = index[at + nyz]
+                if qd.static(n == 2):
+                    if y > 0:
+                        other = index[at - resolution.z]
+                if qd.static(n == 3):
+                    if y < resolution.y - 1:
+                        other = index[at + resolution.z]
+                if qd.static(n == 4):
+                    if z > 0:
+                        other = index[at - 1]
+                if qd.static(n == 5):
+                    if z < resolution.z - 1:
+                        other = index[at + 1]
+                if other > 0:
+                    count += 1.0
+                    d += density[other]
+                    for j in qd.static(range(3 * K)):
+                        s[j] += sh[other * (3 * K) + j]
+            accumulator[to] = accumulator[to] + density_weight * (count * density[slot] - d)
+            accumulator[to + 1] = accumulator[to + 1] + density_weight * count
+            accumulator[to + 2] = accumulator[to + 2] + colour_weight * count
+            for j in qd.static(range(3 * K)):
+                a = to + HEAD + j
+                accumulator[a] = accumulator[a] + colour_weight * (count * sh[slot * (3 * K) + j] - s[j])

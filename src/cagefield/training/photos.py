@@ -1,0 +1,90 @@
+"""Posed photos on the compute device, cut into small square patches of neighbouring rays.
+
+Neighbouring rays read the same voxels, so a batch of patches runs about as fast as its voxels can be
+fetched once; single random rays would fetch them anew each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.datasets.dataset import View
+from cagefield.errors import DatasetError
+
+
+@dataclass(frozen=True, eq=False)
+class Photos:
+    """Photos and cameras as flat device arrays.
+
+    Attributes:
+        names: [V] names of the views.
+        sizes: [V, 2] int (width, height).
+        views: device [V, 4] int32 (first pixel, width, first direction, height).
+        poses: device [V, 12] float32, first three rows of c2w.
+        directions: device [sum of distinct W*H, 3] float32 unit camera-space directions.
+        pixels: device [sum W*H, 4] uint8 straight RGBA.
+        has_alpha: True when any photo has a transparent pixel.
+    """
+
+    names: tuple[str, ...]
+    sizes: NDArray[np.int64]
+    views: Any
+    poses: Any
+    directions: Any
+    pixels: Any
+    has_alpha: bool
+
+    @classmethod
+    def load(cls, views: Sequence[View]) -> Photos:
+        """The photos of these views, read from disk.
+
+        Raises:
+            DatasetError: no view, or a photo that cannot be read.
+        """
+        from cagefield.rendering.grid import to_device
+
+        if not views:
+            raise DatasetError("no training photo: the data set is empty")
+        table = np.zeros((len(views), 4), np.int32)
+        poses = np.zeros((len(views), 12), np.float32)
+        direction_at: dict[int, int] = {}
+        directions: list[NDArray[np.float32]] = []
+        pixels = []
+        n_pixels = n_directions = 0
+        for i, view in enumerate(views):
+            camera = view.camera
+            local = camera.local_directions()
+            if id(local) not in direction_at:
+                direction_at[id(local)] = n_directions
+                directions.append(local)
+                n_directions += len(local)
+            image = view.load()
+            if image.shape[2] == 3:
+                image = np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=2)
+            table[i] = n_pixels, camera.width, direction_at[id(local)], camera.height
+            poses[i] = camera.c2w[:3].reshape(-1)
+            pixels.append(image.reshape(-1, 4))
+            n_pixels += camera.width * camera.height
+        flat = np.concatenate(pixels)
+        return cls(
+            names=tuple(v.name for v in views),
+            sizes=table[:, [1, 3]].astype(np.int64),
+            views=to_device(table),
+            poses=to_device(poses),
+            directions=to_device(np.concatenate(directions)),
+            pixels=to_device(flat),
+            has_alpha=bool((flat[:, 3] < 255).any()),
+        )
+
+    def patches(self, size: int) -> NDArray[np.int32]:
+        """All patches [P, 3] (view, first column, first row) of size x size pixels; they tile each photo."""
+        found = []
+        for view, (width, height) in enumerate(self.sizes):
+            row, column = np.meshgrid(np.arange(0, height, size), np.arange(0, width, size), indexing="ij")
+            found.append(np.stack([np.full(row.size, view), column.ravel(), row.ravel()], axis=1))
+        return np.concatenate(found).astype(np.int32)
