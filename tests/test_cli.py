@@ -202,10 +202,17 @@ INSIDE_OUT = "[[1,0,0],[0,0,0],[1,1,0],[0,1,0],[1,0,1],[0,0,1],[1,1,1],[0,1,1]]"
         ),
         (GOOD_EDIT.replace("translate", "teleport"), "teleport"),
         (GOOD_EDIT.replace("size: 1.2", "size: -1.2"), "positive"),
-        (GOOD_EDIT.replace("{center: [0, 0, 0], size: 1.2}", f"{{corners: {INSIDE_OUT}}}"), "right-handed frame"),
+        (
+            GOOD_EDIT.replace("{center: [0, 0, 0], size: 1.2}", f"{{corners: {INSIDE_OUT}}}"),
+            "right-handed frame",
+        ),
+        (
+            GOOD_EDIT.replace("translate: [0, 0, 0.2]", "move_corner: {corner: 7, by: [-2, -2, -2]}"),
+            "inside out",
+        ),
         ("edits: [", "edits.yaml"),
     ],
-    ids=["nan", "outside", "unknown", "negative", "inside-out", "not-yaml"],
+    ids=["nan", "outside", "unknown", "negative", "mirrored", "inside-out", "not-yaml"],
 )
 def test_bad_edit_files_change_nothing(
     capsys: pytest.CaptureFixture[str], scene: Path, tmp_path: Path, text: str, message: str

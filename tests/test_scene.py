@@ -11,6 +11,7 @@ import pytest
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
+from cagefield.fields.voxel import VoxelField
 from cagefield.scene import check_destination
 from scenes import ball_field, ball_scene, files_of
 
@@ -210,3 +211,50 @@ def test_invalid_scene_values() -> None:
         Scene(ball_field(), version=2)
     with pytest.raises(CameraError):
         Camera.from_fov(np.full((4, 4), np.nan), 4, 4, 1.0)
+
+
+def test_render_agrees_with_the_exact_renderer() -> None:
+    inner = Cage.box((0.0, 0.0, 0.0), 1.2)
+    lift = Edit(inner, inner.grown(0.5), lattice=64).rotate((0.0, 0.2, 0.0)).translate((0.0, 0.0, 0.2))
+    scene = ball_scene().with_edits(EditStack([lift]))
+    camera = scene.cameras["test"][1]
+    fused, exact = (scene.render(camera, exact=exact, normals=True) for exact in (False, True))
+    # Both take two samples a voxel, at different places: 2 grey levels on average, more at the silhouette.
+    assert np.abs(fused.rgb - exact.rgb).mean() < 0.008
+    assert np.abs(fused.opacity - exact.opacity).max() < 0.15
+    assert fused.normals is not None and fused.opacity.max() > 0.99
+
+
+def test_render_takes_the_scenes_own_background_unless_told() -> None:
+    scene = Scene(ball_field(), background=(0.0, 0.0, 1.0))
+    camera = ball_scene().cameras["test"][0]
+    np.testing.assert_array_equal(scene.render(camera).rgb[0, 0], (0, 0, 1))
+    np.testing.assert_array_equal(scene.render(camera, background="black").rgb[0, 0], (0, 0, 0))
+    assert scene.render(camera, background="none").background is None
+
+
+def test_with_edits_shares_the_field_and_moves_what_it_says() -> None:
+    scene = ball_scene()
+    camera = Camera.look_at((0, -3, 0), (0, 0, 0), width=48, height=48, fov_x=0.8)
+    before = scene.render(camera)
+    edited = scene.with_edits(
+        EditStack([Edit(Cage.box((0, 0, 0), 1.2), adjustment="discrete").translate((0, 0, 0.5))])
+    )
+    after = edited.render(camera)
+    assert edited.renderer._grid is scene.renderer._grid
+    rows = [np.average(np.arange(48), weights=frame.opacity.sum(axis=1)) for frame in (before, after)]
+    # 0.5 upwards at distance 3 and focal length 24 / tan(0.4) pixels
+    assert rows[0] - rows[1] == pytest.approx(0.5 / 3 * 24 / np.tan(0.4), abs=0.5)
+    np.testing.assert_array_equal(edited.with_edits(EditStack([])).render(camera).rgb, before.rgb)
+
+
+def test_unbounded_scenes_render_beyond_their_box() -> None:
+    field = ball_field(resolution=33, radius=1.0)
+    unbounded = VoxelField(
+        field.bounds / 4.0, field.resolution, field.vertices, field.density, field.sh, contracted=True
+    )
+    camera = Camera.look_at((0, -2, 0), (0, 0, 0), width=32, height=32, fov_x=1.0)
+    scene = Scene(unbounded)
+    fused, exact = scene.render(camera), scene.render(camera, exact=True)
+    assert np.abs(fused.opacity - exact.opacity).mean() < 0.02
+    assert fused.opacity.mean() > 0.05

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
@@ -30,7 +30,7 @@ from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
 
 if TYPE_CHECKING:
-    from cagefield.rendering.march import Renderer
+    from cagefield.rendering.renderer import Renderer
 
 FORMAT = "cagefield-scene"
 VERSION = 1
@@ -106,7 +106,9 @@ class Scene:
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack."""
-        return dataclasses.replace(self, edits=edits)
+        scene = dataclasses.replace(self, edits=edits)
+        scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
+        return scene
 
     def render(
         self,
@@ -123,27 +125,35 @@ class Scene:
         """
         colour = self.background if background is None else background_rgb(background)
         if not exact:
-            return self._renderer.render(camera, background=colour, normals=normals)
+            return cast(Frame, self.renderer.render(camera, background=colour, normals=normals))
+        return self._render_exact(camera, colour, normals)
+
+    def _render_exact(self, camera: Camera, background: Background, normals: bool) -> Frame:
+        from cagefield.fields.protocol import Field
         from cagefield.rendering.sampled import render_sampled
 
-        near, far = _sampling_range(self.field, camera)
-        samples = min(4096, max(64, math.ceil(2.0 * (far - near) / float(min(self.field.voxel_size)))))
+        field = self.field
+        near, far = _sampling_range(field, camera)
+        samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
         return render_sampled(
-            self.field,
+            # An unbounded field is sampled beyond its bounds: without them, up to `far`.
+            cast(Field, field.__call__) if field.contracted else field,
             camera,
             near=near,
             far=far,
-            samples=samples,
-            background=colour,
-            edits=self.edits,
+            samples=min(4096, max(64, samples)),
+            background=background,
+            edits=EditStack(edit.replace(lattice=None) for edit in self.edits),
             normals=normals,
         )
 
     @cached_property
-    def _renderer(self) -> Renderer:
-        from cagefield.rendering.march import Renderer
+    def renderer(self) -> Renderer:
+        """The fused renderer; a scene made by `with_edits` shares the field's arrays on the device."""
+        from cagefield.rendering.renderer import Renderer
 
-        return Renderer(self.field, self.edits)
+        origin: Renderer | None = self.__dict__.get("_origin")
+        return Renderer(self.field, self.edits) if origin is None else origin.with_edits(self.edits)
 
 
 def check_destination(path: Path | str, overwrite: bool) -> Path:
@@ -225,7 +235,7 @@ def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
     return max(0.0, distance - reach * radius), distance + reach * radius
 
 
-def _read_json(path: Path) -> dict[str, object]:
+def _read_json(path: Path) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:

@@ -75,7 +75,7 @@ def _parse(args: list[str]) -> Command | int:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            command: Command = tyro.cli(commands, prog="cagefield", description=_DESCRIPTION, args=args)  # type: ignore[call-overload]
+            command: Command = tyro.cli(commands, prog="cagefield", description=_DESCRIPTION, args=args)
     except SystemExit as stop:
         if not stop.code:
             return 0

@@ -71,6 +71,9 @@ class Render:
         self._check_options()
         video, single = self.out.suffix.lower() == ".mp4", self.out.suffix.lower() == ".png"
         (check_file if video or single else check_folder)(self.out, self.overwrite)
+        if single:
+            for end in ["_depth.png", "_depth.npy"] * self.depth + ["_normals.png"] * self.normals:
+                check_file(self.out.with_name(self.out.stem + end), self.overwrite)
 
         from cagefield import devices
         from cagefield.cli.pictures import in_one_row, write_pictures

@@ -71,6 +71,9 @@ def _details(edit: Edit, positions: Array) -> Iterable[str]:
         ratio = warp.shell.least_ratio()
         state = "does not fold" if ratio > 0.0 else "folds, and is allowed to"
         yield f"{gives:.1%} of them give way; the shell {state} (least volume ratio {ratio:.3f})"
+        if edit.lattice is not None:
+            worst, mean = edit.lattice_error()
+            yield f"the lattice is off by {mean:.2g} on average, {worst:.2g} at most (world units)"
 
 
 def _volume(cage: Cage) -> float:
