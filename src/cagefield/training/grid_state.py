@@ -45,6 +45,7 @@ class GridState:
     codes: Any
     brick_dims: tuple[int, int, int]
     vertex_at: Any
+    cell: Any
 
     @classmethod
     def build(
@@ -89,6 +90,7 @@ class GridState:
             codes=to_device(bricks.codes),
             brick_dims=tuple(bricks.codes.shape),
             vertex_at=to_device(np.concatenate([np.zeros(1, np.int32), vertices.astype(np.int32)])),
+            cell=to_device(np.concatenate([np.ones(1, np.float32), cell_sizes(bounds, resolution, vertices, contracted)])),
         )
 
     @classmethod
@@ -97,18 +99,20 @@ class GridState:
         bounds: NDArray[np.float64],
         resolution: tuple[int, int, int],
         *,
-        density: float,
+        opacity: float,
         degree: int,
         contracted: bool,
         workers: int,
+        keep: NDArray[np.bool_] | None = None,
     ) -> "GridState":
-        """Every vertex stored, with the same density and grey colour."""
-        count = int(np.prod(resolution))
+        """Every vertex (of those in `keep` [nx*ny*nz]) stored, grey, each voxel `opacity` deep optically."""
+        vertices = np.arange(int(np.prod(resolution))) if keep is None else np.flatnonzero(keep)
+        count = len(vertices)
         return cls.build(
             bounds,
             resolution,
-            np.arange(count),
-            np.full(count, density, np.float32),
+            vertices,
+            (opacity / cell_sizes(bounds, resolution, vertices, contracted)).astype(np.float32),
             np.zeros((count, (degree + 1) ** 2, 3), np.float32),
             contracted=contracted,
             workers=workers,
@@ -232,3 +236,15 @@ class GridState:
         lower = self.bounds[0] + (at.min(axis=0) - 1) * cell
         upper = self.bounds[0] + (at.max(axis=0) + 1) * cell
         return np.array([np.maximum(lower, self.bounds[0]), np.minimum(upper, self.bounds[1])])
+
+
+def cell_sizes(
+    bounds: NDArray[np.float64], resolution: tuple[int, int, int], vertices: NDArray[np.int64], contracted: bool
+) -> NDArray[np.float32]:
+    """World-space voxel size [M] at each vertex; in a contracted grid along the radius, where it grows as m^2."""
+    n = np.array(resolution) - 1
+    if not contracted:
+        return np.full(len(vertices), ((bounds[1] - bounds[0]) / n).max(), np.float32)
+    c = np.stack(np.unravel_index(vertices, resolution), axis=1) * (4.0 / n) - 2.0
+    m = 1.0 / np.maximum(2.0 - np.maximum(np.abs(c).max(axis=1), 1.0), 2.0 / n.max())
+    return ((4.0 / n).max() * ((bounds[1] - bounds[0]) / 2).max() * m**2).astype(np.float32)

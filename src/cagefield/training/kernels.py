@@ -80,7 +80,6 @@ def march_batch(
     scale: vec3,
     step: qd.f32,
     near: qd.f32,
-    spread: qd.f32,
     random_background: qd.i32,
     background: vec3,
     K: qd.template(),
@@ -202,7 +201,6 @@ def march_batch(
                                         if qd.static(march == 1):
                                             slope = h * gain * (T * c - (C - acc))
                                             curvature = slope.dot(slope)
-                                            curvature += spread * h * qd.sqrt(curvature)
                                             gradient = slope.dot(residual)
                                             pull = residual * gain * w
                                             for a in qd.static(range(3)):
@@ -210,7 +208,7 @@ def march_batch(
                                                     pull[a] = 0.0
                                                 if colour[a] > 1.0 and pull[a] < 0.0:
                                                     pull[a] = 0.0
-                                            ww = w * (w + spread * (1.0 - w))
+                                            ww = w * w
                                             for k in qd.static(range(8)):
                                                 if slots[k] > 0:
                                                     to = base + slots[k] * (HEAD + 3 * K)
@@ -242,6 +240,7 @@ def gauss_newton(
     sh: F32,
     state: F32,
     weight: F32,
+    cell: F32,
     accumulator: F32,
     record: qd.i32,
     workers: qd.i32,
@@ -249,15 +248,16 @@ def gauss_newton(
     decay: qd.f32,
     density_rate: qd.f32,
     colour_rate: qd.f32,
-    largest_density_step: qd.f32,
-    density_floor: qd.f32,
-    colour_floor: qd.f32,
+    largest_step: qd.f32,
+    damping: qd.f32,
     K: qd.template(),
 ):
     """One diagonal Gauss-Newton step of every slot the batch touched; empties the accumulators.
 
     state: [slots, 2] running sums of density and colour curvature, decayed on each touch.
-    weight: [slots] the largest weight seen since the last pruning.
+    weight: [slots] the largest weight seen since the last pruning. cell: [slots] world-space voxel size h.
+    The density moves by at most largest_step / h; `damping` is added to the colour curvature, and times h^2
+    to the density curvature.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
@@ -282,9 +282,10 @@ def gauss_newton(
                 for a in qd.static(range(HEAD)):
                     accumulator[at + a] = 0.0
             weight[slot] = w
-            change = density_rate * g_density / (s0 + density_floor)
-            density[slot] = density[slot] - qd.max(qd.min(change, largest_density_step), -largest_density_step)
-            rate = colour_rate / (s1 + colour_floor)
+            change = density_rate * g_density / (s0 + damping * cell[slot] * cell[slot])
+            limit = largest_step / cell[slot]
+            density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
+            rate = colour_rate / (s1 + damping)
             for j in qd.static(range(3 * K)):
                 g = 0.0
                 for worker in range(workers):
@@ -346,6 +347,7 @@ def laplacian(
     sh: F32,
     index: I32,
     vertex_at: I32,
+    cell: F32,
     accumulator: F32,
     slots: qd.i32,
     resolution: ivec3,
@@ -355,7 +357,8 @@ def laplacian(
 ):
     """Adds the gradient and curvature of weight/2 * sum over stored neighbours (x - x_n)^2 to touched slots.
 
-    Touched: the first accumulator has a colour curvature. Neighbours are the 6 along the axes.
+    Touched: the first accumulator has a colour curvature. Neighbours are the 6 along the axes. The density's
+    weight is times the squared voxel size, so that it acts on optical depth per voxel.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
@@ -396,8 +399,9 @@ def laplacian(
                     d += density[other]
                     for j in qd.static(range(3 * K)):
                         s[j] += sh[other * (3 * K) + j]
-            accumulator[to] = accumulator[to] + density_weight * (count * density[slot] - d)
-            accumulator[to + 1] = accumulator[to + 1] + density_weight * count
+            scaled = density_weight * cell[slot] * cell[slot]
+            accumulator[to] = accumulator[to] + scaled * (count * density[slot] - d)
+            accumulator[to + 1] = accumulator[to + 1] + scaled * count
             accumulator[to + 2] = accumulator[to + 2] + colour_weight * count
             for j in qd.static(range(3 * K)):
                 a = to + HEAD + j

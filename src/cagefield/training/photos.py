@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.datasets.dataset import View
+from cagefield.datasets.views import View
 from cagefield.errors import DatasetError
 
 
