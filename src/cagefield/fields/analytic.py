@@ -74,8 +74,8 @@ class UniformBox:
         return np.stack([self.center - self.size / 2, self.center + self.size / 2])
 
     def sigma(self, positions: NDArray[Any]) -> Array:
-        inside = (np.abs(positions - self.center) <= self.size / 2).all(-1)
-        return self.density * inside.astype(np.float64)
+        inside = np.all(np.abs(positions - self.center) <= self.size / 2, axis=-1)
+        return np.where(inside, self.density, 0.0)
 
     def optical_depth(self, origins: Array, directions: Array, near: Array, far: Array) -> Array:
         lower, upper = self.bounds

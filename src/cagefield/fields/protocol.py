@@ -22,6 +22,6 @@ class Field(Protocol):
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(sigma [N] >= 0 per world unit, rgb [N,3] in [0,1]) at positions [N,3] seen along viewdirs [N,3].
 
-        A viewdir is unit and points from the camera into the scene. Positions outside `bounds` are valid input.
+        A viewdir is unit and points from the camera into the scene. Positions outside `bounds` are valid.
         """
         ...

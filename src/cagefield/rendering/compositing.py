@@ -17,7 +17,7 @@ Array = NDArray[Any]
 
 
 class Composite(NamedTuple):
-    """Sums along rays: premultiplied [...,3], opacity [...], depth [...] (inf at opacity 0), weights [...,S]."""
+    """Sums along rays: premultiplied [...,3], opacity and depth [...] (inf at opacity 0), weights [...,S]."""
 
     premultiplied: Array
     opacity: Array

@@ -37,7 +37,7 @@ def background_rgb(background: Background) -> tuple[float, float, float] | None:
 
 
 def to_uint8(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Values of [0,1] as round(255 v) in uint8; values outside are clipped, uint8 input comes back as it is."""
+    """Values of [0,1] as round(255 v) in uint8; values outside are clipped, uint8 comes back as it is."""
     if values.dtype == np.uint8:
         return values
     return (np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)

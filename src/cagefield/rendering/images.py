@@ -40,7 +40,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
     """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
 
     Grey, palette and 16-bit files are converted; pixels come as stored, EXIF orientation is not applied
-    (camera poses refer to the stored pixels). Raises DatasetError for a file that is missing or is no picture.
+    (camera poses refer to the stored pixels). Raises DatasetError for a file that is missing or no picture.
     """
     path = Path(path)
     try:
@@ -69,7 +69,7 @@ def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8
 
 
 def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
-    """Writes uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes or suffixes."""
+    """Writes uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes, suffixes."""
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise CagefieldError(f"{path}: write_png writes .png files")

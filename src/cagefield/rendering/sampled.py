@@ -43,11 +43,17 @@ class Canonical(Protocol):
     def viewdirs(self) -> NDArray[Any] | None: ...
 
     @property
+    def stretch(self) -> NDArray[Any] | None: ...
+
+    @property
     def emptied(self) -> NDArray[Any]: ...
 
 
 class PointMap(Protocol):
-    """What rendering needs of an edit stack: the map to canonical space and the box it changes (or None)."""
+    """What rendering needs of an edit stack: the map to canonical space and the box of what it changes.
+
+    The box is None, or its minimum is above its maximum, where nothing is changed.
+    """
 
     @property
     def bounds(self) -> NDArray[Any] | None: ...
@@ -76,13 +82,15 @@ def render_sampled(
     near: float = 0.0,
     far: float | None = None,
     normals: bool = False,
+    preserve_opacity: bool = False,
     chunk: int = 1 << 19,
 ) -> Frame:
     """Frame of a field seen by a camera, from `samples` midpoints on each ray's piece inside the bounds.
 
     The piece is the ray's intersection with field.bounds (united with edits.bounds), cut to [near, far].
     A field without `bounds` needs `far`. Normals are minus the normalised gradient of sigma by central
-    differences in deformed space, weighted like the colour. `chunk` is the number of samples held at a time.
+    differences in deformed space, weighted like the colour. `preserve_opacity` multiplies sigma by |J d|,
+    which keeps optical depth under the edits' stretch. `chunk` is the number of samples held at a time.
     The error falls with the square of the step for smooth fields, with the step where sigma jumps.
 
     Raises FieldError when neither bounds nor far is known, or the field returns wrong shapes.
@@ -92,8 +100,9 @@ def render_sampled(
     if not 0 <= near < np.inf or (far is not None and not near < far < np.inf):
         raise FieldError(f"near and far must satisfy 0 <= near < far < inf, not near={near}, far={far}")
     bounds = _sampled_bounds(field, edits)
-    if bounds is None and far is None:
-        raise FieldError("field has no bounds, so far must be given; render_sampled(field, camera, far=...)")
+    if far is None and (bounds is None or not np.isfinite(bounds).all()):
+        what = "no bounds" if bounds is None else "infinite bounds"
+        raise FieldError(f"field has {what}, so far must be given; render_sampled(field, camera, far=...)")
 
     origins, directions = camera.rays()
     count = len(directions)
@@ -105,23 +114,23 @@ def render_sampled(
         t0, t1 = intersect_box(origins, directions, bounds)
         enter, leave = np.maximum(enter, t0), np.minimum(leave, t1)
 
-    probe = _Probe(field, edits)
+    probe = _Probe(field, edits, preserve_opacity)
     rgb, depth = np.zeros((count, 3), np.float32), np.full(count, np.inf, np.float32)
     opacity, normal = np.zeros(count, np.float32), np.zeros((count, 3), np.float32)
-    step = 1e-3 * float(np.linalg.norm(np.subtract(*bounds)) if bounds is not None else leave[0] - near)
+    reach = leave.max(initial=0.0) - near if bounds is None else np.linalg.norm(bounds[1] - bounds[0])
     crossing = np.flatnonzero(leave > enter)
     for start in range(0, len(crossing), max(chunk // samples, 1)):
         rows = crossing[start : start + max(chunk // samples, 1)]
         delta = (leave[rows] - enter[rows]) / samples
-        t = enter[rows, None] + (np.arange(samples, dtype=np.float32) + 0.5) * delta[:, None]
-        points = origins[rows, None] + t[..., None] * directions[rows, None]
+        t = enter[rows, None] + (np.arange(samples) + 0.5).astype(np.float32) * delta[:, None]
+        points = np.asarray(origins[rows, None] + t[..., None] * directions[rows, None], np.float32)
         viewdirs = np.broadcast_to(directions[rows, None], points.shape)
         sigma, color = probe(points.reshape(-1, 3), viewdirs.reshape(-1, 3))
         sums = composite(sigma.reshape(t.shape), color.reshape(points.shape), t, delta[:, None])
         rgb[rows], opacity[rows], depth[rows] = sums.premultiplied, sums.opacity, sums.depth
         if normals:
             seen = sums.weights > NORMAL_WEIGHT
-            slopes = probe.gradient(points[seen], viewdirs[seen], step)
+            slopes = probe.gradient(points[seen], viewdirs[seen], 1e-3 * float(reach))
             length = np.linalg.norm(slopes, axis=-1, keepdims=True)
             weighted = np.zeros_like(points)
             weighted[seen] = -slopes / np.where(length > 0, length, 1.0) * sums.weights[seen][:, None]
@@ -146,7 +155,7 @@ def _sampled_bounds(field: Field, edits: PointMap | None) -> Float32 | None:
         return None
     box = np.asarray(own, np.float32)
     changed = None if edits is None else edits.bounds
-    if changed is None:
+    if changed is None or (np.asarray(changed)[0] > np.asarray(changed)[1]).any():
         return box
     changed = np.asarray(changed, np.float32)
     return np.stack([np.minimum(box[0], changed[0]), np.maximum(box[1], changed[1])])
@@ -155,17 +164,23 @@ def _sampled_bounds(field: Field, edits: PointMap | None) -> Float32 | None:
 class _Probe:
     """The edited field: (points, viewdirs) of deformed space to (sigma, rgb)."""
 
-    def __init__(self, field: Field, edits: PointMap | None) -> None:
-        self.field, self.edits = field, edits
+    def __init__(self, field: Field, edits: PointMap | None, preserve_opacity: bool) -> None:
+        self.field, self.edits, self.preserve_opacity = field, edits, preserve_opacity
 
     def __call__(self, points: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
         if self.edits is None:
             return self._evaluate(points, viewdirs)
         mapped = self.edits.to_canonical(points, viewdirs)
-        if mapped.viewdirs is None:
-            raise FieldError("edits.to_canonical must return viewdirs when it is given viewdirs")
-        sigma, rgb = self._evaluate(mapped.points.astype(np.float32), mapped.viewdirs.astype(np.float32))
-        return np.where(mapped.emptied, np.float32(0), sigma), rgb
+        if mapped.viewdirs is None or mapped.stretch is None:
+            raise FieldError("edits.to_canonical must return viewdirs and stretch when it is given viewdirs")
+        sigma, rgb = np.zeros(len(points), np.float32), np.zeros((len(points), 3), np.float32)
+        kept = np.flatnonzero(~mapped.emptied)
+        sigma[kept], rgb[kept] = self._evaluate(
+            mapped.points[kept].astype(np.float32), mapped.viewdirs[kept].astype(np.float32)
+        )
+        if self.preserve_opacity:
+            sigma[kept] *= mapped.stretch[kept].astype(np.float32)
+        return sigma, rgb
 
     def _evaluate(self, points: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
         sigma, rgb = self.field(points, viewdirs)

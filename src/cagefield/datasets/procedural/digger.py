@@ -32,7 +32,7 @@ ARM_Y = -0.11
 def digger() -> ProceduralScene:
     """Scene with the parts ground, tracks, body, cabin, boom, stick, bucket and (traffic) cone."""
     parts = (_ground(), _tracks(), _body(), _cabin(), _boom(), _stick(), _bucket(), _cone())
-    return ProceduralScene("digger", shifted(parts, (-0.1, 0, 0.02)), lowest=2.0)
+    return ProceduralScene("digger", shifted(parts, (-0.1, 0, 0.14)), lowest=2.0)
 
 
 def _ground() -> Part:
@@ -40,8 +40,8 @@ def _ground() -> Part:
     rim = Checker(hexcolor("#e8e4da"), hexcolor("#4d5157"), 0.125, (0, 1))
     return part(
         "ground",
-        at(Box((0.93, 0.68, 0.03), 0.02), soil, (0.1, 0, -0.58), gloss=MATTE),
-        at(Box((1.0, 0.75, 0.025), 0.02), rim, (0.1, 0, -0.615), gloss=MATTE),
+        at(Box((0.9, 0.65, 0.03), 0.02), soil, (0.1, 0, -0.58), gloss=MATTE),
+        at(Box((0.97, 0.72, 0.025), 0.02), rim, (0.1, 0, -0.615), gloss=MATTE),
     )
 
 

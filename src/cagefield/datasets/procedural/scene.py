@@ -153,10 +153,10 @@ class ProceduralScene:
 
         opacity = mean(seen.astype(np.float32))[..., 0]
         depth = mean(np.where(seen, hits.t, np.float32(0)))[..., 0]
-        depth = np.where(opacity > 0, depth / np.maximum(opacity, np.float32(1e-6)), np.float32(np.inf))
+        depth[opacity > 0] /= opacity[opacity > 0]
+        depth[opacity == 0] = np.inf
         normal = mean(normals)
-        length = np.linalg.norm(normal, axis=-1, keepdims=True)
-        normal = normal / np.where(length > 0, length, 1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
         return Frame.from_premultiplied(mean(rgb), opacity, depth, normals=normal, background=background)
 
     def field(self, eps: float = 0.004) -> SurfaceField:

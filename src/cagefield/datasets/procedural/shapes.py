@@ -222,7 +222,7 @@ class Revolution:
 class Leaf:
     """Pointed blade along x, `length` by `width`, bent down towards both ends by `bend` * x^2.
 
-    A lower bound of the distance: that of the flat blade over the steepest slope of the bend.
+    A lower bound of the distance: that of the flat blade over the largest stretch of the bend.
     """
 
     length: float
@@ -249,5 +249,6 @@ class Leaf:
             _length2(x, y + np.float32(offset)) - np.float32(radius),
         )
         flat = _length2(np.maximum(side, 0), z)
-        steepest = np.sqrt(1 + (2 * self.bend * a) ** 2)
-        return (flat - np.float32(self.thickness)) / np.float32(steepest)
+        # the bend is a shear of slope k at the tips; (k + sqrt(k^2 + 4)) / 2 is its largest stretch
+        k = 2 * abs(self.bend) * a
+        return (flat - np.float32(self.thickness)) / np.float32((k + np.sqrt(k * k + 4)) / 2)

@@ -16,8 +16,11 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.intp]
 Openness = Callable[[Float32, Float32], Float32]
 
-SHELL = 8.0
-"""Distances in units of eps past which a field's sigma is negligible: sigmoid(-8) = 3e-4."""
+DEPTH = 2.0
+"""Depth in units of eps at which a field's shell starts: less, and outlines grow; more, and faces sink in."""
+
+SHELL = 6.0
+"""Distance in units of eps past which a field's sigma is negligible: sigmoid(-SHELL - DEPTH) = 3e-4."""
 
 
 def _unit(vectors: Float32) -> Float32:
@@ -50,9 +53,9 @@ def surface(
 
 @dataclass(frozen=True)
 class SurfaceField:
-    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps) / (eps ln 2), rgb their shading.
+    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - DEPTH) / (eps ln 2), rgb their shading.
 
-    The optical depth from open space to a flat surface is then 1 at the surface itself. Distances are
+    The optical depth from open space is 1 at DEPTH * eps below a flat surface. Distances are
     Euclidean for parts that were scaled alike on all axes, accurate to first order for the others.
     """
 
@@ -67,7 +70,9 @@ class SurfaceField:
         points = np.ascontiguousarray(positions, np.float32)
         distance, owner, instance = self.distance(points)
         with np.errstate(over="ignore"):
-            sigma = 1 / (1 + np.exp(distance / np.float32(self.eps))) / np.float32(self.eps * np.log(2))
+            sigma = (
+                1 / (1 + np.exp(distance / np.float32(self.eps) + DEPTH)) / np.float32(self.eps * np.log(2))
+            )
         rgb = np.zeros((len(points), 3), np.float32)
         for index in np.unique(owner[owner >= 0]):
             rows = np.flatnonzero(owner == index)

@@ -91,7 +91,7 @@ class Mottled:
 
     def __call__(self, points: Float32, instance: NDArray[np.intp]) -> Float32:
         offset = (instance * 0.37).astype(np.float32)
-        squeezed: Float32 = points / np.array(self.stretch, np.float32) + offset[:, None]
+        squeezed = points * (1 / np.array(self.stretch)).astype(np.float32) + offset[:, None]
         value = noise(squeezed, self.scale)
         return _mix(self.first, self.second, np.clip(0.5 + self.contrast * value, 0, 1))
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -21,6 +19,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
+from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import write_png
 
@@ -87,15 +86,13 @@ def make_scene(
     for what, number in (("views", views), ("size", size), ("test_views", tests)):
         if number < 1:
             raise DatasetError(f"{what} must be at least 1, not {number}")
-    target = Path(out_dir)
+    target = Path(out_dir).resolve()
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
 
     counts = {"train": views, "val": max(tests // 5, 1), "test": tests}
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        done = 0
+    done = 0
+    with replaced_folder(target, ()) as draft:
         for split, count in counts.items():
             cameras = viewpoints(count, size, lowest=scene.lowest, seed=seed, split=split)
             (draft / split).mkdir()
@@ -108,12 +105,6 @@ def make_scene(
                     progress(done, sum(counts.values()))
             text = json.dumps(_transforms(scene, cameras, split), indent=1)
             (draft / f"transforms_{split}.json").write_text(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        draft.chmod(0o777 & ~umask)
-        draft.replace(target)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return target
 
 
