@@ -2,7 +2,7 @@
 
 Samples lie at t_in + (k + 1/2) h along each ray, h = `step` voxels; leaps move by whole steps, so that the
 picture does not depend on what was skipped. In a contracted field the step is `step` voxels of contracted
-length, so it grows with distance.
+length, so it grows with distance; the march ends half a voxel before infinity.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -27,7 +27,6 @@ from cagefield.warps.device import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 TILE = 8
-FAR = 100.0
 
 
 @qd.kernel
@@ -128,7 +127,7 @@ def march_tiles(
                     if m > 1.0:
                         leap = 0.5
                         limit = 0.25 * m / qd.abs(gd).max()
-                    if m > FAR:
+                    if m > 2.0 * half.x:
                         t_end = t
                 run = empty_run(codes, g, inv, brick_origin, brick_dims)
                 if run >= 0.0:

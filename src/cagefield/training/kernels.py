@@ -161,7 +161,8 @@ def march_batch(
                         if qd.static(march == 1):
                             residual = gain * C - photo
                         t = t_start
-                        while t < t_end and T > 1e-3:
+                        end = t_end
+                        while t < end and T > 1e-3:
                             q = go + t * gd
                             g = q
                             h = step
@@ -177,8 +178,8 @@ def march_batch(
                                 if far > 1.0:
                                     leap = 0.5
                                     limit = 0.25 * far / qd.abs(gd).max()
-                                if far > 100.0:
-                                    t_end = t
+                                if far > 2.0 * half.x:
+                                    end = t
                             run = empty_run(codes, g, inv, ivec3(0, 0, 0), brick_dims)
                             if run >= 0.0:
                                 if qd.static(contracted):

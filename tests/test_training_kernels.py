@@ -1,0 +1,186 @@
+"""The trainer's kernels against finite differences of their own forward march and against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cagefield import devices
+from cagefield.cameras import Camera
+from cagefield.datasets.views import View
+
+devices.start("cpu")
+
+from cagefield.rendering.grid import ivec3, to_device, vec3  # noqa: E402
+from cagefield.training import kernels  # noqa: E402
+from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
+from cagefield.training.kernels import HEAD  # noqa: E402
+from cagefield.training.photos import Photos  # noqa: E402
+
+SIZE = 8
+N = 9
+
+
+class FakeView(View):
+    """A view whose photo is random noise, partly transparent."""
+
+    def load(self) -> np.ndarray:
+        rng = np.random.default_rng(len(self.name))
+        return rng.integers(0, 256, (SIZE, SIZE, 4), dtype=np.uint8)
+
+
+def photos(tmp_path) -> Photos:
+    eyes = [(3.0, 0.4, 0.7), (-0.5, 2.8, 1.1), (0.3, -1.2, 2.9)]
+    views = []
+    for i, eye in enumerate(eyes):
+        camera = Camera.look_at(eye, (0, 0, 0), width=SIZE, height=SIZE, fov_x=0.7)
+        views.append(FakeView("v" * (i + 1), camera, tmp_path / "none.png"))
+    return Photos.load(views)
+
+
+def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
+    rng = np.random.default_rng(3)
+    bounds = np.array([[-0.8] * 3, [0.8] * 3])
+    vertices = np.sort(rng.choice(N**3, int(0.8 * N**3), replace=False))
+    cell = cell_sizes(bounds, (N,) * 3, vertices, contracted)
+    # Optical depth about 0.3 a voxel: rays see several voxels, none is hidden altogether.
+    density = (rng.uniform(0.05, 0.5, len(vertices)) / cell).astype(np.float32)
+    sh = rng.normal(0, 0.08, (len(vertices), (degree + 1) ** 2, 3)).astype(np.float32)
+    return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, workers=workers)
+
+
+def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
+    """Runs one batch of all pixels; returns the squared errors."""
+    patches = data.patches(4)
+    rays = len(patches) * 16
+    losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
+    grid.accumulator.fill(0.0)
+    if grid.contracted:
+        lower, scale = np.zeros(3), np.full(3, 1 / 0.8)
+        step = 0.7
+    else:
+        lower, scale = grid.bounds[0], (N - 1) / (grid.bounds[1] - grid.bounds[0])
+        step = 0.7 / scale.max()
+    kernels.march_batch(
+        to_device(patches), len(patches), 4, grid.workers, 7, data.views, data.poses, to_device(gains.astype(np.float32)),
+        data.directions, data.pixels, grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
+        losses, sums, ivec3(*grid.brick_dims), ivec3(N, N, N), vec3(*lower.tolist()), vec3(*scale.tolist()),
+        float(step), 0.05, 1, vec3(1.0, 1.0, 1.0), grid.terms, grid.contracted, False,
+    )  # fmt: skip
+    return losses.to_numpy().astype(np.float64)
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_gradients_match_finite_differences(tmp_path, degree, contracted):
+    data, grid = photos(tmp_path), state(degree, contracted)
+    gains = np.array([[1.0, 1.1, 0.9], [0.95, 1.0, 1.2], [1.0, 1.0, 1.0]])
+    march(grid, data, gains)
+    stride = HEAD + 3 * grid.terms
+    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, stride).sum(axis=0)
+    rng = np.random.default_rng(0)
+    seen = np.flatnonzero(records[:, 2] > 1e-3)
+    checked = {"density": grid.density.to_numpy(), "sh": grid.sh.to_numpy()}
+    for name, column in (("density", 0), ("sh", HEAD)):
+        values = checked[name]
+        array = getattr(grid, name)
+        errors, sizes = [], []
+        for slot in rng.choice(seen, 12, replace=False):
+            at, gradient = slot, records[slot, column]
+            if name == "sh":
+                term = rng.integers(3 * grid.terms)
+                at, gradient = slot * 3 * grid.terms + term, records[slot, HEAD + term]
+            # Float32 sums of some hundred squared errors carry about 1e-6; the step keeps truncation and
+            # rounding both near 1e-3 of a typical gradient.
+            h = 0.02 / grid.cell.to_numpy()[slot] if name == "density" else 0.02
+            up, down = values.copy(), values.copy()
+            up[at] += h
+            down[at] -= h
+            array.from_numpy(up)
+            plus = march(grid, data, gains)
+            array.from_numpy(down)
+            minus = march(grid, data, gains)
+            array.from_numpy(values)
+            difference = 0.5 * (plus - minus).sum() / (2 * h)
+            errors.append(difference - gradient)
+            sizes.append(difference)
+        # Samples of weight under 1e-4 and rays past T = 1e-3 are left out of both; what moves across those
+        # thresholds, and colours that start to clip, stay under 2 percent.
+        assert np.linalg.norm(errors) < 0.02 * np.linalg.norm(sizes), name
+
+
+def test_curvature_is_the_sum_of_squared_slopes(tmp_path):
+    """With one voxel's weight 1 everywhere, the colour curvature is sum b w^2: bounded by the rays' opacity."""
+    data, grid = photos(tmp_path), state(0, False)
+    march(grid, data, np.ones((3, 3)))
+    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0)
+    assert (records[:, 1:3] >= 0).all()
+    assert records[0].max() == 0.0  # the empty slot gets nothing
+    assert 0 < records[:, 2].sum() < 3 * SIZE * SIZE
+
+
+def test_workers_only_split_the_sum(tmp_path):
+    data = photos(tmp_path)
+    sums = []
+    for workers in (1, 3):
+        grid = state(1, False, workers)
+        march(grid, data, np.ones((3, 3)))
+        sums.append(grid.accumulator.to_numpy().reshape(workers, grid.slots, -1))
+    # Column 3 is a maximum, the others are sums; only their order differs.
+    for column, merge in ((slice(0, 3), np.sum), (slice(HEAD, None), np.sum), (3, np.max)):
+        np.testing.assert_allclose(
+            merge(sums[0][..., column], axis=0), merge(sums[1][..., column], axis=0), rtol=2e-4, atol=1e-5
+        )
+
+
+def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
+    data, grid = photos(tmp_path), state(1, False)
+    march(grid, data, np.ones((3, 3)))
+    records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0).astype(np.float64)
+    before_density, before_sh, _, _ = grid.arrays()
+    h = grid.cell.to_numpy()[1:].astype(np.float64)
+    kernels.gauss_newton(
+        grid.density, grid.sh, grid.state, grid.weight, grid.cell, grid.accumulator, grid.record, grid.workers,
+        grid.slots, 0.9, 0.5, 0.25, 0.3, 0.01, grid.terms,
+    )  # fmt: skip
+    density, sh, running, weight = grid.arrays()
+    r = records[1:]
+    touched = r[:, 2] > 0
+    change = np.clip(0.5 * r[:, 0] / (r[:, 1] + 0.01 * h**2), -0.3 / h, 0.3 / h) * touched
+    np.testing.assert_allclose(density, before_density - change, rtol=1e-4, atol=1e-5)
+    expected = before_sh.reshape(len(sh), -1) - 0.25 * r[:, HEAD:] / (r[:, 2:3] + 0.01) * touched[:, None]
+    np.testing.assert_allclose(sh.reshape(len(sh), -1), expected, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(running, r[:, 1:3], rtol=1e-5)
+    assert weight.max() > 0
+    assert not grid.accumulator.to_numpy().any()
+
+
+def test_laplacian_is_the_gradient_of_neighbour_differences(tmp_path):
+    data, grid = photos(tmp_path), state(1, False)
+    march(grid, data, np.ones((3, 3)))
+    before = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).copy()
+    kernels.laplacian(
+        grid.density, grid.sh, grid.index, grid.vertex_at, grid.cell, grid.accumulator, grid.slots, ivec3(N, N, N),
+        0.3, 0.2, grid.terms,
+    )  # fmt: skip
+    after = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1)
+    added = (after - before)[0, 1:]
+    density, sh, _, _ = grid.arrays()
+    full = np.full(N**3, np.nan)
+    full[grid.vertices] = density
+    full = full.reshape(N, N, N)
+    h = float(grid.cell.to_numpy()[1])
+    for slot in range(0, len(density), 37):
+        x, y, z = np.unravel_index(grid.vertices[slot], (N, N, N))
+        near = []
+        for a in range(3):
+            for s in (-1, 1):
+                q = [x, y, z]
+                q[a] += s
+                if 0 <= q[a] < N and np.isfinite(full[tuple(q)]):
+                    near.append(full[tuple(q)])
+        touched = before[0, slot + 1, 2] > 0
+        expected = 0.3 * h * h * (len(near) * density[slot] - sum(near)) * touched
+        assert added[slot, 0] == pytest.approx(expected, rel=1e-3, abs=1e-5)
+        assert added[slot, 2] == pytest.approx(0.2 * len(near) * touched, rel=1e-3, abs=1e-4)
+    assert sh.shape[1] == 4
