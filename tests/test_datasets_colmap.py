@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
+from cagefield.datasets.colmap_files import check_whole
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 
@@ -148,9 +149,47 @@ def test_impossible_intrinsics_and_sizes(tmp_path):
         load_dataset(tmp_path / "b")
 
 
+@pytest.fixture(scope="module")
+def rigs(tmp_path_factory):
+    """A model with two rigs of three sensors, tracks and image points."""
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_cameras_per_rig, options.num_frames_per_rig = 2, 3, 2
+    options.num_points3D = 10
+    folder = tmp_path_factory.mktemp("rigs")
+    pycolmap.synthesize_dataset(options).write_binary(folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"])
+def test_binary_files_cut_off_anywhere_are_noticed(rigs, tmp_path, name):
+    check_whole(rigs)
+    whole = (rigs / name).read_bytes()
+    for length in {*range(0, len(whole), 7), len(whole) - 1}:
+        (tmp_path / name).write_bytes(whole[:length])
+        with pytest.raises(
+            DatasetError, match=rf"{name}: the file is cut off after {length} bytes; copy or export"
+        ):
+            check_whole(tmp_path)
+    (tmp_path / name).write_bytes(whole)
+    check_whole(tmp_path)
+
+
+def test_a_model_cut_off_is_refused(tmp_path):
+    _write(tmp_path, n=2)
+    file = tmp_path / "sparse/0/cameras.bin"
+    file.write_bytes(file.read_bytes()[:-8])  # pycolmap alone would read the last parameter as zero
+    with pytest.raises(DatasetError, match=r"cameras.bin: the file is cut off after 56 bytes"):
+        load_dataset(tmp_path)
+
+
 def test_damaged_and_missing_parts(tmp_path):
     _write(tmp_path / "a", n=2, text=True)
     file = tmp_path / "a/sparse/0/images.txt"
+    whole = file.read_text()
+    for part in ("", whole[: len(whole) // 2]):
+        file.write_text(part)
+        with pytest.raises(DatasetError, match=r"sparse/0: pycolmap cannot read the model .*export it again"):
+            load_dataset(tmp_path / "a")
     file.unlink()
     with pytest.raises(DatasetError, match=r"sparse/0: pycolmap cannot read the model .*export it again"):
         load_dataset(tmp_path / "a")

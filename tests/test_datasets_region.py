@@ -127,7 +127,7 @@ def test_levelling_of_hand_held_forward_facing_cameras_takes_the_mean_up():
     rng = np.random.default_rng(10)
     poses = np.array(_facing(40, 0.3))
     poses[:, :3, :3] = poses[:, :3, :3] @ Rotation.from_rotvec(rng.normal(0, 0.05, (40, 3))).as_matrix()
-    # right axes leave the directions across them open (53 degrees off here); 40 ups average to 0.05 / sqrt(40)
+    # right axes leave what is across them open (53 degrees off here); 40 ups average to 0.05 / sqrt(40)
     np.testing.assert_allclose(levelling_rotation(poses) @ (0, 0, 1), (0, 0, 1), atol=0.03)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.colmap_files import check_whole
 from cagefield.datasets.llff import stored_camera
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
@@ -45,8 +46,7 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
     if model_folder is None:
         places = ", ".join(_MODEL_FOLDERS)
         raise DatasetError(f"{path}: no COLMAP model (cameras.bin or cameras.txt) in {places}")
-    model = _read_model(model_folder)
-    images = [model.image(image_id) for image_id in model.reg_image_ids()]
+    model, images = _read_model(model_folder)
     if not images:
         raise DatasetError(f"{model_folder}: the model has no registered images; run COLMAP's mapper again")
     root = next((f for f in _upwards(model_folder) if photo_folders(f)), None)
@@ -90,17 +90,21 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
     )
 
 
-def _read_model(folder: Path) -> Any:
+def _read_model(folder: Path) -> tuple[Any, list[Any]]:
+    """The pycolmap reconstruction and its registered images."""
     try:
         import pycolmap
     except ImportError:
         raise DatasetError(
             f"{folder}: reading a COLMAP model needs pycolmap; run pip install 'cagefield[colmap]'"
         ) from None
+    check_whole(folder)
     try:
-        return pycolmap.Reconstruction(folder)
+        model = pycolmap.Reconstruction(folder)
+        return model, [model.image(image_id) for image_id in model.reg_image_ids()]
     except Exception as error:  # pycolmap raises whatever C++ threw
-        raise DatasetError(f"{folder}: pycolmap cannot read the model ({error}); export it again") from error
+        reason = " ".join(str(error).split())
+        raise DatasetError(f"{folder}: pycolmap cannot read the model ({reason}); export it again") from error
 
 
 def _upwards(folder: Path) -> Sequence[Path]:
