@@ -1,8 +1,8 @@
 """Whether the binary files of a COLMAP model are whole.
 
-pycolmap (4.2) does not notice the end of a binary file: from one that is cut off it reads zeros as intrinsics,
-or loops on a count it never read until memory is full. So each file is walked first, record by record, without
-decoding more than its counts.
+pycolmap (4.2) does not notice the end of a binary file: from one that is cut off it reads zeros as
+intrinsics, or loops on a count it never read until memory is full. So each file is walked first, record by
+record, without decoding more than its counts.
 
 Source: COLMAP, `src/colmap/scene/reconstruction_io_binary.cc`.
 """
