@@ -152,13 +152,8 @@ class Cage:
         low, high = self.aabb
         slack = 1e-9 * (high - low)
         near = np.flatnonzero(((p >= low - slack) & (p <= high + slack)).all(axis=1))
-        if self.is_affine:
-            A, b = self.affine
-            u[near] = (p[near] - b) @ np.linalg.inv(A).T
-            mask[near] = hexahedron.inside(u[near], np.ones(len(near), dtype=bool))
-        else:
-            u[near], found = hexahedron.inverse(self.corners, p[near])
-            mask[near] = hexahedron.inside(u[near], found)
+        u[near], found = hexahedron.inverse(self.corners, p[near])
+        mask[near] = hexahedron.inside(u[near], found)
         return u, mask
 
     def contains(self, points: ArrayLike) -> Mask:

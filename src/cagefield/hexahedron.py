@@ -29,8 +29,10 @@ _TO_MONOMIAL: Array = (
     np.array([[np.prod(_SIGNS[k] ** BITS[m]) for k in range(8)] for m in range(8)], dtype=np.float64) / 8.0
 )
 _CHUNK = 16384
-_INSIDE = 1e-12
-"""A point counts as inside when u is within this of [0,1]^3: some 5000 roundings, far below a float32."""
+_DEPTH = 12
+_ON_FACE = 1e-11
+"""A point this close to a hexahedron, as a share of its half-size, is on its face; besides the rounding of
+the point's own coordinates."""
 
 
 def coefficients(corners: Array) -> Array:
@@ -54,16 +56,21 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
 
     Every target that has a preimage in [0,1]^3 gets it, if the determinant is positive over the hexahedron.
     Others get a preimage outside the cube, or none (mask False, u unspecified); targets outside the hull of
-    the corners are not tried. Damped Newton with the analytic Jacobian from the affine guess; targets that
-    it did not take to [0,1]^3 are tried again from the centres of those of the 512 sub-hexahedra whose boxes
-    hold them, so that no preimage in the cube is missed.
+    the corners are not tried. A target on a face up to rounding gets a u on that face.
+
+    Damped Newton with the analytic Jacobian from the affine guess; targets that it did not take to [0,1]^3
+    are tried again from the centres of the sub-hexahedra whose boxes hold them, so that no preimage in the
+    cube is missed.
     """
     C = coefficients(corners)
     W = centre_inverse(C)
     y = (targets - C[0]) @ W.T
+    rounding = np.finfo(np.float64).eps * np.abs(corners).max() * np.abs(W).sum(axis=1).max()
+    on_face = _ON_FACE + 100.0 * rounding
     K = C[[3, 5, 6, 7]] @ W.T  # y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta
     if np.abs(K).max() < 1e-14:  # a parallelepiped up to rounding
-        return 0.5 * (y + 1.0), np.isfinite(y).all(axis=1)
+        xi = np.where(np.abs(y) <= 1.0 + on_face, y.clip(-1.0, 1.0), y)
+        return 0.5 * (xi + 1.0), np.isfinite(y).all(axis=1)
     local = (corners - C[0]) @ W.T
     rows = np.flatnonzero(_in_hull(local, y))
     y = y[rows]
@@ -72,9 +79,10 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     for start in range(0, len(y), _CHUNK):
         part = slice(start, start + _CHUNK)
         xi[part], found[part] = _newton(K, y[part], y[part].clip(-1.0, 1.0))
-    retry = np.flatnonzero(~found | (np.abs(xi).max(axis=1, initial=0.0) > 1.0 + 2.0 * _INSIDE))
+    _snap(K, y, xi, on_face)
+    retry = np.flatnonzero(~found | (np.abs(xi).max(axis=1, initial=0.0) > 1.0))
     if len(retry):
-        better, where = _newton_from_cells(K, local, y[retry])
+        better, where = _newton_from_cells(K, y[retry], on_face)
         xi[retry[where]] = better[where]
         found[retry[where]] = True
     u, mask = np.full(targets.shape, np.nan), np.zeros(len(targets), dtype=bool)
@@ -106,7 +114,7 @@ def invert(matrices: Array) -> Array:
 
 def inside(u: Array, found: Mask) -> Mask:
     """Mask [N] of the points whose u, as `inverse` returns it, lies in the closed unit cube."""
-    return found & np.asarray((u >= -_INSIDE).all(axis=1) & (u <= 1.0 + _INSIDE).all(axis=1))
+    return found & np.asarray(((u >= 0.0) & (u <= 1.0)).all(axis=1))
 
 
 def determinant_coefficients(corners: Array) -> Array:
@@ -163,7 +171,7 @@ def _derivative(C: Array, xi: Array) -> tuple[Array, Array, Array]:
 
 def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
     """Roots xi [N,3] of xi + K-terms = y [N,3] from a start, and a mask of those with residual < 1e-11."""
-    C = np.concatenate([np.zeros((1, 3)), np.eye(3)[:2], K[:1], np.eye(3)[2:], K[1:]])
+    C = _centred(K)
     y, xi = y.T.copy(), start.T.copy()
     residual = _evaluate(C, xi) - y
     size = np.abs(residual).max(axis=0)
@@ -181,6 +189,25 @@ def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
         # What creeps is stuck at a fold outside the hexahedron, or has arrived.
         active = active[(size[active] < 0.9 * before) & (size[active] > arrived[active])]
     return np.ascontiguousarray(xi.T), np.asarray(size < 1e-11)
+
+
+def _centred(K: Array) -> Array:
+    """Monomial coefficients [8,3] of xi + K-terms."""
+    return np.concatenate([np.zeros((1, 3)), np.eye(3)[:2], K[:1], np.eye(3)[2:], K[1:]])
+
+
+def _snap(K: Array, y: Array, xi: Array, tolerance: float) -> None:
+    """Move roots xi [N,3] just outside [-1,1]^3 onto the cube where that is a root, too, up to rounding.
+
+    Near a corner where the determinant almost vanishes, rounding of the point moves xi by far more than
+    rounding: the residual decides, not xi.
+    """
+    excess = np.abs(xi).max(axis=1, initial=0.0) - 1.0
+    near = np.flatnonzero((excess > 0.0) & (excess < 1e-3))
+    clipped = xi[near].clip(-1.0, 1.0)
+    residual = np.abs(_evaluate(_centred(K), clipped.T) - y[near].T).max(axis=0)
+    close = residual <= tolerance
+    xi[near[close]] = clipped[close]
 
 
 def _line_search(
@@ -201,32 +228,47 @@ def _line_search(
         rows, step = rows[worse], 0.5 * step[:, worse]
 
 
-def _newton_from_cells(K: Array, local: Array, y: Array) -> tuple[Array, Mask]:
+def _newton_from_cells(K: Array, y: Array, on_face: float) -> tuple[Array, Mask]:
     """Roots in [-1,1]^3 found from the centres of the sub-hexahedra whose boxes hold y, and their mask.
 
-    A sub-hexahedron lies in the box of its own eight corners; 8, 64 and 512 of them are gone through.
+    A sub-hexahedron lies in the box of its own eight corners. Newton's method is tried from those of the
+    512, and for what that leaves, near corners where the determinant almost vanishes, from ever smaller ones.
     """
-    g = np.linspace(0.0, 1.0, 9)
-    nodes = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
-    net = points(local, nodes).reshape(9, 9, 9, 3)
-    slack = 1e-9
-    rows, cell = np.arange(len(y)), np.zeros((len(y), 3), dtype=np.intp)
-    for stride in (4, 2, 1):
-        coarse = net[::stride, ::stride, ::stride]
-        corners = np.stack([coarse[_ends(i), :, :][:, _ends(j), :][:, :, _ends(k)] for i, j, k in BITS])
-        low, high = corners.min(axis=0) - slack, corners.max(axis=0) + slack
-        cell = (2 * cell[:, None] + BITS.astype(np.intp)).reshape(-1, 3)
-        rows = np.repeat(rows, 8)
-        at = tuple(cell.T)
-        holds = ((y[rows] >= low[at]) & (y[rows] <= high[at])).all(axis=1)
-        rows, cell = rows[holds], cell[holds]
+    C = _centred(K)
     best = np.zeros((len(y), 3))
     done = np.zeros(len(y), dtype=bool)
-    middle: Array = np.asarray((cell + 0.5) / 4.0 - 1.0, dtype=np.float64)
-    xi, found = _newton(K, y[rows], middle)
-    good = found & np.asarray(np.abs(xi).max(axis=1, initial=0.0) <= 1.0 + 2.0 * _INSIDE)
-    best[rows[good]], done[rows[good]] = xi[good], True
+    rows, cell = np.arange(len(y)), np.zeros((len(y), 3), dtype=np.intp)
+    for level in range(1, _DEPTH + 1):
+        cell = (2 * cell[:, None] + BITS.astype(np.intp)).reshape(-1, 3)
+        rows = np.repeat(rows, 8)
+        low, high = _cell_boxes(C, cell, level)
+        holds = ((y[rows] >= low) & (y[rows] <= high)).all(axis=1)
+        rows, cell = rows[holds], cell[holds]
+        if len(rows) == 0:
+            break
+        if level >= 3:
+            middle: Array = np.asarray((2 * cell + 1) * 0.5**level - 1.0, dtype=np.float64)
+            xi, found = _newton(K, y[rows], middle)
+            _snap(K, y[rows], xi, on_face)
+            good = found & np.asarray(np.abs(xi).max(axis=1, initial=0.0) <= 1.0)
+            best[rows[good]], done[rows[good]] = xi[good], True
+            rows, cell = rows[~done[rows]], cell[~done[rows]]
     return best, done
+
+
+def _cell_boxes(C: Array, cell: NDArray[np.intp], level: int) -> tuple[Array, Array]:
+    """(min [M,3], max [M,3]) of the sub-hexahedra with indices [M,3] out of 2^level along each axis."""
+    slack = 1e-9
+    if level <= 3:  # few cells, asked for by many points
+        g = np.linspace(-1.0, 1.0, 2**level + 1)
+        nodes = np.stack(np.meshgrid(g, g, g, indexing="ij")).reshape(3, -1)
+        net = _evaluate(C, nodes).reshape(3, len(g), len(g), len(g))
+        corners = np.stack([net[:, _ends(i)][:, :, _ends(j)][:, :, :, _ends(k)] for i, j, k in BITS])
+        at = (slice(None), *cell.T)
+        return corners.min(axis=0)[at].T - slack, corners.max(axis=0)[at].T + slack
+    xi = (cell[:, None] + BITS) * 0.5 ** (level - 1) - 1.0
+    corners = _evaluate(C, xi.reshape(-1, 3).T).T.reshape(-1, 8, 3)
+    return corners.min(axis=1) - slack, corners.max(axis=1) + slack
 
 
 def _ends(bit: float) -> slice:

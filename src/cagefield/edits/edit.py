@@ -16,7 +16,7 @@ from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import SHELLS, Shell, Warp
-from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.continuous import ContinuousWarp, lattice_error
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron import HexahedronMap
 from cagefield.warps.lattice import Lattice
@@ -187,6 +187,13 @@ class Edit:
                 return 1.0
             before, operation = self.replace(operations=self.operations[:-1]), self.operations[-1]
         return before._largest_part(operation)
+
+    def lattice_error(self, resolution: int | None = None, *, samples: int = 20_000) -> tuple[float, float]:
+        """(max, mean) error of the lattice in world units, measured in the shell; zeros without a lattice."""
+        warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
+        if nodes is None or not isinstance(warp, ContinuousWarp):
+            return 0.0, 0.0
+        return lattice_error(warp, nodes, samples=samples)
 
     def _largest_part(self, operation: Operation) -> float:
         cage = self.deformed

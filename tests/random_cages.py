@@ -1,0 +1,95 @@
+"""Random cages and edits for property tests, and an independent trilinear map to compare with."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import assume
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from cagefield.cages import Cage
+from cagefield.edits.edit import Edit, largest_safe
+from cagefield.errors import CageError, EditError
+
+Array = NDArray[np.float64]
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def cages(draw: st.DrawFn) -> Cage:
+    """Boxes of any orientation and aspect to 100, their corners moved by 0 to 0.999 of what is possible."""
+    rng = np.random.default_rng(draw(seeds))
+    nearness = draw(st.sampled_from([0.0, 0.3, 0.7, 0.95, 0.999]))
+    aspect = draw(st.sampled_from([1.0, 3.0, 100.0]))
+    size = rng.uniform(0.5, 1.0, 3) / aspect ** rng.random(3)
+    box = Cage.box(rng.uniform(-2.0, 2.0, 3), size, rng.uniform(-3.0, 3.0, 3))
+    return dragged(box, rng.uniform(-1.0, 1.0, (8, 3)) @ box.affine[0].T, nearness)
+
+
+@st.composite
+def edits(draw: st.DrawFn, fold_free: float = 0.95) -> Edit:
+    """Continuous edits whose operations go to at most a share `fold_free` of what is safe."""
+    rng = np.random.default_rng(draw(seeds))
+    bend = draw(st.sampled_from([0.0, 0.3]))
+    outer = Cage.box(rng.uniform(-1.0, 1.0, 3), rng.uniform(1.0, 3.0, 3), rng.uniform(-3.0, 3.0, 3))
+    A, b = outer.affine
+    inner = Cage(b + (0.5 + (np.asarray(Cage.box(0.0 * b, 1.0).corners)) * rng.uniform(0.2, 0.6, 3)) @ A.T)
+    inner = dragged(inner, rng.uniform(-1.0, 1.0, (8, 3)) @ inner.affine[0].T, bend)
+    outer = dragged(outer, rng.uniform(-0.3, 0.3, (8, 3)) @ A.T, bend)
+    edit = Edit(inner, outer)
+    assume(can_be_evaluated(edit))
+    gap = np.linalg.norm(A, axis=0).min() * 0.25
+    for kind in draw(st.lists(st.integers(0, 6), min_size=1, max_size=3)):
+        trial = Edit(edit.inner, edit.outer, operations=edit.operations)
+        by = rng.uniform(-gap, gap, 3)
+        operation = (
+            lambda: trial.translate(by),
+            lambda: trial.rotate(rng.uniform(-1.0, 1.0, 3)),
+            lambda: trial.scale(np.exp(rng.uniform(-0.7, 0.7, 3))),
+            lambda: trial.shear(xy=rng.uniform(-0.5, 0.5), zx=rng.uniform(-0.5, 0.5)),
+            lambda: trial.move_corner(int(rng.integers(8)), 0.3 * by),
+            lambda: trial.move_edge((2, 6), 0.3 * by),
+            lambda: trial.move_face("-y", 0.3 * by),
+        )[kind]
+        try:
+            after = operation().operations[-1]
+        except ValueError:
+            continue
+        edit = edit.then(after.part(fold_free * edit.safe_fraction(after)))
+    return edit
+
+
+def can_be_evaluated(edit: Edit) -> bool:
+    """True where `check` finds nothing wrong."""
+    try:
+        edit.check()
+    except EditError:
+        return False
+    return True
+
+
+def dragged(cage: Cage, by: Array, nearness: float) -> Cage:
+    """The cage with its corners moved by a share of the most of `by` [8,3] that keeps it valid."""
+
+    def valid(t: float) -> bool:
+        try:
+            Cage(cage.corners + t * by)
+        except CageError:
+            return False
+        return True
+
+    return Cage(cage.corners + nearness * largest_safe(valid) * by)
+
+
+def trilinear(corners: Array, u: Array) -> Array:
+    """x(u) [3] by nested linear interpolation: along x, then y, then z."""
+    along_x = corners[0::2] * (1.0 - u[0]) + corners[1::2] * u[0]
+    along_y = along_x[0::2] * (1.0 - u[1]) + along_x[1::2] * u[1]
+    return np.asarray(along_y[0] * (1.0 - u[2]) + along_y[1] * u[2])
+
+
+def unit_vectors(rng: np.random.Generator, n: int) -> Array:
+    """Random directions [N,3]."""
+    d = rng.normal(size=(n, 3))
+    return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
