@@ -121,13 +121,15 @@ def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
     before = np.full_like(target, np.inf)
     for _ in range(100):
         error = _curve(r, k) - target
-        if np.all(np.abs(error) <= 4e-15 * (1.0 + target)):
+        done = np.abs(error) <= 1e-14 * (1.0 + target)
+        if np.all(done):
             break
         low, high = np.where(error <= 0, r, low), np.where(error >= 0, r, high)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             newton = r - error / _curve_slope(r, k)
         good = (newton >= low) & (newton <= high) & (np.abs(error) <= 0.5 * before)
-        r, before = np.where(good, newton, 0.5 * (low + high)), np.where(good, np.abs(error), np.inf)
+        r = np.where(done, r, np.where(good, newton, 0.5 * (low + high)))
+        before = np.where(good, np.abs(error), np.inf)
     return r, reached
 
 
