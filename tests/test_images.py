@@ -59,7 +59,7 @@ def test_unreadable_files_are_named(tmp_path):
     (tmp_path / "text.png").write_text("not a picture")
     write_png(tmp_path / "whole.png", gradient(40, 40))
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:600])
-    with pytest.raises(DatasetError, match="none.png: there is no such image"):
+    with pytest.raises(DatasetError, match=r"none\.png: there is no such image"):
         read_image(tmp_path / "none.png")
     for name in ("text.png", "cut.png"):
         with pytest.raises(DatasetError, match=f"{name}: not a readable image"):
@@ -105,7 +105,7 @@ def test_video_errors_leave_nothing(tmp_path):
         write_video(tmp_path / "a.mp4", [])
     with pytest.raises(CagefieldError, match=r"frame 1 is \[16, 18, 3\]; all frames must be \[16, 16, 3\]"):
         write_video(tmp_path / "a.mp4", [small, large])
-    with pytest.raises(CagefieldError, match="writes .mp4 files"):
+    with pytest.raises(CagefieldError, match=r"writes \.mp4 files"):
         write_video(tmp_path / "a.gif", [small])
     with pytest.raises(CagefieldError, match="fps must be positive"):
         write_video(tmp_path / "a.mp4", [small], fps=0)

@@ -1,4 +1,4 @@
-"""The plain renderer against closed forms: Beer-Lambert, expected depth, order of convergence, moved fields."""
+"""The plain renderer against closed forms: Beer-Lambert, expected depth, order of convergence, edits."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from cagefield.datasets.procedural.parts import Part
+from cagefield.datasets.procedural.parts import Part, apply
 
 
 class Occlusion:
@@ -42,9 +42,9 @@ class Occlusion:
                     grid = np.meshgrid(
                         *(axis[cut] for axis, cut in zip(axes, near, strict=True)), indexing="ij"
                     )
-                    points = np.stack(grid).reshape(3, -1)
+                    points = np.stack(grid).reshape(3, -1).astype(np.float32)
                     inverse = np.linalg.inv(pose)
-                    local = (inverse[:3, :3] @ points + inverse[:3, 3:]).astype(np.float32)
+                    local = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
                     # a stretched shape: the smallest scale gives a lower bound
                     factor = np.linalg.svd(pose[:3, :3], compute_uv=False)[-1]
                     distance = primitive.shape.distance(local) * np.float32(factor)
@@ -52,11 +52,11 @@ class Occlusion:
         return lows.astype(np.float32), lattice
 
     def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Openness [N] at points [N,3] with unit normals [N,3], both as modelled."""
+        """Openness [N] at points [3,N] with unit normals [3,N], both as modelled."""
         origin, lattice = self._lattice
-        openness = np.ones(len(points), np.float32)
+        openness = np.ones(points.shape[1], np.float32)
         for height, weight in self.taps:
-            at = (points + np.float32(height) * normals - origin).T / np.float32(self.spacing)
+            at = (points + np.float32(height) * normals - origin[:, None]) / np.float32(self.spacing)
             distance = map_coordinates(lattice, at, order=1, mode="nearest")
             openness -= np.float32(weight / height) * np.clip(height - distance, 0, height)
         return np.clip(openness, 0, 1)

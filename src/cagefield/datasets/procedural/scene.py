@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.occlusion import Occlusion
-from cagefield.datasets.procedural.parts import Part, Placed, affine
+from cagefield.datasets.procedural.parts import Part, Placed, affine, apply
 from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
 from cagefield.datasets.procedural.tracing import trace
 from cagefield.errors import SceneError
@@ -128,19 +128,19 @@ class ProceduralScene:
             raise SceneError(f"supersample must be at least 1, not {supersample}")
         height, width = camera.height, camera.width
         fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
-        _, directions = fine.rays()
+        directions = apply(camera.c2w[:3, :3], fine.local_directions().T)
         hits = trace(self.placed, camera.origin, directions)
-        rgb, normals = np.zeros((2, *directions.shape), np.float32)
-        origin = camera.origin.astype(np.float32)
+        rgb, normals = np.zeros((2, directions.shape[1], 3), np.float32)
+        origin = camera.origin.astype(np.float32)[:, None]
         for index, item in enumerate(self.placed):
             rows = np.flatnonzero(hits.primitive == index)
             if len(rows):
-                points = origin + hits.t[rows, None] * directions[rows]
+                toward = directions[:, rows]
                 rgb[rows], normals[rows] = surface(
                     item,
-                    points,
+                    origin + hits.t[rows] * toward,
                     hits.instance[rows],
-                    directions[rows],
+                    toward,
                     openness=self.occlusion,
                     relit=self.relit,
                 )

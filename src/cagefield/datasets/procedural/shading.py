@@ -26,6 +26,10 @@ WRAP = 0.3
 """Share by which the key light reaches around the terminator."""
 
 
+def _dot(first: Float32, second: Float32) -> Float32:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
 def shade(
     albedo: Float32,
     normals: Float32,
@@ -36,18 +40,17 @@ def shade(
 ) -> Float32:
     """rgb [N,3] in [0,1] of surface points.
 
-    albedo [N,3]; normals [N,3] unit, outwards; viewdirs [N,3] unit, from the camera; occlusion [N] in [0,1]
+    albedo [N,3]; normals [3,N] unit, outwards; viewdirs [3,N] unit, from the camera; occlusion [N] in [0,1]
     (1 is open); gloss: strength and exponent of the highlight.
     """
-    up = 0.5 + 0.5 * normals[:, 2]
+    up = 0.5 + 0.5 * normals[2]
     ambient = GROUND + (SKY - GROUND) * up[:, None]
-    key = np.maximum((normals @ KEY_DIRECTION + WRAP) / (1 + WRAP), 0)
-    fill = np.maximum(normals @ FILL_DIRECTION, 0)
+    key = np.maximum((_dot(KEY_DIRECTION, normals) + WRAP) / (1 + WRAP), 0)
+    fill = np.maximum(_dot(FILL_DIRECTION, normals), 0)
     light = ambient * occlusion[:, None]
     light = light + (key * (0.4 + 0.6 * occlusion))[:, None] * KEY_COLOR + fill[:, None] * FILL_COLOR
-    halfway = KEY_DIRECTION - viewdirs
-    halfway = halfway / np.sqrt(np.einsum("ni,ni->n", halfway, halfway))[:, None]
-    facing = np.maximum(np.einsum("ni,ni->n", normals, halfway), 1e-6)
+    halfway = KEY_DIRECTION[:, None] - viewdirs
+    facing = np.maximum(_dot(normals, halfway) / np.sqrt(_dot(halfway, halfway)), np.float32(1e-6))
     highlight = np.float32(gloss[0]) * facing ** np.float32(gloss[1]) * occlusion
     out: Float32 = np.clip(albedo * light + highlight[:, None], 0, 1).astype(np.float32)
     return out

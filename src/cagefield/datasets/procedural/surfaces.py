@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.datasets.procedural.parts import Placed
+from cagefield.datasets.procedural.parts import Placed, apply
 from cagefield.datasets.procedural.shading import shade
 
 Float32 = NDArray[np.float32]
@@ -24,23 +24,26 @@ SHELL = 6.0
 
 
 def _unit(vectors: Float32) -> Float32:
-    length = np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
-    return vectors / np.maximum(length, np.float32(1e-12))[:, None]
+    length = np.sqrt((vectors**2).sum(0))
+    return vectors / np.maximum(length, np.float32(1e-12))
 
 
 def surface(
     item: Placed, points: Float32, instance: Int, viewdirs: Float32, *, openness: Openness, relit: bool
 ) -> tuple[Float32, Float32]:
-    """(rgb [N,3], unit world normals [N,3]) of points [N,3] on the surface of one placed primitive."""
-    local = item.local(np.ascontiguousarray(points.T), instance)
-    normals = _unit(item.world_gradient(item.local_gradient(local, instance), instance).T)
+    """(rgb [N,3], unit world normals [N,3]) of points [3,N] on the surface of one placed primitive.
+
+    viewdirs [3,N]; openness maps modelled points and normals [3,N] to occlusion.
+    """
+    local = item.local(points, instance)
+    normals = _unit(item.world_gradient(item.local_gradient(local, instance), instance))
     motion = item.part.motion
     modelled_points, modelled_normals, modelled_dirs = points, normals, viewdirs
     if not np.array_equal(motion, np.eye(4)):
         inverse = np.linalg.inv(motion)
-        modelled_points = (points @ inverse[:3, :3].T + inverse[:3, 3]).astype(np.float32)
-        modelled_normals = _unit((normals @ motion[:3, :3]).astype(np.float32))
-        modelled_dirs = _unit((viewdirs @ inverse[:3, :3].T).astype(np.float32))
+        modelled_points = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
+        modelled_normals = _unit(apply(motion[:3, :3].T, normals))
+        modelled_dirs = _unit(apply(inverse[:3, :3], viewdirs))
     rgb = shade(
         item.primitive.texture(local.T, instance),
         normals if relit else modelled_normals,
@@ -48,12 +51,12 @@ def surface(
         occlusion=openness(modelled_points, modelled_normals),
         gloss=item.primitive.gloss,
     )
-    return rgb, normals
+    return rgb, normals.T
 
 
 @dataclass(frozen=True)
 class SurfaceField:
-    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - DEPTH) / (eps ln 2), rgb their shading.
+    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - DEPTH) / (eps ln 2).
 
     The optical depth from open space is 1 at DEPTH * eps below a flat surface. Distances are
     Euclidean for parts that were scaled alike on all axes, accurate to first order for the others.
@@ -76,15 +79,14 @@ class SurfaceField:
         rgb = np.zeros((len(points), 3), np.float32)
         for index in np.unique(owner[owner >= 0]):
             rows = np.flatnonzero(owner == index)
-            dirs = np.asarray(viewdirs[rows], np.float32)
-            rgb[rows] = surface(
+            rgb[rows], _ = surface(
                 self.placed[index],
-                points[rows],
+                np.ascontiguousarray(points[rows].T),
                 instance[rows],
-                dirs,
+                np.ascontiguousarray(viewdirs[rows].T, np.float32),
                 openness=self.openness,
                 relit=self.relit,
-            )[0]
+            )
         return sigma, rgb
 
     def distance(self, points: Float32) -> tuple[Float32, Int, Int]:

@@ -110,7 +110,8 @@ class Stripes:
 
     def __call__(self, points: Float32, instance: NDArray[np.intp]) -> Float32:
         axis = np.array(self.direction, np.float32)
-        along = points @ (axis / np.linalg.norm(axis)) / np.float32(self.period) + np.float32(self.phase)
+        axis /= np.float32(np.linalg.norm(axis) * self.period)
+        along = np.einsum("ni,i->n", points, axis) + np.float32(self.phase)
         return _mix(self.first, self.second, _soft_square(along, self.duty, self.soft))
 
 

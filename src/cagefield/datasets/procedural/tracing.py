@@ -35,10 +35,9 @@ class Hits:
 
 
 def trace(placed: Sequence[Placed], origin: NDArray[np.float64], directions: Float32) -> Hits:
-    """Nearest surfaces of all primitives along rays from one origin [3] with unit directions [N,3]."""
-    count = len(directions)
+    """Nearest surfaces of all primitives along rays from one origin [3] with unit directions [3,N]."""
+    count = directions.shape[1]
     hits = Hits(np.full(count, np.inf, np.float32), np.full(count, -1, np.intp), np.zeros(count, np.intp))
-    rows = np.ascontiguousarray(directions.T, np.float32)
     start = np.asarray(origin, np.float32)
     bundles: dict[str, tuple[Int, Float32]] = {}
     # near primitives first: what they hide is never traced
@@ -50,8 +49,8 @@ def trace(placed: Sequence[Placed], origin: NDArray[np.float64], directions: Flo
         if part.name not in bundles:
             low, high = part.bounds
             ball = ((low + high) / 2 - start).astype(np.float32), np.float32(np.linalg.norm(high - low) / 2)
-            rays = np.flatnonzero(_meets(rows, *ball))
-            bundles[part.name] = rays, rows[:, rays]
+            rays = np.flatnonzero(_meets(directions, *ball))
+            bundles[part.name] = rays, directions[:, rays]
         _trace_primitive(placed[index], index, start, *bundles[part.name], hits)
     return hits
 
@@ -61,7 +60,10 @@ def _meets(directions: Float32, to_center: Float32, radius: np.float32) -> NDArr
     distance = np.float32(np.linalg.norm(to_center))
     if distance <= radius:
         return np.ones(directions.shape[1], bool)
-    return (to_center / distance) @ directions >= np.sqrt(1 - (radius / distance) ** 2) - np.float32(1e-6)
+    x, y, z = to_center / distance
+    cosine = x * directions[0] + y * directions[1] + z * directions[2]
+    meets: NDArray[np.bool_] = cosine >= np.sqrt(1 - (radius / distance) ** 2) - np.float32(1e-6)
+    return meets
 
 
 def _trace_primitive(

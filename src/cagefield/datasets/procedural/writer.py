@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,6 @@ from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
 from cagefield.folders import replaced_folder
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import write_png
 
 FOV_X = 0.6911112
@@ -52,14 +50,6 @@ def viewpoints(
         eye = RADIUS * np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), height])
         cameras.append(Camera.look_at(eye, (0, 0, 0), width=size, height=size, fov_x=FOV_X))
     return tuple(cameras)
-
-
-def photographs(
-    scene: ProceduralScene, cameras: Iterable[Camera], *, supersample: int = 2
-) -> Iterator[Frame]:
-    """Frames of a scene without background, in order; two are made at a time."""
-    with ThreadPoolExecutor(max_workers=min(2, os.cpu_count() or 1)) as pool:
-        yield from pool.map(lambda camera: scene.photograph(camera, supersample=supersample), cameras)
 
 
 def make_scene(
@@ -96,7 +86,8 @@ def make_scene(
         for split, count in counts.items():
             cameras = viewpoints(count, size, lowest=scene.lowest, seed=seed, split=split)
             (draft / split).mkdir()
-            for index, frame in enumerate(photographs(scene, cameras)):
+            for index, camera in enumerate(cameras):
+                frame = scene.photograph(camera)
                 write_png(draft / split / f"r_{index}.png", frame.rgba8())
                 if split == "test":
                     np.save(draft / split / f"r_{index}_depth.npy", frame.depth)
