@@ -54,6 +54,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
     patches = data.patches(4)
     rays = len(patches) * 16
     losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
+    scratch = to_device(np.zeros(grid.workers * kernels.MOST_SAMPLES * kernels.SAMPLE, np.float32))
     grid.accumulator.fill(0.0)
     if grid.contracted:
         lower, scale = np.zeros(3), np.full(3, 1 / 0.8)
@@ -64,7 +65,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
     kernels.march_batch(
         to_device(patches), len(patches), 4, grid.workers, 7, data.views, data.poses, to_device(gains.astype(np.float32)),
         data.directions, data.pixels, grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
-        losses, sums, ivec3(*grid.brick_dims), ivec3(N, N, N), vec3(*lower.tolist()), vec3(*scale.tolist()),
+        scratch, losses, sums, ivec3(*grid.brick_dims), ivec3(N, N, N), vec3(*lower.tolist()), vec3(*scale.tolist()),
         float(step), 0.05, 1, vec3(1.0, 1.0, 1.0), grid.terms, grid.contracted, False,
     )  # fmt: skip
     return losses.to_numpy().astype(np.float64)

@@ -6,8 +6,9 @@ residual r = gain * C - photo; remaining colour S_i = C - sum_{j<=i} w_j c_j. Th
 
     dC/dc_i = w_i          dC/ds_i = h_i (T_{i+1} c_i - S_i)
 
-The first march computes C, the second the gradients from S_i; no samples are stored. b_v are trilinear
-weights. Each worker adds into its own accumulator, so that no atomics are needed on a CPU and the sums do
+The march computes C and notes its few samples that carry weight in a scratch area of the worker; the way
+back over them has the gradients from S_i. (Marching twice instead, with nothing noted, took 1.5 times as long
+on a CPU.) b_v are trilinear weights. Each worker adds into its own accumulator, so that no atomics are needed on a CPU and the sums do
 not depend on timing; on a GPU one accumulator is shared, with atomic adds.
 
 Accumulator record of a slot (stride 4 + 3K): density gradient, density curvature sum_c (dC_c/ds)^2,
@@ -33,6 +34,10 @@ from cagefield.rendering.grid import (
 from cagefield.rendering.traverse import empty_run, safe_inverse, slab
 
 HEAD = 4
+SAMPLE = 8
+"""Floats of a noted sample: t, h, w, T after it, and its colour before the clamp."""
+MOST_SAMPLES = 512
+LEAST_WEIGHT = 1e-4
 DENSITY_GRADIENT, DENSITY_CURVATURE, COLOUR_CURVATURE, LARGEST_WEIGHT = range(HEAD)
 
 
@@ -72,6 +77,7 @@ def march_batch(
     sh: F32,
     accumulator: F32,
     record: qd.i32,
+    scratch: F32,
     losses: F32,
     gain_sums: F32,
     brick_dims: ivec3,
@@ -154,85 +160,100 @@ def march_batch(
                         t_start += jitter * step / qd.abs(v0 * half).max()
 
                     C = vec3(0.0, 0.0, 0.0)
-                    for march in qd.static(range(2)):
-                        T = 1.0
-                        acc = vec3(0.0, 0.0, 0.0)
-                        residual = vec3(0.0, 0.0, 0.0)
-                        if qd.static(march == 1):
-                            residual = gain * C - photo
-                        t = t_start
-                        end = t_end
-                        while t < end and T > 1e-3:
-                            q = go + t * gd
-                            g = q
-                            h = step
-                            inv = inverse
-                            leap = 1.0
-                            limit = 1e30
+                    T = 1.0
+                    t = t_start
+                    samples = 0
+                    while t < t_end and T > 1e-3:
+                        q = go + t * gd
+                        g = q
+                        h = step
+                        inv = inverse
+                        leap = 1.0
+                        limit = 1e30
+                        if qd.static(contracted):
+                            v = contract_velocity(q, gd) * half
+                            g = (contract_point(q) + 2.0) * half
+                            inv = safe_inverse(v)
+                            h = step / qd.abs(v).max()
+                            far = qd.abs(q).max()
+                            if far > 1.0:
+                                leap = 0.5
+                                limit = 0.25 * far / qd.abs(gd).max()
+                            if far > 2.0 * half.x:
+                                t_end = t
+                        run = empty_run(codes, g, inv, ivec3(0, 0, 0), brick_dims)
+                        if run >= 0.0:
                             if qd.static(contracted):
-                                v = contract_velocity(q, gd) * half
-                                g = (contract_point(q) + 2.0) * half
-                                inv = safe_inverse(v)
-                                h = step / qd.abs(v).max()
-                                far = qd.abs(q).max()
-                                if far > 1.0:
-                                    leap = 0.5
-                                    limit = 0.25 * far / qd.abs(gd).max()
-                                if far > 2.0 * half.x:
-                                    end = t
-                            run = empty_run(codes, g, inv, ivec3(0, 0, 0), brick_dims)
-                            if run >= 0.0:
-                                if qd.static(contracted):
-                                    t += qd.max(qd.min(run * leap, limit), h)
-                                else:
-                                    t += (qd.floor(run / step) + 1.0) * step
+                                t += qd.max(qd.min(run * leap, limit), h)
                             else:
-                                cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
-                                slots = corner_slots(index, cell, resolution.y, resolution.z)
-                                b = corner_weights(g - qd.cast(cell, qd.f32))
-                                raw = gather_density(density, slots, b)
-                                if raw > 0.0:
-                                    keep = qd.exp(-raw * h)
-                                    w = T * (1.0 - keep)
-                                    T *= keep
-                                    if w > 1e-4:
-                                        colour = gather_rgb(sh, slots, b, basis, K)
-                                        c = qd.max(qd.min(colour, 1.0), 0.0)
-                                        acc += w * c
-                                        if qd.static(march == 1):
-                                            slope = h * gain * (T * c - (C - acc))
-                                            curvature = slope.dot(slope)
-                                            gradient = slope.dot(residual)
-                                            pull = residual * gain * w
-                                            for a in qd.static(range(3)):
-                                                if colour[a] < 0.0 and pull[a] > 0.0:
-                                                    pull[a] = 0.0
-                                                if colour[a] > 1.0 and pull[a] < 0.0:
-                                                    pull[a] = 0.0
-                                            ww = w * w
-                                            for k in qd.static(range(8)):
-                                                if slots[k] > 0:
-                                                    to = base + slots[k] * (HEAD + 3 * K)
-                                                    add(accumulator, to, b[k] * gradient, gpu)
-                                                    add(accumulator, to + 1, b[k] * curvature, gpu)
-                                                    add(accumulator, to + 2, b[k] * ww, gpu)
-                                                    if qd.static(gpu):
-                                                        qd.atomic_max(accumulator[to + 3], b[k] * w)
-                                                    else:
-                                                        accumulator[to + 3] = qd.max(accumulator[to + 3], b[k] * w)
-                                                    for j in qd.static(range(K)):
-                                                        y = b[k] * basis[j]
-                                                        for a in qd.static(range(3)):
-                                                            add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
-                                t += h
-                        if qd.static(march == 0):
-                            C = acc + T * bg
+                                t += (qd.floor(run / step) + 1.0) * step
                         else:
-                            error = residual
-                            losses[ray] = error.dot(error)
-                            for a in qd.static(range(3)):
-                                gain_sums[6 * ray + a] = C[a] * photo[a]
-                                gain_sums[6 * ray + 3 + a] = C[a] * C[a]
+                            cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
+                            slots = corner_slots(index, cell, resolution.y, resolution.z)
+                            b = corner_weights(g - qd.cast(cell, qd.f32))
+                            raw = gather_density(density, slots, b)
+                            if raw > 0.0:
+                                keep = qd.exp(-raw * h)
+                                w = T * (1.0 - keep)
+                                T *= keep
+                                if w > LEAST_WEIGHT:
+                                    colour = gather_rgb(sh, slots, b, basis, K)
+                                    C += w * qd.max(qd.min(colour, 1.0), 0.0)
+                                    if samples < MOST_SAMPLES:
+                                        at = SAMPLE * (worker * MOST_SAMPLES + samples)
+                                        scratch[at] = t
+                                        scratch[at + 1] = h
+                                        scratch[at + 2] = w
+                                        scratch[at + 3] = T
+                                        for a in qd.static(range(3)):
+                                            scratch[at + 4 + a] = colour[a]
+                                        samples += 1
+                            t += h
+                    C += T * bg
+                    residual = gain * C - photo
+                    losses[ray] = residual.dot(residual)
+                    for a in qd.static(range(3)):
+                        gain_sums[6 * ray + a] = C[a] * photo[a]
+                        gain_sums[6 * ray + 3 + a] = C[a] * C[a]
+
+                    remaining = C
+                    for sample in range(samples):
+                        at = SAMPLE * (worker * MOST_SAMPLES + sample)
+                        q = go + scratch[at] * gd
+                        h = scratch[at + 1]
+                        w = scratch[at + 2]
+                        colour = vec3(scratch[at + 4], scratch[at + 5], scratch[at + 6])
+                        g = q
+                        if qd.static(contracted):
+                            g = (contract_point(q) + 2.0) * half
+                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
+                        slots = corner_slots(index, cell, resolution.y, resolution.z)
+                        b = corner_weights(g - qd.cast(cell, qd.f32))
+                        c = qd.max(qd.min(colour, 1.0), 0.0)
+                        remaining -= w * c
+                        slope = h * gain * (scratch[at + 3] * c - remaining)
+                        curvature = slope.dot(slope)
+                        gradient = slope.dot(residual)
+                        pull = residual * gain * w
+                        for a in qd.static(range(3)):
+                            if colour[a] < 0.0 and pull[a] > 0.0:
+                                pull[a] = 0.0
+                            if colour[a] > 1.0 and pull[a] < 0.0:
+                                pull[a] = 0.0
+                        for k in qd.static(range(8)):
+                            if slots[k] > 0:
+                                to = base + slots[k] * (HEAD + 3 * K)
+                                add(accumulator, to, b[k] * gradient, gpu)
+                                add(accumulator, to + 1, b[k] * curvature, gpu)
+                                add(accumulator, to + 2, b[k] * w * w, gpu)
+                                if qd.static(gpu):
+                                    qd.atomic_max(accumulator[to + 3], b[k] * w)
+                                else:
+                                    accumulator[to + 3] = qd.max(accumulator[to + 3], b[k] * w)
+                                for j in qd.static(range(K)):
+                                    y = b[k] * basis[j]
+                                    for a in qd.static(range(3)):
+                                        add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
 
 
 @qd.kernel

@@ -234,6 +234,7 @@ class _Run:
         self.gain_sums = np.zeros((len(dataset.train), 6))
         self.gains = to_device(np.ones((len(dataset.train), 3), np.float32))
         self._buffers: dict[int, tuple[Any, Any, Any]] = {}
+        self._notes: tuple[int, Any] | None = None
         self.grid: GridState = GridState.dense(
             self.bounds,
             (first,) * 3,
@@ -356,7 +357,7 @@ class _Run:
             patches, count, config.patch, count if gpu else self.workers, self.step + 1000003 * config.seed,
             photos.views, photos.poses, self.gains, photos.directions, photos.pixels,
             grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
-            losses, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
+            self._scratch(count if gpu else self.workers), losses, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
             step, self.near, 1, vec3(1.0, 1.0, 1.0), grid.terms, self.contracted, gpu,
         )  # fmt: skip
         if config.smooth_density > 0 or config.smooth_colour > 0:
@@ -387,6 +388,15 @@ class _Run:
                 )
             }
         return self._buffers[count]
+
+    def _scratch(self, workers: int) -> Any:
+        import quadrants as qd
+
+        from cagefield.training.kernels import MOST_SAMPLES, SAMPLE
+
+        if self._notes is None or self._notes[0] != workers:
+            self._notes = (workers, qd.ndarray(qd.f32, (workers * MOST_SAMPLES * SAMPLE,)))
+        return self._notes[1]
 
     # -- exposure ---------------------------------------------------------------------------------------
 
