@@ -9,7 +9,8 @@ import contextlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Protocol
 
 import cagefield
@@ -38,7 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         command = _parse(args or ["--help"])
         if isinstance(command, int):
             return command
-        command.run()
+        with _warnings_in_one_line():
+            command.run()
     except CagefieldError as error:
         return _refuse(str(error))
     except BrokenPipeError:
@@ -81,6 +83,19 @@ def _parse(args: list[str]) -> Command | int:
             return 0
         return _refuse(_without_box(complaint.getvalue()))
     return command
+
+
+@contextlib.contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Shows warnings as a line on stderr, without their place in the source."""
+
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+        if issubclass(category, UserWarning):
+            print("cagefield: warning: " + " ".join(str(message).split()), file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
 
 
 def _without_box(text: str) -> str:

@@ -2,21 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import dataclasses
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from cagefield.cli.options import Device, OptionalOutput
+from cagefield.cli.options import Device, Output, check_folder, progress_bar, track
+
+if TYPE_CHECKING:
+    from cagefield.scene import Scene
+
+_OWN = (
+    "photos", "scene", "edited", "edits.yaml",
+    "before.png", "after.png", "before_after.png", "turntable.mp4",
+)  # fmt: skip
+_EYE, _TARGET, _FOV_X = (1.6, -3.5, 1.3), (0.0, 0.0, 0.05), 0.62
+"""Where before.png and after.png are taken from: radians, world units."""
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Demo:
-    """Photograph the built-in digger, train a field, raise its arm, and write pictures before and after."""
+    """Photograph the built-in digger, train a field, raise its arm; pictures before and after."""
 
-    out: OptionalOutput = None
+    out: Output = Path("cagefield-demo")
     """Folder for the results."""
+    views: int = 60
+    """Number of training photos."""
+    size: int = 320
+    """Width and height of the photos in pixels."""
+    seconds: float = 75.0
+    """How long to train."""
+    steps: int | None = None
+    """Train this many steps instead."""
+    resolution: int = 256
+    """Voxels along the longest axis at the end."""
+    frames: int = 48
+    """Number of pictures in the turntable video."""
     device: Device = "auto"
     """Where kernels run."""
     overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -24,3 +49,89 @@ class Demo:
 
     def run(self) -> None:
         """Runs the chain and says where the results are."""
+        from cagefield.folders import replaced_folder
+
+        check_folder(self.out, self.overwrite, "before_after.png")
+        began = time.perf_counter()
+        with replaced_folder(self.out.resolve(), _OWN) as folder:
+            with _timed("photos of the digger"):
+                self._photograph(folder / "photos")
+            with _timed("training"):
+                scene, figures = self._train(folder)
+            with _timed("edit"):
+                edited = self._edit(scene, folder)
+            with _timed("pictures"):
+                self._render(scene, edited, folder)
+        print(f"done in {time.perf_counter() - began:.0f} s; {figures}")
+        for name, what in (
+            ("before.png, after.png", "the digger, and with its arm raised"),
+            ("before_after.png", "both side by side"),
+            ("turntable.mp4", "once round the two"),
+            ("edits.yaml", "the edit: change it and run `cagefield edit SCENE EDITS -o NEW`"),
+            ("scene/, edited/", "the scene folders, for `cagefield render` and `cagefield info`"),
+            ("photos/", "what the field was trained on"),
+        ):
+            print(f"  {self.out}/{name:24} {what}")
+
+    def _photograph(self, folder: Path) -> None:
+        from cagefield.datasets.procedural import make_scene
+
+        with progress_bar("Photos") as move:
+            make_scene(
+                "digger",
+                folder,
+                views=self.views,
+                size=self.size,
+                test_views=5,
+                progress=lambda done, total: move(done, total, f"{done}/{total}"),
+            )
+
+    def _train(self, folder: Path) -> tuple[Scene, str]:
+        from cagefield import devices
+        from cagefield.cli.train import summary, train_scene
+        from cagefield.datasets import load_dataset
+        from cagefield.training.voxel import VoxelConfig
+
+        devices.start(self.device)
+        config = VoxelConfig(minutes=self.seconds / 60.0, resolution=self.resolution)
+        if self.steps is not None:
+            config = dataclasses.replace(config, minutes=None, steps=self.steps)
+        scene, result = train_scene(load_dataset(folder / "photos"), config)
+        scene.save(folder / "scene")
+        return scene, summary(result)
+
+    def _edit(self, scene: Scene, folder: Path) -> Scene:
+        from importlib.resources import files
+
+        from cagefield.edits.files import load_edits
+
+        text = files("cagefield").joinpath("examples", "digger.yaml").read_text(encoding="utf-8")
+        (folder / "edits.yaml").write_text(text, encoding="utf-8")
+        edited = scene.with_edits(load_edits(folder / "edits.yaml"))
+        edited.save(folder / "edited")
+        return edited
+
+    def _render(self, scene: Scene, edited: Scene, folder: Path) -> None:
+        from cagefield.camera_paths import orbit
+        from cagefield.cameras import Camera
+        from cagefield.rendering.images import side_by_side, write_png, write_video
+
+        camera = Camera.look_at(_EYE, _TARGET, width=480, height=480, fov_x=_FOV_X)
+        before, after = (one.render(camera).rgb8() for one in (scene, edited))
+        write_png(folder / "before.png", before)
+        write_png(folder / "after.png", after)
+        write_png(folder / "before_after.png", side_by_side(before, after))
+        path = orbit(scene.cameras["train"], self.frames, width=320, height=320)
+        pictures = (
+            side_by_side(scene.render(camera).rgb8(), edited.render(camera).rgb8())
+            for camera in track(path, len(path), "Turntable")
+        )
+        write_video(folder / "turntable.mp4", pictures, fps=12)
+
+
+@contextmanager
+def _timed(what: str) -> Iterator[None]:
+    """Prints what was done and how long it took."""
+    began = time.perf_counter()
+    yield
+    print(f"{what}: {time.perf_counter() - began:.0f} s", flush=True)

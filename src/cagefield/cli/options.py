@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -81,17 +82,22 @@ def check_file(path: Path, overwrite: bool) -> None:
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
-    """A function (done, total, note) that moves a bar on stderr; nothing is shown off a terminal."""
+    """A function (done, total, note) that moves a bar on stderr; off a terminal, a line for each quarter."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = TextColumn(what), BarColumn(), TimeRemainingColumn(), TextColumn("{task.description}")
+    quarters = 0
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("")
 
         def move(done: float, total: float, note: str = "") -> None:
+            nonlocal quarters
             bar.update(task, completed=done, total=total, description=note)
+            if not console.is_terminal and done >= (quarters + 1) * total / 4:
+                quarters = int(4 * done / total)
+                print(f"{what} {25 * quarters}%: {note}", file=sys.stderr)
 
         yield move
 
