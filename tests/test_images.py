@@ -33,6 +33,11 @@ def test_grey_palette_and_16_bit_files_become_rgb(tmp_path):
         np.testing.assert_array_equal(read_image(tmp_path / f"{name}.png"), np.repeat(grey[..., None], 3, -1))
 
 
+def test_16_bit_values_are_rounded(tmp_path):
+    Image.fromarray(np.array([[128, 129, 65535]], np.uint16)).save(tmp_path / "a.png")
+    np.testing.assert_array_equal(read_image(tmp_path / "a.png")[0, :, 0], [0, 1, 255])
+
+
 def test_floats_are_rounded_and_clipped(tmp_path):
     write_png(tmp_path / "a.png", np.array([[-0.2, 0.5, 1.7]]).reshape(1, 1, 3))
     np.testing.assert_array_equal(read_image(tmp_path / "a.png")[0, 0], [0, 128, 255])

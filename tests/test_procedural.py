@@ -82,6 +82,34 @@ def test_distance_is_euclidean(name):
     assert np.abs(shape.distance(foot)).max() < 1e-3
 
 
+def test_profiles_agree_with_the_closed_forms():
+    """A square extruded is a box, a half square turned is a cylinder: inside, outside, and on the axis."""
+    points = np.random.default_rng(3).uniform(-0.8, 0.8, (3, 4000)).astype(np.float32)
+    points[:2, :100] = 0
+    rectangle = ((-0.25, -0.35), (0.25, -0.35), (0.25, 0.35), (-0.25, 0.35))
+    box, slab = Box((0.3, 0.4, 0.2), 0.05), Extrusion(rectangle, 0.15, 0.05)
+    np.testing.assert_allclose(slab.distance(points), box.distance(points), atol=1e-6)
+    half = ((0.0, -0.35), (0.25, -0.35), (0.25, 0.35), (0.0, 0.35))
+    cylinder, turned = Cylinder(0.3, 0.4, 0.05), Revolution(half, 0.05)
+    np.testing.assert_allclose(turned.distance(points), cylinder.distance(points), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "point", "distance"),
+    [
+        ("sphere", (0, 0, 0.1), -0.3),
+        ("box", (0.05, 0, 0.1), -0.1),
+        ("rounded box", (0, 0, 0), -0.2),
+        ("cylinder", (0.1, 0, 0), -0.2),
+        ("torus", (0, 0.3, 0), -0.1),
+        ("tube", (0.1, 0.2, 0), -0.1),
+    ],
+)
+def test_distance_inside(name, point, distance):
+    at_point = EXACT[name].distance(np.array([point], np.float32).T)
+    assert at_point[0] == pytest.approx(distance, abs=1e-6)
+
+
 @pytest.mark.parametrize("name", EXACT)
 def test_extent_holds_the_shape_and_touches_it(name):
     shape = EXACT[name]
@@ -151,6 +179,37 @@ def test_traced_stretched_sphere_is_an_ellipsoid():
     assert np.isinf(depth[(square < -0.05).reshape(40, 40)]).all()
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_nearest_instance_hides_the_other(order):
+    poses = np.stack([place((0.8, 0, 0)), place((-0.8, 0, 0))])[::order]
+    pair = ProceduralScene("pair", (Part("balls", (Primitive(Sphere(0.3), PLAIN, poses),)),))
+    camera = view(21, eye=(4, 0, 0), fov_x=0.3)
+    assert hits_of(pair, camera)[10, 10] == pytest.approx(4 - 0.8 - 0.3, abs=1e-3)
+
+
+def test_field_distance_is_euclidean_for_uniform_scales():
+    ball = one(Sphere(0.5), place((0.1, 0.2, 0), scale=0.4))
+    points = np.random.default_rng(0).uniform(-0.3, 0.5, (3000, 3)).astype(np.float32)
+    expected = np.linalg.norm(points - np.float32([0.1, 0.2, 0]), axis=1) - 0.2
+    distance, owner, _ = ball.field(eps=0.01).distance(points)
+    near = expected < 0.06 - 1e-4
+    np.testing.assert_allclose(distance[near], expected[near], atol=1e-6)
+    assert np.isinf(distance[expected > 0.06 + 1e-4]).all()
+    np.testing.assert_array_equal(owner >= 0, np.isfinite(distance))
+
+
+def test_field_distance_is_first_order_for_stretched_parts():
+    pose = place((0, 0, 0), (20, 30, 40), (0.5, 0.3, 0.1))
+    u = np.random.default_rng(0).normal(size=(500, 3))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    normals = u @ np.linalg.inv(pose[:3, :3])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = (u @ pose[:3, :3].T + 0.001 * normals).astype(np.float32)
+    distance, _, _ = one(Sphere(), pose).field(eps=0.01).distance(points)
+    # curvature of the ellipsoid, up to .5 / .1^2 = 50 per unit, times (.001)^2 / 2
+    np.testing.assert_allclose(distance, 0.001, atol=1e-4)
+
+
 def test_opacity_of_an_antialiased_edge_is_the_covered_share():
     """A box face that covers the left part of the picture, seen by a nearly parallel camera."""
     camera = Camera.look_at((0, -200, 0), (0, 0, 0), width=20, height=20, fov_x=0.01)
@@ -162,6 +221,8 @@ def test_opacity_of_an_antialiased_edge_is_the_covered_share():
     np.testing.assert_allclose(frame.opacity[:, 10], 0.3, atol=0.5 / 8 + 0.01)
     np.testing.assert_allclose(frame.opacity[:, 11:], 0)
     np.testing.assert_allclose(frame.normals[:, :10], np.broadcast_to([0, -1, 0], (20, 10, 3)), atol=1e-4)
+    np.testing.assert_allclose(frame.depth[:, :11], 199.5, atol=0.01)
+    assert np.isinf(frame.depth[:, 11:]).all()
     # straight colour: the edge column has the colour of the face, not a mixture with black
     np.testing.assert_allclose(frame.rgb[:, 10], frame.rgb[:, 9], atol=0.03)
 
