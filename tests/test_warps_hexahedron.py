@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 from hypothesis import given, settings
-from random_cages import cages, seeds, trilinear
 from scipy.optimize import root
 
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.warps.hexahedron import HexahedronMap
+from random_cages import cages, seeds, trilinear
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(cages(), seeds)
 def test_inverse_is_that_of_an_independent_map(cage: Cage, seed: int) -> None:
     truth = np.random.default_rng(seed).random((20, 3))
@@ -27,7 +27,7 @@ def test_inverse_is_that_of_an_independent_map(cage: Cage, seed: int) -> None:
         assert np.abs(u[k] - truth[k]).max() < tolerance
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(cages(), seeds)
 def test_inverse_finds_every_point_of_the_cage(cage: Cage, seed: int) -> None:
     u = np.random.default_rng(seed).random((2000, 3))

@@ -52,8 +52,8 @@ def test_inner_region_and_outside_stay_exact() -> None:
 
 
 def test_error_falls_with_the_resolution() -> None:
-    resolutions = np.array([9, 17, 33, 49])
-    errors = np.array([edit().lattice_error(int(R), samples=8000) for R in resolutions])
+    resolutions = np.array([9, 17, 33])
+    errors = np.array([edit().lattice_error(int(R), samples=4000) for R in resolutions])
     assert (np.diff(errors, axis=0) < 0.0).all()
     order = -np.polyfit(np.log(resolutions - 1), np.log(errors), 1)[0]
     # The displacement has kinks on the cages' faces, where the interpolation is of first order, and is smooth

@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
-from random_cages import edits, seeds, trilinear
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
@@ -13,6 +12,7 @@ from cagefield.edits.edit import Edit
 from cagefield.hexahedron import Array
 from cagefield.warps.hexahedron import HexahedronMap
 from cagefield.warps.trilinear_shell import SIDES, TrilinearShell
+from random_cages import edits, seeds, trilinear
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 
@@ -51,11 +51,11 @@ def test_hexahedra_join_faces_of_the_same_side() -> None:
         inner_ids = [k for k in range(8) if k not in FACES[side]]
         inner_face = shell.deformed.corners[list(FACES[side])]
         np.testing.assert_array_equal(shell.deformed_hexahedra[n][inner_ids], inner_face)
-    volumes = [Cage(h).corners for h in shell.deformed_hexahedra]  # each is a valid, right-handed hexahedron
-    assert len(volumes) == 6
+    for corners in shell.deformed_hexahedra:
+        Cage(corners)  # valid: right-handed and not inside out
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(edits(), seeds)
 def test_both_maps_against_the_definition(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -84,28 +84,33 @@ def test_inverse_against_scipy(edit: Edit, seed: int) -> None:
         assert np.abs(q[k] - reference).max() < 1e-12 * (10.0 + amplified[k])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(edits(), seeds)
 def test_continuous_across_every_face(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
-    t = np.random.default_rng(seed).random((30, 2))
-    for n, side in enumerate(SIDES):
-        corners_d, corners_c = shell.deformed_hexahedra[n], shell.canonical_hexahedra[n]
-        u = np.concatenate([np.insert(t, across, end, axis=1) for across in range(3) for end in (0.0, 1.0)])
-        p, expected = hexahedron.points(corners_d, u), hexahedron.points(corners_c, u)
-        tolerance = 1e-11 * (1.0 + conditioning(shell, u, np.full(len(u), n)))
-        # On the face itself, whichever of its two hexahedra is chosen, and a hair on either side.
-        for shift in (0.0, 1e-12, -1e-12):
-            q, _ = shell.to_canonical(p + shift)
-            assert (np.abs(q - expected).max(axis=1) < tolerance).all()
-        axis, outwards = "xyz".index(side[1]), float(side[0] == "+")
-        on_inner, on_outer = u[:, axis] == 1.0 - outwards, u[:, axis] == outwards
+    t = np.random.default_rng(seed).random((15, 2))
+    u = np.concatenate([np.insert(t, across, end, axis=1) for across in range(3) for end in (0.0, 1.0)])
+    side, u = np.repeat(np.arange(6), len(u)), np.tile(u, (6, 1))
+    p, expected = np.empty_like(u), np.empty_like(u)
+    for n in range(6):
+        p[side == n] = hexahedron.points(shell.deformed_hexahedra[n], u[side == n])
+        expected[side == n] = hexahedron.points(shell.canonical_hexahedra[n], u[side == n])
+    tolerance = 1e-11 * (1.0 + conditioning(shell, u, side))
+    # On the face itself, whichever of its two hexahedra is chosen, and a hair on either side (where the
+    # hexahedron is the neighbour, whose conditioning may be worse).
+    q, _ = shell.to_canonical(np.concatenate([p, p + 1e-12, p - 1e-12]))
+    errors = np.abs(q.reshape(3, -1, 3) - expected).max(axis=2)
+    assert (errors[0] < tolerance).all() and (errors[1:] < tolerance.max()).all()
+    for n, name in enumerate(SIDES):
+        axis, outwards = "xyz".index(name[1]), float(name[0] == "+")
+        on_inner = (side == n) & (u[:, axis] == 1.0 - outwards)
+        on_outer = (side == n) & (u[:, axis] == outwards)
         _, phi, _ = HexahedronMap(edit.inner, edit.deformed)(p[on_inner])
         assert (np.abs(phi - expected[on_inner]).max(axis=1) < tolerance[on_inner]).all()
         assert (np.abs(p[on_outer] - expected[on_outer]).max(axis=1) < tolerance[on_outer]).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(edits(), seeds)
 def test_jacobian_against_finite_differences(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -117,28 +122,27 @@ def test_jacobian_against_finite_differences(edit: Edit, seed: int) -> None:
     assume(deep.any())
     p = deformed[deep]
     _, J = shell.to_canonical(p)
-    for a in range(3):
-        e = h * np.eye(3)[a]
-        slope = (shell.to_canonical(p + e)[0] - shell.to_canonical(p - e)[0]) / (2.0 * h)
-        # Truncation h^2 x third derivative (at most conditioning^5 here), rounding 1e-15 x conditioning / h.
-        assert (np.abs(J[:, :, a] - slope).max(axis=1) < 1e-8 + 1e-10 * amplified[deep] ** 5).all()
+    shifted = p[:, None] + h * np.concatenate([np.eye(3), -np.eye(3)])
+    q = shell.to_canonical(shifted.reshape(-1, 3))[0].reshape(-1, 6, 3)
+    slope = np.transpose(q[:, :3] - q[:, 3:], (0, 2, 1)) / (2.0 * h)
+    # Truncation h^2 x third derivative (at most conditioning^5 here), rounding 1e-15 x conditioning / h.
+    assert (np.abs(J - slope).max(axis=(1, 2)) < 1e-8 + 1e-10 * amplified[deep] ** 5).all()
 
 
-@settings(max_examples=30, deadline=None)
-@given(edits(fold_free=1.0), seeds)
-def test_least_ratio_bounds_a_dense_sample(edit: Edit, seed: int) -> None:
+@settings(max_examples=15, deadline=None)
+@given(edits(fold_free=1.0))
+def test_least_ratio_against_a_dense_sample(edit: Edit) -> None:
     shell = shell_of(edit)
-    u = np.random.default_rng(seed).random((2000, 3))
-    u[:1000] = np.round(u[:1000] * 4.0) / 4.0  # corners, edges and faces as well
+    g = np.linspace(0.0, 1.0, 13)
+    u = np.stack(np.meshgrid(g, g, g), axis=-1).reshape(-1, 3)
     ratios = [
         np.linalg.det(hexahedron.jacobian(d, u)) / np.linalg.det(hexahedron.jacobian(c, u))
         for c, d in zip(shell.canonical_hexahedra, shell.deformed_hexahedra, strict=True)
     ]
-    sampled_least = float(np.min(ratios))
+    # The net's spacing of 1/12 misses a minimum between its nodes by about (1/24)^2 of the variation.
+    sampled_least, variation = float(np.min(ratios)), float(np.ptp(ratios))
     least = shell.least_ratio()
-    assert least <= sampled_least + 2e-3 * max(1.0, abs(sampled_least))
-    # A net of 125 nodes and 1000 random points comes near the least value, if not as near as the bound.
-    assert least > sampled_least - 0.2 * max(np.max(ratios), 1.0)
+    assert sampled_least - 0.01 * variation - 2e-3 < least < sampled_least + 2e-3
     assert shell.problem() is None
 
 

@@ -4,7 +4,7 @@
     edits:
       - name: arm up
         inner: {center: [0, 0, 1], size: [1, 1, 2], rotation_deg: [0, 0, 30]}    # or {corners: [8 points]}
-        outer: {margin: 0.3}                  # or a cage like inner; not needed by a discrete edit
+        outer: {margin: 2.5}                  # or a cage like inner; not needed by a discrete edit
         operations:
           - translate: [0, 0, 0.5]
           - rotate_deg: [0, 0, 20]            # or {by: [0, 0, 20], axes: cage}

@@ -13,20 +13,22 @@ import yaml
 
 from cagefield.errors import EditFileError
 
-_MOST_VALUES = 200_000
+_MOST_VALUES = 50_000
 
 
 @dataclass(frozen=True)
 class Node:
     """A value, with its file, line (0 where unknown) and key path.
 
-    `value` is a dict of nodes by key, a list of nodes, or a str, int, float, bool or None.
+    `value` is a dict of nodes by key, a list of nodes, or a str, int, float, bool or None; `raw` is what a
+    plain YAML scalar looks like in the file.
     """
 
     value: Any
     source: str
     line: int
     path: str
+    raw: str | None = None
 
     def error(self, message: str) -> EditFileError:
         """An `EditFileError` that says where this value stands."""
@@ -59,7 +61,7 @@ class Node:
         allowed = (*required, *optional)
         for key, node in self.value.items():
             if key not in allowed:
-                near = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.5)
+                near = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.6)
                 hint = f'; did you mean "{near[0]}"?' if near else f"; the keys here are {', '.join(allowed)}"
                 raise node.error(f'unknown key "{key}"{hint}')
         for key in required:
@@ -114,10 +116,12 @@ class Node:
         return self.value
 
     def text(self) -> str:
-        """A string; a number stands for its own text, as in `name: 7`."""
-        if isinstance(self.value, bool) or not isinstance(self.value, (str, int, float)):
+        """A string; an unquoted YAML scalar stands for itself, as in `name: 7`."""
+        if self.raw is not None and self.value is not None:
+            return self.raw
+        if not isinstance(self.value, str):
             raise self.error(f"expected text, got {self._shown}")
-        return str(self.value)
+        return self.value
 
     def choice(self, values: Sequence[str]) -> str:
         """One of some words."""
@@ -224,7 +228,8 @@ def _from_yaml(
             for n, item in enumerate(node.value)
         ]
         return Node(items, source, line, path)
-    return Node(_scalar(node, Node(None, source, line, path)), source, line, path)
+    raw = str(node.value) if isinstance(node, yaml.ScalarNode) and node.style is None else None
+    return Node(_scalar(node, Node(None, source, line, path)), source, line, path, raw)
 
 
 def _scalar(node: yaml.Node, place: Node) -> Any:

@@ -146,18 +146,29 @@ def _nearest(hexahedra: Array, points: Array) -> tuple[NDArray[np.intp], Array]:
     return nearest // len(u), u[nearest % len(u)]
 
 
-def _matching_turn(inner_axes: Array, outer_axes: Array) -> list[int]:
-    """Outer corner numbers in the inner cage's order, under the proper turn that best aligns the axes."""
-    best, order = -np.inf, list(range(8))
+def _matching_turn(inner_axes: Array, outer_axes: Array) -> NDArray[np.intp]:
+    """Outer corner numbers [8] in the inner cage's order, under the proper turn that best aligns the axes."""
+    alignment = (inner_axes.T @ outer_axes).ravel()
+    fits = _TURN_SIGNS @ alignment
+    # Ties go to the first turn, which is the identity.
+    return np.asarray(_TURN_ORDERS[int(np.flatnonzero(fits > fits.max() - 1e-9)[0])])
+
+
+def _turns() -> tuple[Array, NDArray[np.intp]]:
+    """The 24 proper turns of the axes: signed permutation matrices [24,9] and corner orders [24,8]."""
+    signs_of, orders = [], []
     for axes in permutations(range(3)):
-        parity = np.linalg.det(np.eye(3)[list(axes)])
-        for signs in 1.0 - 2.0 * hexahedron.BITS:
-            fit = sum(signs[a] * inner_axes[:, a] @ outer_axes[:, axes[a]] for a in range(3))
-            # Ties go to the first turn tried, which is the identity.
-            if parity * signs.prod() > 0.0 and fit > best + 1e-9:
-                best = fit
-                order = [sum((k >> a & 1 ^ int(signs[a] < 0)) << axes[a] for a in range(3)) for k in range(8)]
-    return order
+        for signs in 1 - 2 * hexahedron.BITS.astype(np.intp):
+            turn = np.eye(3)[list(axes)] * signs[:, None]
+            if np.linalg.det(turn) > 0.0:
+                signs_of.append(turn.ravel())
+                orders.append(
+                    [sum((k >> a & 1 ^ int(signs[a] < 0)) << axes[a] for a in range(3)) for k in range(8)]
+                )
+    return np.array(signs_of), np.array(orders, dtype=np.intp)
+
+
+_TURN_SIGNS, _TURN_ORDERS = _turns()
 
 
 def _at_corners(bernstein: Array) -> Array:
