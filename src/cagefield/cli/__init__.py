@@ -59,6 +59,7 @@ def _parse(args: list[str]) -> Command | int:
     """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after a complaint."""
     import tyro
 
+    from cagefield.cli.bench import Bench
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
     from cagefield.cli.info import Info
@@ -73,6 +74,7 @@ def _parse(args: list[str]) -> Command | int:
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]
+        | Annotated[Bench, tyro.conf.subcommand("bench")]
     )
     complaint = io.StringIO()
     try:

@@ -1,0 +1,1 @@
+"""Measurements: edits against ground truth, frame times, PSNR against training time."""

@@ -1,0 +1,124 @@
+"""The edit cases: an edit file of the package, and what it should look like.
+
+The truth of a discrete edit is the scene whose part was really moved, stated here without the edit file: an
+edit that is applied wrongly does not agree with it. The truth of a continuous edit is the scene seen through
+the edit's exact map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+
+import numpy as np
+
+from cagefield.datasets.procedural import ProceduralScene
+from cagefield.edits import EditStack
+from cagefield.edits.files import parse_edits
+from cagefield.errors import CagefieldError
+
+WEIGHT_CENTER = (-0.6413, 0.0, 0.1461)
+PINECONE_CENTER = (0.419, -0.3, -0.2135)
+
+
+@dataclass(frozen=True)
+class Case:
+    """An edit of a built-in scene: examples/`file` in the package; `moved` is None for continuous edits."""
+
+    scene: str
+    name: str
+    moved: Callable[[ProceduralScene], ProceduralScene] | None = None
+    named_file: str | None = None
+
+    @property
+    def file(self) -> str:
+        """Name of the edit file."""
+        return self.named_file or f"{self.scene}_{self.name}.yaml"
+
+    @property
+    def text(self) -> str:
+        """Content of the edit file."""
+        return files("cagefield").joinpath("examples", self.file).read_text(encoding="utf-8")
+
+    @property
+    def edits(self) -> EditStack:
+        """The edit stack of the file."""
+        return parse_edits(self.text, source=self.file)
+
+    @property
+    def kind(self) -> str:
+        """What the edits are: move, copy, delete or continuous."""
+        kinds = []
+        for edit in self.edits:
+            if edit.deleted:
+                kinds.append("delete")
+            elif edit.adjustment == "continuous":
+                kinds.append("continuous")
+            else:
+                kinds.append("copy" if edit.keep_source else "move")
+        return ", ".join(dict.fromkeys(kinds))
+
+
+CASES = (
+    Case("digger", "raise_arm", named_file="digger.yaml"),
+    Case("digger", "move_cone", lambda s: s.move("cone", translate=(0, -0.97, 0))),
+    Case("digger", "copy_cone", lambda s: s.duplicate("cone", translate=(-1.4, 0, 0))),
+    Case("digger", "delete_bucket", lambda s: s.remove("bucket")),
+    Case("chair", "lower_wider"),
+    Case("chair", "move_arm_rest", lambda s: s.move("arm rest left", translate=(0, 0.3, 0))),
+    Case("chair", "copy_cushion", lambda s: s.duplicate("cushion", translate=(0, 0, 0.156))),
+    Case("chair", "delete_back", lambda s: s.remove("back")),
+    Case("microphone", "bigger_head"),
+    Case("microphone", "move_weight", lambda s: s.move("weight", translate=(-0.1782, 0, -0.0908))),
+    Case(
+        "microphone",
+        "copy_weight",
+        lambda s: s.duplicate("weight", translate=(0, 0, -0.4), scale=0.8, pivot=WEIGHT_CENTER),
+    ),
+    Case("microphone", "delete_base", lambda s: s.remove("base")),
+    Case("plant", "taller"),
+    Case(
+        "plant",
+        "move_pinecone",
+        lambda s: s.move(
+            "pinecone", translate=(-0.43, -0.31, 0), rotate=(0, 0, np.radians(70)), pivot=PINECONE_CENTER
+        ),
+    ),
+    Case(
+        "plant",
+        "copy_pinecone",
+        lambda s: s.duplicate("pinecone", translate=(0.05, 0.68, -0.0586), scale=0.75, pivot=PINECONE_CENTER),
+    ),
+    Case("plant", "delete_flower", lambda s: s.remove("flower")),
+)
+
+
+def chosen(scenes: Sequence[str] = (), names: Sequence[str] = ()) -> tuple[Case, ...]:
+    """The cases of these scenes and of these names; empty means all.
+
+    Raises:
+        CagefieldError: a scene or a name that no case has, or no case with both.
+    """
+    for what, wanted, known in (
+        ("scene", scenes, [case.scene for case in CASES]),
+        ("edit", names, [case.name for case in CASES if not scenes or case.scene in scenes]),
+    ):
+        unknown = [name for name in wanted if name not in known]
+        if unknown:
+            raise CagefieldError(
+                f"there is no {what} {', '.join(map(repr, unknown))} to measure; choose from "
+                f"{', '.join(dict.fromkeys(known))}"
+            )
+    return tuple(
+        case for case in CASES if (not scenes or case.scene in scenes) and (not names or case.name in names)
+    )
+
+
+def relit(moved: ProceduralScene) -> bool:
+    """True where a part was turned or stretched: light falls on it in another way than in the photos."""
+    for part in moved.parts:
+        linear = part.motion[:3, :3]
+        if not np.allclose(linear, np.eye(3) * linear[0, 0], atol=1e-9):
+            return True
+    return False

@@ -1,0 +1,183 @@
+"""Edits against ground truth: an edited field beside the scene whose part was really moved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from cagefield.benchmarking.cases import Case, relit
+from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, pooled_psnr, stacked
+from cagefield.benchmarking.figures import changed_pixels as changed
+from cagefield.benchmarking.tables import Table, number
+from cagefield.benchmarking.timing import interleaved
+from cagefield.benchmarking.workbench import Settings, Workbench
+from cagefield.cameras import Camera
+from cagefield.datasets.procedural import procedural_scene
+from cagefield.datasets.procedural.writer import FOV_X
+from cagefield.rendering.images import side_by_side, write_png
+from cagefield.scene import Scene
+
+_TIMED_VIEWS, _ROUNDS = 3, 5
+
+_EYES = {
+    "digger": (1.6, -3.5, 1.3),
+    "chair": (3.0, 2.2, 1.6),
+    "microphone": (0.7, -3.8, 0.7),
+    "plant": (2.0, -3.1, 1.6),
+}
+"""Where pictures are taken from, so that what the cases move is seen."""
+
+
+_COLUMNS = (
+    "scene", "edit", "kind", "truth", "views", "PSNR unedited", "PSNR edited", "PSNR lost", "SSIM unedited",
+    "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
+    "there carried", "frame time",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Score:
+    """The figures of one case; `there_carried` is the PSNR on the changed pixels where light is carried.
+
+    `frame_ratio` is the time of an edited frame over that of an unedited one.
+    """
+
+    case: Case
+    truth: str
+    views: int
+    size: int
+    figures: Figures
+    there_carried: float
+    frame_ratio: float
+
+
+def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
+    """The scores of the cases, in order; cases of one scene that follow each other share its pictures."""
+    scene, name = None, ""
+    unedited: dict[str, Pictures] = {}
+    for case in cases:
+        if scene is None or case.scene != name:
+            scene, name, unedited = bench.scene(case.scene), case.scene, {}
+        edited = scene.with_edits(case.edits)
+        ratio = frame_ratio(scene, edited)
+        cameras = scene.cameras["test"]
+        carried = float("nan")
+        if case.moved is None:
+            size = bench.settings.exact_size
+            cameras = tuple(camera.resized(size, size) for camera in cameras[: bench.settings.exact_views])
+            truth, before = "exact map", bench.mapped(name, None, cameras)
+            after = bench.mapped(name, case.edits, cameras)
+        else:
+            truth, before = "photos", bench.modelled(name, cameras)
+            after = bench.moved(case, cameras)
+        if truth not in unedited:
+            unedited[truth] = pictures_of(scene, cameras)
+        shown = pictures_of(edited, cameras)
+        if case.moved is not None and relit(case.moved(procedural_scene(name))):
+            there = changed(before, after)
+            carried = pooled_psnr(shown, bench.moved(case, cameras, carried=True), there)
+        figures = compare(unedited[truth], shown, before, after)
+        yield Score(case, truth, len(cameras), cameras[0].width, figures, carried, ratio)
+
+
+def pictures_of(scene: Scene, cameras: Sequence[Camera]) -> Pictures:
+    """Pictures [V,H,W,3] of a scene over white."""
+    return stacked([np.clip(scene.render(camera, background="white").rgb, 0.0, 1.0) for camera in cameras])
+
+
+def frame_ratio(scene: Scene, edited: Scene) -> float:
+    """Median over interleaved rounds of the time of edited frames over that of unedited ones."""
+    cameras = scene.cameras["test"][:_TIMED_VIEWS]
+
+    def render(which: Scene) -> None:
+        for camera in cameras:
+            which.render(camera)
+
+    seconds = interleaved([lambda: render(scene), lambda: render(edited)], _ROUNDS)
+    return float(np.median(seconds[:, 1] / seconds[:, 0]))
+
+
+def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()) -> Table:
+    """The scores as a table, with what its columns mean."""
+    rows = tuple(_row(score) for score in scores)
+    config = settings.config
+    length = f"{config.steps} steps" if config.minutes is None else f"{config.minutes:g} minutes"
+    explained = [
+        f"Fields: {settings.views} photos of {settings.size}x{settings.size} pixels, trained for {length} at "
+        f"{config.resolution} voxels along the longest axis.",
+        "PSNR (dB) and SSIM: mean over test views, never trained on; unedited: the trained field against "
+        "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
+        "Truth: photos of the scene whose part was really moved, with the light as it then falls; for "
+        "continuous edits the scene's model seen through the edit's exact map, at "
+        f"{settings.exact_size}x{settings.exact_size} pixels, the unedited field against the unedited model.",
+        "There: on the pixels that the edit changes in truth, and a margin of a 100th of the width; if left: "
+        "what the field without the edit would reach there; carried: against parts that keep the light they "
+        "had, as an edited field does (where a part was turned).",
+        "Frame time: edited over unedited, median of frames taken in turn.",
+    ]
+    lost = [score.figures.lost for score in scores]
+    there = [
+        score.figures.there_lost for score in scores if score.figures.there_lost == score.figures.there_lost
+    ]
+    if lost:
+        explained.append(
+            f"Mean of the PSNR lost: {number(float(np.mean(lost)))} dB over {len(lost)} edits"
+            + (f", there {number(float(np.mean(there)))} dB." if there else ".")
+        )
+    return Table(
+        "Edits against ground truth",
+        _COLUMNS,
+        rows,
+        (*explained, *notes),
+        names=4,
+    )
+
+
+def _row(score: Score) -> tuple[str, ...]:
+    figures = score.figures
+    return (
+        score.case.scene,
+        score.case.name.replace("_", " "),
+        score.case.kind,
+        score.truth,
+        str(score.views),
+        number(figures.unedited),
+        number(figures.edited),
+        number(figures.lost),
+        number(figures.unedited_ssim, 4),
+        number(figures.edited_ssim, 4),
+        f"{100 * figures.changed:.1f}%",
+        number(figures.there_unedited),
+        number(figures.there_edited),
+        number(figures.there_lost),
+        number(figures.there_if_left),
+        number(score.there_carried),
+        f"x{score.frame_ratio:.2f}",
+    )
+
+
+def picture_path(folder: Path, case: Case) -> Path:
+    """Where the picture of a case goes."""
+    return folder / f"{case.scene}_{case.name}.png"
+
+
+def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, error: bool = False) -> Path:
+    """Writes before, edited and truth (and their difference, dark, three times as strong) side by side."""
+    camera = Camera.look_at(_EYES[case.scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
+    scene = bench.scene(case.scene)
+    before = cast(Pictures, scene.render(camera, background="white").rgb8())
+    after = scene.with_edits(case.edits).render(camera, background="white").rgb8()
+    truth = (
+        bench.mapped(case.scene, case.edits, [camera]) if case.moved is None else bench.moved(case, [camera])
+    )
+    panels = [before, after, truth[0]]
+    if error:
+        difference = np.abs(floats(after) - floats(truth[0])).max(axis=-1, keepdims=True)
+        panels.append(np.repeat(1.0 - np.minimum(3.0 * difference, 1.0), 3, axis=-1))
+    path = picture_path(folder, case)
+    write_png(path, side_by_side(*panels))
+    return path

@@ -1,0 +1,71 @@
+"""Tables of figures, on screen and as Markdown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from cagefield.errors import CagefieldError
+from cagefield.rendering.images import replaced_whole
+
+
+@dataclass(frozen=True)
+class Table:
+    """Text cells by row, with a title and notes; the first `names` columns are set left, the others right.
+
+    Raises:
+        CagefieldError: a row with another number of cells than there are columns.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+    names: int = 1
+
+    def __post_init__(self) -> None:
+        for number, row in enumerate(self.rows, start=1):
+            if len(row) != len(self.columns):
+                raise CagefieldError(
+                    f"row {number} of the table {self.title!r} has {len(row)} cells; it must have "
+                    f"{len(self.columns)}, one for each column"
+                )
+
+    def markdown(self) -> str:
+        """The table as Markdown, notes below it."""
+        sides = ["---" if index < self.names else "---:" for index in range(len(self.columns))]
+        lines = [f"# {self.title}", "", _row(self.columns), _row(tuple(sides)), *map(_row, self.rows), ""]
+        return "\n".join([*lines, *(f"- {note}" for note in self.notes)]).rstrip() + "\n"
+
+    def show(self) -> None:
+        """Prints the table."""
+        from rich.console import Console
+        from rich.table import Table as Grid
+
+        grid = Grid(title=self.title)
+        for index, column in enumerate(self.columns):
+            grid.add_column(column, justify="left" if index < self.names else "right")
+        for row in self.rows:
+            grid.add_row(*row)
+        console = Console()
+        console.print(grid)
+        for note in self.notes:
+            console.print(note, style="dim", highlight=False, markup=False)
+
+
+def number(value: float, digits: int = 2) -> str:
+    """The value with so many decimals; "-" for NaN, "inf" for infinity."""
+    if math.isnan(value):
+        return "-"
+    return "inf" if math.isinf(value) else f"{value + 0.0:.{digits}f}"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a text file, whole or not at all."""
+    with replaced_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _row(cells: tuple[str, ...]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"

@@ -1,0 +1,212 @@
+"""What the edit benchmark works on: photos, trained fields and truths, kept in a folder between runs.
+
+    WORKDIR/SCENE/photos-KEY/      photos in NeRF-synthetic layout
+    WORKDIR/SCENE/field-KEY/       the scene trained on them
+    WORKDIR/SCENE/truth-KEY.npz    pictures of the truth
+
+KEY is a digest of everything that the content depends on, the sources of the built-in scenes included. The
+trainer's sources are not: `retrain` makes the fields anew.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import cagefield
+from cagefield.benchmarking.cases import Case
+from cagefield.cameras import Camera
+from cagefield.datasets import Dataset, load_dataset
+from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
+from cagefield.edits import EditStack
+from cagefield.edits.files import dump_edits
+from cagefield.errors import CagefieldError
+from cagefield.rendering.images import replaced_whole
+from cagefield.rendering.sampled import render_sampled
+from cagefield.scene import Scene
+from cagefield.training.voxel import Progress, VoxelConfig, train_voxel
+
+UInt8 = NDArray[np.uint8]
+Move = Callable[[float, float, str], None]
+Bar = Callable[[str], AbstractContextManager[Move]]
+
+_MODELLED = ("datasets/procedural", "cameras.py")
+_MAPPED = ("edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py")
+
+SOFTNESS = 0.004
+"""Softness of the surfaces of a scene that is rendered as a field, in world units: half a voxel or less."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is photographed, how the fields are trained, and how the exact maps are rendered.
+
+    Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
+    the first `exact_views` test cameras, with `exact_samples` samples a ray.
+
+    Raises:
+        CagefieldError: sizes and numbers that are too small.
+    """
+
+    views: int = 100
+    size: int = 400
+    test_views: int = 20
+    config: VoxelConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
+    exact_size: int = 128
+    exact_views: int = 6
+    exact_samples: int = 768
+
+    def __post_init__(self) -> None:
+        for name, least in (
+            ("views", 1),
+            ("size", 16),
+            ("test_views", 1),
+            ("exact_size", 16),
+            ("exact_views", 1),
+            ("exact_samples", 1),
+        ):
+            value = getattr(self, name)
+            if value < least:
+                raise CagefieldError(f"{name} is {value}; it must be at least {least}")
+
+
+@contextmanager
+def no_bar(_: str) -> Iterator[Move]:
+    """A progress bar that shows nothing."""
+    yield lambda done, total, note: None
+
+
+@dataclass(frozen=True)
+class Workbench:
+    """Photos, fields and truths under `folder`; what is there already is used, fields unless `retrain`."""
+
+    settings: Settings
+    folder: Path
+    bar: Bar = no_bar
+    retrain: bool = False
+    _open: dict[str, Scene] = field(default_factory=dict, init=False, repr=False)
+
+    def photos(self, name: str) -> Dataset:
+        """The data set of a built-in scene."""
+        settings = self.settings
+        shape = [settings.views, settings.size, settings.test_views]
+        path = self.folder / name / f"photos-{digest(shape, _MODELLED)}"
+        if not path.is_dir():
+            with self.bar(f"{name}: photos") as move:
+                make_scene(
+                    name,
+                    path,
+                    views=settings.views,
+                    size=settings.size,
+                    test_views=settings.test_views,
+                    progress=lambda i, n: move(i, n, f"{i}/{n}"),
+                )
+        return load_dataset(path, downscale=1)
+
+    def scene(self, name: str) -> Scene:
+        """The scene trained on the photos of a built-in scene."""
+        if name not in self._open:
+            self._open[name] = self._trained(name)
+        return self._open[name]
+
+    def _trained(self, name: str) -> Scene:
+        dataset = self.photos(name)
+        config = self.settings.config
+        path = dataset.path.with_name(f"field-{digest([dataset.path.name, dataclasses.asdict(config)])}")
+        if path.is_dir() and not self.retrain:
+            return Scene.open(path)
+        with self.bar(f"{name}: training") as move:
+
+            def show(progress: Progress) -> None:
+                move(progress.done, 1.0, f"PSNR {progress.psnr:.1f} dB, {progress.resolution}^3 grid")
+
+            result = train_voxel(dataset, config, on_progress=show, evaluate=False)
+        if not result.finished:
+            raise KeyboardInterrupt
+        cameras = {"train": dataset.train, "test": dataset.test}
+        scene = Scene(
+            result.field,
+            cameras={split: tuple(view.camera for view in views) for split, views in cameras.items()},
+        )
+        scene.save(path, overwrite=True)
+        return scene
+
+    def moved(self, case: Case, cameras: Sequence[Camera], *, carried: bool = False) -> UInt8:
+        """Photos [V,H,W,3] of the scene whose part was really moved, over white.
+
+        With `carried` the parts keep the colours they had before they were moved.
+        """
+        if case.moved is None:
+            raise CagefieldError(
+                f"no part of {case.scene} is moved by {case.name}; its truth is the exact map"
+            )
+        scene = case.moved(procedural_scene(case.scene))
+        if carried:
+            scene = scene.carrying_light()
+        key = digest([case.scene, case.name, carried, _poses(cameras)], (*_MODELLED, "benchmarking/cases.py"))
+        what = f"{case.scene}, {case.name}: photos of the truth"
+        return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
+
+    def modelled(self, name: str, cameras: Sequence[Camera]) -> UInt8:
+        """Photos [V,H,W,3] of a built-in scene as it is, over white."""
+        scene = procedural_scene(name)
+        key = digest([name, _poses(cameras)], _MODELLED)
+        return self._kept(
+            name, key, f"{name}: photos", lambda: self._photographs(scene, cameras), len(cameras)
+        )
+
+    def mapped(self, name: str, edits: EditStack | None, cameras: Sequence[Camera]) -> UInt8:
+        """Pictures [V,H,W,3] of a built-in scene seen through the exact map of edits, over white."""
+        field_ = procedural_scene(name).field(SOFTNESS)
+        stack = None if edits is None else EditStack(edit.replace(lattice=None) for edit in edits)
+        text = "" if stack is None else dump_edits(stack)
+        samples = self.settings.exact_samples
+        key = digest([name, text, samples, SOFTNESS, _poses(cameras)], (*_MODELLED, *_MAPPED))
+
+        def pictures() -> Iterator[UInt8]:
+            for camera in cameras:
+                yield render_sampled(field_, camera, samples=samples, edits=stack).rgb8()
+
+        return self._kept(name, key, f"{name}: exact maps", pictures, len(cameras))
+
+    @staticmethod
+    def _photographs(scene: ProceduralScene, cameras: Sequence[Camera]) -> Iterator[UInt8]:
+        return (scene.photograph(camera, background="white").rgb8() for camera in cameras)
+
+    def _kept(self, name: str, key: str, what: str, make: Callable[[], Iterator[UInt8]], count: int) -> UInt8:
+        """The pictures in the folder's file of that key, made where there is none."""
+        path = self.folder / name / f"truth-{key}.npz"
+        if path.is_file():
+            with np.load(path) as file:
+                kept: UInt8 = file["pictures"]
+            return kept
+        made = []
+        with self.bar(what) as move:
+            for picture in make():
+                made.append(picture)
+                move(len(made), count, f"{len(made)}/{count}")
+        with replaced_whole(path) as temporary:
+            np.savez_compressed(temporary, pictures=np.stack(made))
+        return np.stack(made)
+
+
+def digest(content: object, sources: Sequence[str] = ()) -> str:
+    """Ten hexadecimal digits that change with the content (JSON) and with source files of the package."""
+    total = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
+    for name in sources:
+        entry = Path(cagefield.__file__).parent / name
+        for file in sorted(entry.rglob("*.py")) if entry.is_dir() else [entry]:
+            total.update(file.read_bytes())
+    return total.hexdigest()[:10]
+
+
+def _poses(cameras: Sequence[Camera]) -> list[object]:
+    return [camera.to_dict() for camera in cameras]

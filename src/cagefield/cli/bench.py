@@ -1,0 +1,333 @@
+"""`cagefield bench`: edits against ground truth, frame times, PSNR against training time."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from cagefield.cli.options import (
+    Device,
+    Flag,
+    OptionalOutput,
+    Output,
+    check_file,
+    parse_size,
+    progress_bar,
+)
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.benchmarking.cases import Case
+    from cagefield.benchmarking.workbench import Workbench
+    from cagefield.training.voxel import Progress, VoxelConfig
+
+_Overwrite = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+_SILENT = ("workdir", "out", "pictures", "picture_size", "error_panel", "overwrite", "scene_out")
+
+
+@dataclass(frozen=True)
+class BenchEdits:
+    """Edits of the built-in scenes against scenes whose parts are really moved; writes a Markdown table."""
+
+    out: Output = Path("benchmarks/results/edits.md")
+    """Markdown file for the table."""
+    scenes: tuple[str, ...] = ()
+    """Only these scenes: digger, chair, microphone, plant."""
+    edits: tuple[str, ...] = ()
+    """Only the edits of these names, such as move_cone."""
+    views: int = 100
+    """Number of training photos of each scene."""
+    size: int = 400
+    """Width and height of the photos in pixels."""
+    test_views: int = 20
+    """Number of test photos."""
+    minutes: float = 5.0
+    """How long to train each field."""
+    steps: int | None = None
+    """Train this many steps instead."""
+    resolution: int = 256
+    """Voxels along the longest axis."""
+    exact_size: int = 128
+    """Width and height of the pictures of continuous edits, whose truth is slow to render."""
+    exact_views: int = 6
+    """Number of pictures of continuous edits."""
+    exact_samples: int = 768
+    """Samples a ray in the truth of continuous edits."""
+    workdir: Path | None = None
+    """Folder that keeps photos, fields and truths, so that a second call only evaluates."""
+    retrain: Flag = False
+    """Train the fields anew where the work folder has them."""
+    pictures: Path | None = None
+    """Folder for pictures of each edit: before, edited, truth."""
+    picture_size: int = 320
+    """Width and height of each of them in pixels."""
+    error_panel: Flag = False
+    """A fourth picture: the difference from the truth."""
+    only_pictures: Flag = False
+    """Write the pictures and no table."""
+    device: Device = "auto"
+    """Where kernels run."""
+    overwrite: _Overwrite = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Trains what is missing, measures, shows the table, says where the files are."""
+        from cagefield import devices
+        from cagefield.benchmarking.cases import chosen
+        from cagefield.benchmarking.edits import picture_path
+        from cagefield.benchmarking.workbench import Settings, Workbench
+
+        cases = chosen(self.scenes, self.edits)
+        if self.only_pictures and self.pictures is None:
+            raise CagefieldError("--only-pictures needs a folder for them; give --pictures FOLDER")
+        if self.picture_size < 1:
+            raise CagefieldError(f"--picture-size is {self.picture_size}; it must be at least 1")
+        if not self.only_pictures:
+            check_file(self.out, self.overwrite)
+        if self.pictures is not None:
+            for case in cases:
+                check_file(picture_path(self.pictures, case), self.overwrite)
+        settings = Settings(
+            self.views,
+            self.size,
+            self.test_views,
+            _config(self.minutes, self.steps, self.resolution),
+            self.exact_size,
+            self.exact_views,
+            self.exact_samples,
+        )
+        devices.start(self.device)
+        with _work_folder(self.workdir) as folder:
+            bench = Workbench(settings, folder, progress_bar, self.retrain)
+            if not self.only_pictures:
+                self._measure(cases, bench)
+            if self.pictures is not None:
+                self._draw(cases, bench, self.pictures)
+
+    def _measure(self, cases: tuple[Case, ...], bench: Workbench) -> None:
+        from cagefield.benchmarking.edits import measure, table
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.tables import write_text
+
+        scores = []
+        for score in measure(cases, bench):
+            scores.append(score)
+            figures = score.figures
+            print(
+                f"{score.case.scene}, {score.case.name}: PSNR {figures.unedited:.2f} dB unedited, "
+                f"{figures.edited:.2f} dB edited, {figures.lost:.2f} dB lost",
+                flush=True,
+            )
+        machine, command = Machine.here(), command_line("bench edits", self)
+        result = table(scores, bench.settings, (f"Machine: {machine}", f"Command: `{command}`"))
+        result.show()
+        write_text(self.out, result.markdown())
+        print(f"table written to {self.out}")
+
+    def _draw(self, cases: tuple[Case, ...], bench: Workbench, folder: Path) -> None:
+        from cagefield.benchmarking.edits import write_picture
+
+        for case in cases:
+            path = write_picture(case, bench, folder, self.picture_size, error=self.error_panel)
+            print(f"picture written to {path}", flush=True)
+
+
+@dataclass(frozen=True)
+class BenchSpeed:
+    """Frame times of a scene: unedited, and under an edit, exact, from lattices and discrete; all in turn."""
+
+    scene: tyro.conf.Positional[Path]
+    """Scene folder."""
+    size: str = "400"
+    """WIDTHxHEIGHT, or the longer side alone."""
+    edits: Path | None = None
+    """Edit file; left out, a continuous edit in the middle that covers a quarter of the picture."""
+    cameras: int = 4
+    """Number of the scene's test cameras, evenly chosen."""
+    rounds: int = 15
+    """How often all variants are timed; each time every camera once."""
+    out: OptionalOutput = None
+    """JSON file for the figures; the same as a Markdown table beside it, ending .md."""
+    device: Device = "auto"
+    """Where kernels run."""
+    overwrite: _Overwrite = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Measures, shows the table, writes the files."""
+        import json
+
+        from cagefield import devices
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.speed import measure
+        from cagefield.benchmarking.tables import write_text
+        from cagefield.edits.files import load_edits
+        from cagefield.scene import Scene
+
+        if self.out is not None:
+            if self.out.suffix.lower() != ".json":
+                raise CagefieldError(f"{self.out} must end in .json; the Markdown table goes beside it")
+            for path in (self.out, self.out.with_suffix(".md")):
+                check_file(path, self.overwrite)
+        if self.cameras < 1:
+            raise CagefieldError(f"--cameras is {self.cameras}; it must be at least 1")
+        scene = Scene.open(self.scene)
+        edits = None if self.edits is None else load_edits(self.edits)
+        known = scene.cameras.get("test") or scene.cameras.get("train") or ()
+        chosen = [known[i] for i in _evenly(len(known), min(self.cameras, len(known)))]
+        cameras = [camera.resized(*parse_size(self.size, camera.width, camera.height)) for camera in chosen]
+        devices.start(self.device)
+        report = measure(scene, cameras, edits, rounds=self.rounds, report=print)
+        machine, command = Machine.here(), command_line("bench speed", self)
+        result = report.table(machine, command)
+        result.show()
+        if self.out is not None:
+            write_text(self.out, json.dumps(report.document(machine, command), indent=1) + "\n")
+            write_text(self.out.with_suffix(".md"), result.markdown())
+            print(f"figures written to {self.out} and {self.out.with_suffix('.md')}")
+
+
+@dataclass(frozen=True)
+class BenchTraining:
+    """Test PSNR against training time on a data set; writes the curve as CSV."""
+
+    data: tyro.conf.Positional[Path]
+    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model."""
+    out: Output
+    """CSV file for the curve; the same as a Markdown table beside it, ending .md."""
+    minutes: float = 5.0
+    """How long to train, evaluation left out."""
+    steps: int | None = None
+    """Train this many steps instead."""
+    resolution: int = 256
+    """Voxels along the longest axis at the end."""
+    sh_degree: int = 1
+    """Degree of the colour's spherical harmonics, 0 to 2."""
+    curve_views: int = 10
+    """Number of test views for the points of the curve; the last point is on all."""
+    downscale: int | None = None
+    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
+    holdout: int = 8
+    """Keep every so-many-th photo for testing where the data set has no test views."""
+    seed: int = 0
+    """Of the order of the photos' pixels and of all other chance."""
+    scene_out: Path | None = None
+    """Folder for the trained scene, if it is to be kept."""
+    device: Device = "auto"
+    """Where kernels run."""
+    overwrite: _Overwrite = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Trains, evaluates on the way, shows the table, writes the files."""
+        from cagefield import devices
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.tables import write_text
+        from cagefield.benchmarking.training import Point, measure
+        from cagefield.datasets import load_dataset
+        from cagefield.scene import Scene, check_destination
+
+        if self.out.suffix.lower() != ".csv":
+            raise CagefieldError(f"{self.out} must end in .csv; the Markdown table goes beside it")
+        for path in (self.out, self.out.with_suffix(".md")):
+            check_file(path, self.overwrite)
+        if self.scene_out is not None:
+            check_destination(self.scene_out, self.overwrite)
+        config = _config(self.minutes, self.steps, self.resolution, sh_degree=self.sh_degree, seed=self.seed)
+        dataset = load_dataset(self.data, downscale=self.downscale, holdout=self.holdout)
+        devices.start(self.device)
+
+        def tell(point: Point) -> None:
+            print(
+                f"{point.seconds:6.1f} s, {point.step} steps: test PSNR {point.test_psnr:.2f} dB on "
+                f"{point.views} views",
+                flush=True,
+            )
+
+        with progress_bar("Training") as move:
+
+            def show(progress: Progress) -> None:
+                move(progress.done, 1.0, f"PSNR {progress.psnr:.1f} dB, {progress.resolution}^3 grid")
+
+            curve = measure(dataset, config, views=self.curve_views, on_progress=show, on_point=tell)
+        notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench training', self)}`")
+        result = curve.table(dataset.name, notes)
+        result.show()
+        write_text(self.out, curve.csv())
+        write_text(self.out.with_suffix(".md"), result.markdown())
+        print(f"curve written to {self.out} and {self.out.with_suffix('.md')}")
+        if self.scene_out is not None:
+            views = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
+            Scene(
+                curve.result.field,
+                cameras={
+                    split: tuple(v.camera for v in members) for split, members in views.items() if members
+                },
+                background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
+            ).save(self.scene_out, self.overwrite)
+            print(f"scene written to {self.scene_out}")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measurements: edits against ground truth, frame times, test PSNR against training time."""
+
+    what: tyro.conf.OmitSubcommandPrefixes[
+        tyro.conf.OmitArgPrefixes[
+            Annotated[BenchEdits, tyro.conf.subcommand("edits")]
+            | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
+            | Annotated[BenchTraining, tyro.conf.subcommand("training")]
+        ]
+    ]
+
+    def run(self) -> None:
+        """Runs the chosen benchmark."""
+        self.what.run()
+
+
+def command_line(name: str, options: Any, silent: Collection[str] = _SILENT) -> str:
+    """The command that repeats a benchmark: what differs from the defaults, without the files' places."""
+    words = ["cagefield", *name.split()]
+    for option in dataclasses.fields(options):
+        value = getattr(options, option.name)
+        if option.name in silent or value == option.default or value is None:
+            continue
+        if option.default is dataclasses.MISSING:
+            words.append(str(value))
+            continue
+        words.append("--" + option.name.replace("_", "-"))
+        if isinstance(value, tuple):
+            words += [str(item) for item in value]
+        elif not isinstance(value, bool):
+            words.append(str(value))
+    return shlex.join(words)
+
+
+def _config(minutes: float, steps: int | None, resolution: int, **more: Any) -> VoxelConfig:
+    from cagefield.training.voxel import VoxelConfig
+
+    timed = {"minutes": minutes} if steps is None else {"steps": steps}
+    return VoxelConfig(resolution=resolution, **timed, **more)
+
+
+def _evenly(count: int, chosen: int) -> list[int]:
+    """`chosen` of the indices 0 to count - 1, evenly spread."""
+    return [(2 * i + 1) * count // (2 * chosen) for i in range(chosen)]
+
+
+@contextmanager
+def _work_folder(path: Path | None) -> Iterator[Path]:
+    """The folder, or one that is removed afterwards."""
+    if path is not None:
+        yield path.resolve()
+        return
+    with tempfile.TemporaryDirectory(prefix="cagefield-bench-") as folder:
+        yield Path(folder)
