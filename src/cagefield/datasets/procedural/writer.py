@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
 from cagefield.folders import replaced_folder
+from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import write_png
 
 FOV_X = 0.6911112
@@ -50,6 +51,14 @@ def viewpoints(
         eye = RADIUS * np.array([ring * np.cos(azimuth), ring * np.sin(azimuth), height])
         cameras.append(Camera.look_at(eye, (0, 0, 0), width=size, height=size, fov_x=FOV_X))
     return tuple(cameras)
+
+
+def photographs(
+    scene: ProceduralScene, cameras: Iterable[Camera], *, supersample: int = 2
+) -> Iterator[Frame]:
+    """Frames of a scene without background, in order."""
+    for camera in cameras:
+        yield scene.photograph(camera, supersample=supersample)
 
 
 def make_scene(
@@ -86,8 +95,7 @@ def make_scene(
         for split, count in counts.items():
             cameras = viewpoints(count, size, lowest=scene.lowest, seed=seed, split=split)
             (draft / split).mkdir()
-            for index, camera in enumerate(cameras):
-                frame = scene.photograph(camera)
+            for index, frame in enumerate(photographs(scene, cameras)):
                 write_png(draft / split / f"r_{index}.png", frame.rgba8())
                 if split == "test":
                     np.save(draft / split / f"r_{index}_depth.npy", frame.depth)
