@@ -49,11 +49,12 @@ def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
     return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, workers=workers)
 
 
-def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
-    """Runs one batch of all pixels; returns the squared errors."""
+def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 0.0) -> np.ndarray:
+    """Runs one batch of all pixels; returns the losses of the rays."""
     patches = data.patches(4)
     rays = len(patches) * 16
     losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
+    penalties = to_device(np.zeros(rays, np.float32))
     scratch = to_device(np.zeros(grid.workers * kernels.MOST_SAMPLES * kernels.SAMPLE, np.float32))
     grid.accumulator.fill(0.0)
     if grid.contracted:
@@ -65,10 +66,10 @@ def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
     kernels.march_batch(
         to_device(patches), len(patches), 4, grid.workers, 7, data.views, data.poses, to_device(gains.astype(np.float32)),
         data.directions, data.pixels, grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
-        scratch, losses, sums, ivec3(*grid.brick_dims), ivec3(N, N, N), vec3(*lower.tolist()), vec3(*scale.tolist()),
-        float(step), 0.05, 1, vec3(1.0, 1.0, 1.0), grid.terms, grid.contracted, False,
+        scratch, losses, penalties, sums, ivec3(*grid.brick_dims), ivec3(N, N, N), vec3(*lower.tolist()), vec3(*scale.tolist()),
+        float(step), 0.05, distortion, 0.8, 1, vec3(1.0, 1.0, 1.0), grid.terms, grid.contracted, False,
     )  # fmt: skip
-    return losses.to_numpy().astype(np.float64)
+    return 0.5 * losses.to_numpy().astype(np.float64) + penalties.to_numpy()
 
 
 @pytest.mark.parametrize("contracted", [False, True])
@@ -76,7 +77,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray) -> np.ndarray:
 def test_gradients_match_finite_differences(tmp_path, degree, contracted):
     data, grid = photos(tmp_path), state(degree, contracted)
     gains = np.array([[1.0, 1.1, 0.9], [0.95, 1.0, 1.2], [1.0, 1.0, 1.0]])
-    march(grid, data, gains)
+    march(grid, data, gains, 0.5)
     stride = HEAD + 3 * grid.terms
     records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, stride).sum(axis=0)
     rng = np.random.default_rng(0)
@@ -98,11 +99,11 @@ def test_gradients_match_finite_differences(tmp_path, degree, contracted):
             up[at] += h
             down[at] -= h
             array.from_numpy(up)
-            plus = march(grid, data, gains)
+            plus = march(grid, data, gains, 0.5)
             array.from_numpy(down)
-            minus = march(grid, data, gains)
+            minus = march(grid, data, gains, 0.5)
             array.from_numpy(values)
-            difference = 0.5 * (plus - minus).sum() / (2 * h)
+            difference = (plus - minus).sum() / (2 * h)
             errors.append(difference - gradient)
             sizes.append(difference)
         # Samples of weight under 1e-4 and rays past T = 1e-3 are left out of both; what moves across those

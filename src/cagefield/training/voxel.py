@@ -62,6 +62,7 @@ class VoxelConfig:
         smooth_density, smooth_colour: weights of the Laplacian regularisation.
         prune: vertices whose largest weight stayed under this are dropped.
         step: distance between samples, in voxels.
+        distortion: weight of mip-NeRF 360's distortion loss, against floaters.
         exposure: fit a colour gain to each photo; None does so for captures without alpha.
     """
 
@@ -81,6 +82,7 @@ class VoxelConfig:
     prune: float = 0.01
     step: float = 0.7
     exposure: bool | None = None
+    distortion: float = 0.0
 
     def __post_init__(self) -> None:
         limits = {
@@ -217,6 +219,7 @@ class _Run:
             middle = self.bounds.mean(axis=0)
             self.bounds = np.stack([middle - half, middle + half])
         self.near = 0.0
+        self.reach = float((self.bounds[1] - self.bounds[0]).max()) / 2
         keep = None
         first = self._resolution(0)
         if self.contracted:
@@ -233,7 +236,7 @@ class _Run:
         self.position = 0
         self.gain_sums = np.zeros((len(dataset.train), 6))
         self.gains = to_device(np.ones((len(dataset.train), 3), np.float32))
-        self._buffers: dict[int, tuple[Any, Any, Any]] = {}
+        self._buffers: dict[int, tuple[Any, Any, Any, Any]] = {}
         self._notes: tuple[int, Any] | None = None
         self.grid: GridState = GridState.dense(
             self.bounds,
@@ -348,7 +351,7 @@ class _Run:
         chosen = self.patches[self.order[self.position : self.position + count]]
         self.position += count
         rays = count * config.patch**2
-        patches, losses, gain_sums = self._buffer(count, rays)
+        patches, losses, penalties, gain_sums = self._buffer(count, rays)
         patches.from_numpy(np.ascontiguousarray(chosen).reshape(-1))
         lower, scale = self._transform()
         step = config.step if self.contracted else config.step / max(scale)
@@ -357,8 +360,8 @@ class _Run:
             patches, count, config.patch, count if gpu else self.workers, self.step + 1000003 * config.seed,
             photos.views, photos.poses, self.gains, photos.directions, photos.pixels,
             grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
-            self._scratch(count if gpu else self.workers), losses, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
-            step, self.near, 1, vec3(1.0, 1.0, 1.0), grid.terms, self.contracted, gpu,
+            self._scratch(count if gpu else self.workers), losses, penalties, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
+            step, self.near, config.distortion, self.reach, 1, vec3(1.0, 1.0, 1.0), grid.terms, self.contracted, gpu,
         )  # fmt: skip
         if config.smooth_density > 0 or config.smooth_colour > 0:
             kernels.laplacian(
@@ -376,13 +379,14 @@ class _Run:
         if self.exposure:
             self._fit_exposure(chosen[:, 0], gain_sums.to_numpy().reshape(count, -1, 6).sum(axis=1))
 
-    def _buffer(self, count: int, rays: int) -> tuple[Any, Any, Any]:
+    def _buffer(self, count: int, rays: int) -> tuple[Any, Any, Any, Any]:
         import quadrants as qd
 
         if count not in self._buffers:
             self._buffers = {
                 count: (
                     qd.ndarray(qd.i32, (3 * count,)),
+                    qd.ndarray(qd.f32, (rays,)),
                     qd.ndarray(qd.f32, (rays,)),
                     qd.ndarray(qd.f32, (6 * rays,)),
                 )
