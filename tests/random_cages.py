@@ -8,7 +8,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cagefield.cages import Cage
-from cagefield.edits.edit import Edit, largest_safe
+from cagefield.edits.edit import Edit, _is_valid, largest_safe
+from cagefield.edits.operations import (
+    MoveCorner,
+    MoveEdge,
+    MoveFace,
+    Operation,
+    Rotate,
+    Scale,
+    Shear,
+    Translate,
+    displacement,
+)
 from cagefield.errors import CageError, EditError
 
 Array = NDArray[np.float64]
@@ -41,23 +52,26 @@ def edits(draw: st.DrawFn, fold_free: float = 0.95) -> Edit:
     assume(can_be_evaluated(edit))
     gap = np.linalg.norm(A, axis=0).min() * 0.25
     for kind in draw(st.lists(st.integers(0, 6), min_size=1, max_size=3)):
-        trial = Edit(edit.inner, edit.outer, operations=edit.operations)
-        by = rng.uniform(-gap, gap, 3)
-        operation = (
-            lambda: trial.translate(by),
-            lambda: trial.rotate(rng.uniform(-1.0, 1.0, 3)),
-            lambda: trial.scale(np.exp(rng.uniform(-0.7, 0.7, 3))),
-            lambda: trial.shear(xy=rng.uniform(-0.5, 0.5), zx=rng.uniform(-0.5, 0.5)),
-            lambda: trial.move_corner(int(rng.integers(8)), 0.3 * by),
-            lambda: trial.move_edge((2, 6), 0.3 * by),
-            lambda: trial.move_face("-y", 0.3 * by),
-        )[kind]
-        try:
-            after = operation().operations[-1]
-        except ValueError:
-            continue
-        edit = edit.then(after.part(fold_free * edit.safe_fraction(after)))
+        operation = random_operation(rng, kind, gap)
+        if _is_valid(operation, 1.0, edit.deformed):
+            edit = edit.then(operation.part(fold_free * edit.safe_fraction(operation)))
     return edit
+
+
+def random_operation(rng: np.random.Generator, kind: int, reach: float) -> Operation:
+    """An operation of one of the seven kinds, with moves of at most `reach` along each axis."""
+    by = rng.uniform(-reach, reach, 3)
+    little = displacement(0.3 * by, "by")
+    choices: list[Operation] = [
+        Translate(displacement(by, "by")),
+        Rotate.from_radians(rng.uniform(-1.0, 1.0, 3)),
+        Scale.of(np.exp(rng.uniform(-0.7, 0.7, 3))),
+        Shear(xy=rng.uniform(-0.5, 0.5), zx=rng.uniform(-0.5, 0.5)),
+        MoveCorner(int(rng.integers(8)), little),
+        MoveEdge((2, 6), little),
+        MoveFace("-y", little),
+    ]
+    return choices[kind]
 
 
 def can_be_evaluated(edit: Edit) -> bool:

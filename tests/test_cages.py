@@ -27,7 +27,8 @@ def test_corner_order_is_that_of_vtk_voxels() -> None:
 def test_rotation_is_intrinsic_xyz_and_right_handed() -> None:
     theta = (0.3, -0.7, 1.1)
     turned = Cage.box((1, 2, 3), (1, 2, 3), theta)
-    expected = Rotation.from_euler("XYZ", theta).apply((hexahedron.BITS - 0.5) * (1, 2, 3)) + (1, 2, 3)
+    offsets = (hexahedron.BITS - 0.5) * (1, 2, 3)
+    expected = np.array((1, 2, 3)) + Rotation.from_euler("XYZ", theta).apply(offsets)
     np.testing.assert_allclose(turned.corners, expected, atol=1e-14)
     np.testing.assert_allclose(Cage.box((1, 2, 3), (1, 2, 3)).rotate(theta).corners, expected, atol=1e-14)
     # x turns towards y about +z: a left-handed R_z, as printed in the paper, would turn it towards -y.
@@ -158,7 +159,7 @@ def test_impossible_cages(corners: object, message: str) -> None:
 
 
 def test_inside_out_cages_name_the_corner() -> None:
-    with pytest.raises(CageError, match="inside out at corner 7 .*move corner 7 back"):
+    with pytest.raises(CageError, match=r"inside out at corner 7 .*move corner 7 back"):
         Cage.box((0, 0, 0), 1).move_corner(7, (-2, -2, -2))
     # Positive determinants at all eight corners (at least 0.39) do not make a cage valid.
     tangled = [

@@ -249,7 +249,7 @@ def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
     )
     with pytest.raises(EditError, match=message):
         edit.check()
-    with pytest.raises(EditError, match="inner corner . at .* is 0.2 outside face -z; enlarge"):
+    with pytest.raises(EditError, match=r"inner corner . at .* is 0.2 outside face -z; enlarge"):
         Edit(INNER.translate((0, 0, -0.7)), OUTER).check()
     with pytest.raises(EditError, match="is folded before any operation, at side -z: leave a gap"):
         Edit(INNER.translate((0, 0, -0.5)), OUTER).translate((0, 0, 0.1)).check()

@@ -259,10 +259,10 @@ def test_errors_in_json(text: str, message: str) -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(EditFileError, match="none.yaml: cannot be read .No such file"):
+    with pytest.raises(EditFileError, match=r"none.yaml: cannot be read .No such file"):
         load_edits(tmp_path / "none.yaml")
     with pytest.raises(
-        EditFileError, match='an edit file ends in .yaml, .yml or .json, got ".txt"; rename it'
+        EditFileError, match=r'an edit file ends in .yaml, .yml or .json, got ".txt"; rename it'
     ):
         load_edits(tmp_path / "edits.txt")
     (tmp_path / "latin.yaml").write_bytes(b"name: \xff")

@@ -17,8 +17,8 @@ def test_inverse_is_that_of_an_independent_map(cage: Cage, seed: int) -> None:
     p = np.stack([trilinear(cage.corners, u) for u in truth])
     u, found = hexahedron.inverse(cage.corners, p)
     assert found.all()
+    scale = np.linalg.inv(cage.affine[0])
     for k in range(len(p)):
-        scale = np.linalg.inv(cage.affine[0])
         solved = root(lambda v, k=k: scale @ (trilinear(cage.corners, v) - p[k]), truth[k], tol=1e-14).x
         # Rounding of x, 1e-15 of the cage's distance from the origin, amplified by the inverse Jacobian.
         J = hexahedron.jacobian(cage.corners, truth[k : k + 1])[0]

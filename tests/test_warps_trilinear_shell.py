@@ -23,7 +23,7 @@ def shell_of(edit: Edit) -> TrilinearShell:
 
 
 def sampled(shell: TrilinearShell, seed: int, n: int = 40) -> tuple[Array, Array, Array, Array]:
-    """Deformed and canonical points [6n,3] of the same u [6n,3], and the sides [6n], by the plain definition."""
+    """Deformed and canonical points [6n,3] of the same u [6n,3], and the sides [6n], by definition."""
     rng = np.random.default_rng(seed)
     u = rng.random((6 * n, 3))
     side = np.repeat(np.arange(6), n)

@@ -166,14 +166,12 @@ class Edit:
         A continuous edit's inner cage must lie in its outer cage, before and after the operations, and its
         shell must not fold (unless `allow_folding`).
         """
-        if self.adjustment == "discrete" or self.outer is None:
-            return
-        start = self._problem(self.inner)
-        if start is not None:
-            raise self._error(start.message + start.cure)
-        problem = self._problem(self.deformed)
-        if problem is not None:
-            raise self._error(problem.message + self._safe_part() + problem.cure)
+        if not self._is_safe(self.inner):
+            message, cure = self._problem(self.inner)
+            raise self._error(message + cure)
+        if not self._is_safe(self.deformed):
+            message, cure = self._problem(self.deformed)
+            raise self._error(message + self._safe_part() + cure)
 
     def safe_fraction(self, operation: Operation | None = None) -> float:
         """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
@@ -200,7 +198,7 @@ class Edit:
 
         def safe(t: float) -> bool:
             try:
-                return self._problem(operation.part(t).apply(cage)) is None
+                return self._is_safe(operation.part(t).apply(cage))
             except CageError:
                 return False
 
@@ -210,36 +208,38 @@ class Edit:
         """What is still safe of the operation after which the edit never recovered, as a clause."""
         for number in range(len(self.operations), 0, -1):
             before = self.replace(operations=self.operations[: number - 1])
-            if before._problem(before.deformed) is None:
+            if before._is_safe(before.deformed):
                 operation = self.operations[number - 1]
                 share = _share(before._largest_part(operation))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 
-    def _problem(self, deformed: Cage) -> _Problem | None:
-        """Why the edit cannot be evaluated with its inner cage at `deformed`, or None."""
+    def _is_safe(self, deformed: Cage) -> bool:
+        """True where the edit can be evaluated with its inner cage at `deformed`."""
         if self.adjustment == "discrete" or self.outer is None:
-            return None
-        inside = self.outer.contains(deformed.corners)
-        if not inside.all():
-            distances = [outside_by(self.outer, corner) for corner in deformed.corners]
-            k = max(np.flatnonzero(~inside), key=lambda corner: distances[corner][1])
-            face, distance = distances[k]
-            return _Problem(
-                f"outer cage must contain the inner cage: inner corner {k} at"
-                f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
-                '; enlarge the outer cage or use adjustment="discrete"',
-            )
-        if self.allow_folding:
-            return None
-        problem = self._shell(deformed).problem()
-        if problem is None:
-            return None
-        return _Problem(
-            f"the {self.shell} shell {problem}",
-            '; reduce it, enlarge the outer cage, or use adjustment="discrete"'
-            if deformed is not self.inner
-            else "",
+            return True
+        if not self.outer.contains(deformed.corners).all():
+            return False
+        return self.allow_folding or self._shell(deformed).problem() is None
+
+    def _problem(self, deformed: Cage) -> tuple[str, str]:
+        """(what is wrong, the cure) with the inner cage at a `deformed` that is not safe."""
+        if self.outer is not None:
+            outside = np.flatnonzero(~self.outer.contains(deformed.corners))
+            if len(outside):
+                face, distance, k = max(
+                    ((*outside_by(self.outer, deformed.corners[k]), int(k)) for k in outside),
+                    key=lambda item: item[1],
+                )
+                return (
+                    f"outer cage must contain the inner cage: inner corner {k} at"
+                    f" {format_vector(deformed.corners[k])} is {distance:.3g} outside face {face}",
+                    '; enlarge the outer cage or use adjustment="discrete"',
+                )
+        cure = '; reduce it, enlarge the outer cage, or use adjustment="discrete"'
+        return (
+            f"the {self.shell} shell {self._shell(deformed).problem()}",
+            "" if deformed is self.inner else cure,
         )
 
     def _shell(self, deformed: Cage) -> Shell:
@@ -277,12 +277,6 @@ class Edit:
 
     def _error(self, message: str) -> EditError:
         return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")
-
-
-@dataclass(frozen=True)
-class _Problem:
-    message: str
-    cure: str
 
 
 def _is_valid(operation: Operation, t: float, cage: Cage) -> bool:
