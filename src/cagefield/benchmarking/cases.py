@@ -18,8 +18,8 @@ from cagefield.edits import EditStack
 from cagefield.edits.files import parse_edits
 from cagefield.errors import CagefieldError
 
-WEIGHT_CENTER = (-0.6413, 0.0, 0.1461)
-PINECONE_CENTER = (0.419, -0.3, -0.2135)
+WEIGHT_CENTER = (-0.6493, 0.0, 0.142)
+PINECONE_CENTER = (0.419, -0.3, -0.2035)
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,11 @@ class Case:
     scene: str
     name: str
     moved: Callable[[ProceduralScene], ProceduralScene] | None = None
-    named_file: str | None = None
 
     @property
     def file(self) -> str:
         """Name of the edit file."""
-        return self.named_file or f"{self.scene}_{self.name}.yaml"
+        return f"{self.scene}_{self.name}.yaml"
 
     @property
     def text(self) -> str:
@@ -61,9 +60,9 @@ class Case:
 
 
 CASES = (
-    Case("digger", "raise_arm", named_file="digger.yaml"),
+    Case("digger", "raise_arm"),
     Case("digger", "move_cone", lambda s: s.move("cone", translate=(0, -0.97, 0))),
-    Case("digger", "copy_cone", lambda s: s.duplicate("cone", translate=(-1.4, 0, 0))),
+    Case("digger", "copy_cone", lambda s: s.duplicate("cone", translate=(-1.42, -1.03, 0))),
     Case("digger", "delete_bucket", lambda s: s.remove("bucket")),
     Case("chair", "lower_wider"),
     Case("chair", "move_arm_rest", lambda s: s.move("arm rest left", translate=(0, 0.3, 0))),
@@ -88,7 +87,7 @@ CASES = (
     Case(
         "plant",
         "copy_pinecone",
-        lambda s: s.duplicate("pinecone", translate=(0.05, 0.68, -0.0586), scale=0.75, pivot=PINECONE_CENTER),
+        lambda s: s.duplicate("pinecone", translate=(0.05, 0.68, -0.0611), scale=0.75, pivot=PINECONE_CENTER),
     ),
     Case("plant", "delete_flower", lambda s: s.remove("flower")),
 )

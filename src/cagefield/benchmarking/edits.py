@@ -37,6 +37,10 @@ _COLUMNS = (
     "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
     "there carried", "frame time",
 )  # fmt: skip
+_SHOWN = (
+    "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there unedited", "there edited", "there lost",
+    "frame time",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -111,7 +115,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         f"{config.resolution} voxels along the longest axis.",
         "PSNR (dB) and SSIM: mean over test views, never trained on; unedited: the trained field against "
         "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
-        "Truth: photos of the scene whose part was really moved, with the light as it then falls; for "
+        "Truth: photos of the scene whose part was really moved, with the light as it then falls "
+        "(ambient occlusion stays as modelled); for "
         "continuous edits the scene's model seen through the edit's exact map, at "
         f"{settings.exact_size}x{settings.exact_size} pixels, the unedited field against the unedited model.",
         "There: on the pixels that the edit changes in truth, and a margin of a 100th of the width; if left: "
@@ -134,6 +139,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         rows,
         (*explained, *notes),
         names=4,
+        shown=_SHOWN,
     )
 
 

@@ -14,6 +14,8 @@ from cagefield.rendering.images import replaced_whole
 class Table:
     """Text cells by row, with a title and notes; the first `names` columns are set left, the others right.
 
+    `shown` are the columns that fit a screen; all of them where left out.
+
     Raises:
         CagefieldError: a row with another number of cells than there are columns.
     """
@@ -23,6 +25,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
     names: int = 1
+    shown: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for number, row in enumerate(self.rows, start=1):
@@ -39,15 +42,16 @@ class Table:
         return "\n".join([*lines, *(f"- {note}" for note in self.notes)]).rstrip() + "\n"
 
     def show(self) -> None:
-        """Prints the table."""
+        """Prints the columns that fit a screen, and the notes."""
         from rich.console import Console
         from rich.table import Table as Grid
 
         grid = Grid(title=self.title)
-        for index, column in enumerate(self.columns):
-            grid.add_column(column, justify="left" if index < self.names else "right")
+        chosen = [i for i, column in enumerate(self.columns) if not self.shown or column in self.shown]
+        for index in chosen:
+            grid.add_column(self.columns[index], justify="left" if index < self.names else "right")
         for row in self.rows:
-            grid.add_row(*row)
+            grid.add_row(*(row[index] for index in chosen))
         console = Console()
         console.print(grid)
         for note in self.notes:
