@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
-from hypothesis import assume
+from hypothesis import assume, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -25,6 +27,12 @@ from cagefield.errors import CageError, EditError
 Array = NDArray[np.float64]
 
 seeds = st.integers(0, 2**32 - 1)
+
+
+def examples(count: int) -> settings:
+    """Settings for a property test: always the same examples, times CAGEFIELD_EXAMPLES if that is set."""
+    times = int(os.environ.get("CAGEFIELD_EXAMPLES", "1"))
+    return settings(max_examples=count * times, deadline=None, derandomize=True)
 
 
 @st.composite

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from scipy.spatial.transform import Rotation
 
 from cagefield import hexahedron
 from cagefield.cages import Cage, outside_by
 from cagefield.errors import CageError
-from random_cages import cages, seeds
+from random_cages import cages, examples, seeds
 
 
 def skewed() -> Cage:
@@ -104,7 +104,7 @@ def test_contains_agrees_with_half_spaces_where_faces_are_planar() -> None:
     assert np.array_equal(cage.contains(p), expected)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(cages(), seeds)
 def test_contains_the_points_of_bilinear_hexahedra_and_no_others(cage: Cage, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -121,7 +121,7 @@ def test_contains_the_points_of_bilinear_hexahedra_and_no_others(cage: Cage, see
     assert not cage.contains(cage.center + 100.0 * rng.normal(size=(50, 3))).any()
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(cages(), seeds)
 def test_determinant_polynomial(cage: Cage, seed: int) -> None:
     bernstein = hexahedron.determinant_coefficients(cage.corners)

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Rotate, Scale, Shear, Translate
 from cagefield.errors import EditError
-from random_cages import edits, seeds, unit_vectors
+from random_cages import edits, examples, seeds, unit_vectors
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 AXES = np.eye(3)
@@ -22,7 +22,7 @@ def continuous() -> Edit:
     return Edit(INNER, OUTER).rotate((0.2, 0.1, 0.3)).move_corner(7, (0.1, 0.1, 0.05))
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(), seeds)
 def test_regions_of_a_continuous_edit(edit: Edit, seed: int) -> None:
     assert edit.outer is not None

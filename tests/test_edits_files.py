@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Rotate, dump_edits, files, load_edits, parse_edits, save_edits
 from cagefield.errors import EditFileError
-from random_cages import edits, seeds
+from random_cages import edits, examples, seeds
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 
@@ -64,7 +64,7 @@ def test_every_key() -> None:
     assert cornered == Edit.delete(Cage(INNER.corners))
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(), seeds, st.sampled_from(["yaml", "json"]), st.booleans())
 def test_round_trips_are_exact(edit: Edit, seed: int, kind: str, discrete: bool) -> None:
     rng = np.random.default_rng(seed)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from cagefield import devices
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
-from random_cages import edits, seeds, unit_vectors
+from random_cages import edits, examples, seeds, unit_vectors
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.1, 0.1, -0.05))
@@ -87,7 +87,7 @@ def test_stacks_against_the_reference(name: str) -> None:
     compare(EditStack(STACKS[name]), *samples(4000))
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(fold_free=0.9), seeds)
 def test_random_edits_against_the_reference(edit: Edit, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -1,16 +1,16 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from scipy.optimize import root
 
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.warps.hexahedron import HexahedronMap
-from random_cages import cages, seeds, trilinear
+from random_cages import cages, examples, seeds, trilinear
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(cages(), seeds)
 def test_inverse_is_that_of_an_independent_map(cage: Cage, seed: int) -> None:
     truth = np.random.default_rng(seed).random((20, 3))
@@ -27,7 +27,7 @@ def test_inverse_is_that_of_an_independent_map(cage: Cage, seed: int) -> None:
         assert np.abs(u[k] - truth[k]).max() < tolerance
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(cages(), seeds)
 def test_inverse_finds_every_point_of_the_cage(cage: Cage, seed: int) -> None:
     u = np.random.default_rng(seed).random((2000, 3))
@@ -67,7 +67,7 @@ def test_invert_matches_lapack() -> None:
     np.testing.assert_allclose(hexahedron.invert(M) / scale, expected / scale, atol=1e-12)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(cages(), cages(), seeds)
 def test_map_between_cages(canonical: Cage, deformed: Cage, seed: int) -> None:
     u = np.random.default_rng(seed).random((100, 3))

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
@@ -12,7 +12,7 @@ from cagefield.edits.edit import Edit
 from cagefield.hexahedron import Array
 from cagefield.warps.hexahedron import HexahedronMap
 from cagefield.warps.trilinear_shell import SIDES, TrilinearShell
-from random_cages import edits, seeds, trilinear
+from random_cages import edits, examples, seeds, trilinear
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 
@@ -55,7 +55,7 @@ def test_hexahedra_join_faces_of_the_same_side() -> None:
         Cage(corners)  # valid: right-handed and not inside out
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(), seeds)
 def test_both_maps_against_the_definition(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -70,7 +70,7 @@ def test_both_maps_against_the_definition(edit: Edit, seed: int) -> None:
     np.testing.assert_allclose(J_back @ J, np.tile(np.eye(3), (len(J), 1, 1)), atol=1e-9 * amplified.max())
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(edits(fold_free=0.99), seeds)
 def test_inverse_against_scipy(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -84,7 +84,7 @@ def test_inverse_against_scipy(edit: Edit, seed: int) -> None:
         assert np.abs(q[k] - reference).max() < 1e-12 * (10.0 + amplified[k])
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(), seeds)
 def test_continuous_across_every_face(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -110,7 +110,7 @@ def test_continuous_across_every_face(edit: Edit, seed: int) -> None:
         assert (np.abs(p[on_outer] - expected[on_outer]).max(axis=1) < tolerance[on_outer]).all()
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(), seeds)
 def test_jacobian_against_finite_differences(edit: Edit, seed: int) -> None:
     shell = shell_of(edit)
@@ -129,7 +129,7 @@ def test_jacobian_against_finite_differences(edit: Edit, seed: int) -> None:
     assert (np.abs(J - slope).max(axis=(1, 2)) < 1e-8 + 1e-10 * amplified[deep] ** 5).all()
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(edits(fold_free=1.0))
 def test_least_ratio_against_a_dense_sample(edit: Edit) -> None:
     shell = shell_of(edit)

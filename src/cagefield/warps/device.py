@@ -40,7 +40,9 @@ CONTINUOUS = 8  # 1, or 0 for a discrete edit
 RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly
 OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no further than 2^24
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
-RECORDS = 24
+NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
+SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
+RECORDS = 32
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
@@ -97,9 +99,13 @@ class DeviceStack:
         offset = 0
         for row, edit in zip(params, edits, strict=False):
             _pack(row, edit)
-            if edit.lattice is not None and isinstance(edit.exact_warp, ContinuousWarp):
+            warp = edit.exact_warp
+            if edit.lattice is not None and isinstance(warp, ContinuousWarp):
                 nodes = _lattice(edit, row)
                 row[RESOLUTION] = edit.lattice
+                row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
+                row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
+                row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
                 row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
                 offset += len(nodes)
                 lattices.append(nodes)
@@ -148,34 +154,51 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     first = qd.cast(params[e, FIRST], qd.i32)
     last = qd.cast(params[e, LAST], qd.i32)
     resolution = qd.cast(params[e, RESOLUTION], qd.i32)
+    continuous = params[e, CONTINUOUS] > 0.5
     emptied = 0
+    use_lattice = 0
     hit = -1
     best = 1e30
     at = vec3(0.0, 0.0, 0.0)
-    use_lattice = 0
-    for h in range(first, last):
-        xi, error = locate(p, params, e, RECORDS + h * RECORD)
-        if h >= 2:
-            if error < best:
-                best = error
-                hit = h
-                at = xi
-            if error <= EDGE:
-                break
-        elif h == 0:
-            if error <= EDGE:
-                hit = 0
-                at = xi
-                break
-        else:
-            inside = error <= EDGE
-            if params[e, CONTINUOUS] < 0.5:
-                emptied = qd.cast(inside, qd.i32)
-            elif not inside:
-                break
-            elif resolution > 0:
-                use_lattice = 1
-                break
+    if params[e, SIMPLE] > 0.5:
+        y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTRE))
+        if qd.abs(y).max() <= 1.0 + EDGE:
+            hit = 0
+            at = qd.max(qd.min(y, 1.0), -1.0)
+        elif in_box(to_nodes(p, params, e), params, e, NODE_BOX):
+            use_lattice = 1
+    else:
+        guess = 2
+        for n in range(first, last):
+            # The sides of the shell are gone through from the one that p most likely lies in.
+            h = n
+            if n == 2:
+                guess = likely_side(p, params, e)
+                h = guess
+            elif n > 2 and n <= guess:
+                h = n - 1
+            xi, error = locate(p, params, e, RECORDS + h * RECORD)
+            if n >= 2:
+                if error < best:
+                    best = error
+                    hit = h
+                    at = xi
+                if error <= EDGE:
+                    break
+            elif n == 0:
+                if error <= EDGE:
+                    hit = 0
+                    at = xi
+                    break
+            else:
+                inside = error <= EDGE
+                if not continuous:
+                    emptied = qd.cast(inside, qd.i32)
+                elif not inside:
+                    break
+                elif resolution > 0:
+                    use_lattice = 1
+                    break
     q = p
     v = d
     if use_lattice == 1:
@@ -183,6 +206,30 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
+
+
+@qd.func
+def likely_side(p: vec3, params: qd.template(), e: qd.i32):
+    """The record of the shell's side that p would lie in if the cages were concentric boxes."""
+    y = times(params, e, RECORDS + MATRIX, p - read3(params, e, RECORDS + CENTRE))
+    size = qd.abs(y)
+    side = 0
+    value = y.x
+    if size.y > size.x and size.y >= size.z:
+        side = 2
+        value = y.y
+    elif size.z > size.x:
+        side = 4
+        value = y.z
+    if value < 0.0:
+        side += 1
+    return 2 + side
+
+
+@qd.func
+def to_nodes(p: vec3, params: qd.template(), e: qd.i32):
+    """p in units of the lattice's nodes."""
+    return times(params, e, TO_NODES + 3, p - read3(params, e, TO_NODES))
 
 
 @qd.func
@@ -297,7 +344,7 @@ def interpolate(
     p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, resolution: qd.i32
 ):
     """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
-    g = times(params, e, TO_NODES + 3, p - read3(params, e, TO_NODES))
+    g = to_nodes(p, params, e)
     s = times(params, e, TO_NODES + 3, d)
     top = qd.cast(resolution - 1, qd.f32)
     g = qd.max(qd.min(g, top), 0.0)
