@@ -81,7 +81,7 @@ sys.exit(code)
     assert lines[-1] == "loaded"
     # measured 0.4 s on a quiet machine; 2 s is room for a busy one
     assert float(lines[-2].split()[1]) < 2.0
-    for command in ("demo", "make-scene", "train", "edit", "render", "info"):
+    for command in ("demo", "make-scene", "train", "edit", "render", "info", "bench"):
         assert command in done.stdout
 
 
