@@ -101,13 +101,19 @@ def _warnings_in_one_line() -> Iterator[None]:
 
 
 def _without_box(text: str) -> str:
-    """tyro's framed message as one line: title, message, hint."""
-    lines = []
+    """tyro's framed message as one line: its paragraphs, with the title where they do not repeat it."""
+    paragraphs = [""]
+    title = ""
     for line in text.splitlines():
         words = line.strip("─╭╮╰╯│ ")
-        if words:
-            lines.append(words)
-    return ". ".join(lines[:1]) + ": " + " ".join(lines[1:]) if len(lines) > 1 else " ".join(lines)
+        if line.startswith("╭"):
+            title = words
+        elif words:
+            paragraphs[-1] += words.rstrip(".") + " "
+        elif paragraphs[-1]:
+            paragraphs.append("")
+    message = "; ".join(paragraph.strip() for paragraph in paragraphs if paragraph)
+    return message if message.lower().startswith(title.lower()) else f"{title}: {message}"
 
 
 def _refuse(message: str) -> int:
