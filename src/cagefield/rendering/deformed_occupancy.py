@@ -1,13 +1,14 @@
 """The occupancy of an edited field, in deformed space.
 
-Only the blocks that meet an edit's box are looked at again. There the edits' maps are evaluated at block
-corners (every 2 cells); a corner is occupied when the canonical field has an occupied cell within
+Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again, in two passes. A probe at a
+lattice point p maps it to canonical space and looks for an occupied cell within
 
-    r = |J|_inf * 1 cell + 1/2 cell
+    r = |J|_inf * spacing / 2
 
-of its image (L-infinity norm), which covers the images of all points nearer to it than to another corner,
-to first order. A block is occupied when one of its 8 corners is; with discrete edits, whose maps jump, when
-one of the 64 corners in or next to it is.
+of the image (L-infinity norm), which covers the images of all points nearer to p than to another lattice
+point, to first order. The first pass probes block corners (spacing 2 cells, half a cell added) against
+occupied blocks; the second probes the 27 cell corners of each block that passed (spacing 1) against the
+densities themselves. Maps of discrete edits jump: there, the first pass takes the neighbours' corners too.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -18,7 +19,16 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.grid import U8, contract_point, contract_velocity, ivec3, vec3
+from cagefield.rendering.grid import (
+    F32,
+    I32,
+    U8,
+    DeviceGrid,
+    contract_point,
+    contract_velocity,
+    ivec3,
+    vec3,
+)
 from cagefield.rendering.occupancy import BRICK, Occupancy
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
@@ -26,8 +36,9 @@ MOST_CELLS = 12.0
 """Largest r, in cells; a map that squeezes more than this looks that far only."""
 
 
-def deform(canonical: Occupancy, field: VoxelField, stack: DeviceStack, jumps: bool) -> Occupancy:
-    """The occupancy of `field` seen through the edits. `jumps` says that an edit is discrete."""
+def deform(canonical: Occupancy, grid: DeviceGrid, stack: DeviceStack, jumps: bool) -> Occupancy:
+    """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete."""
+    field = grid.field
     if stack.n_edits == 0:
         return canonical
     boxes = np.stack([_grid_box(field, box) for box in stack.boxes.astype(np.float64)])
@@ -56,6 +67,10 @@ def deform(canonical: Occupancy, field: VoxelField, stack: DeviceStack, jumps: b
     for axis in range(3):
         n = near.shape[axis]
         near = np.take(near, range(n - 1), axis) | np.take(near, range(1, n), axis)
+    near &= touched
+    candidates = np.argwhere(near).astype(np.int32)
+    if len(candidates):
+        near[tuple(candidates.T)] = _refined(candidates, grid, stack, lower)
     at = (lower - first) // 2
     region = tuple(slice(a, a + n) for a, n in zip(at, count, strict=True))
     blocks[region] = np.where(touched, near, blocks[region])
@@ -77,11 +92,6 @@ def _corners(
 ) -> NDArray[np.bool_]:
     """Occupied block corners [count], the first at grid coordinates `lower`."""
     out = np.zeros(int(np.prod(count)), np.uint8)
-    n = np.array(field.resolution)
-    if field.contracted:
-        origin, scale = field.center, 1.0 / field.half_size
-    else:
-        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
     _occupied_corners(
         out,
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
@@ -89,15 +99,44 @@ def _corners(
         ivec3(*canonical.origin.tolist()),
         ivec3(*lower.tolist()),
         ivec3(*count.tolist()),
-        vec3(*origin.tolist()),
-        vec3(*scale.tolist()),
-        vec3(*((n - 1) / 4).tolist()),
+        *_transform(field),
         stack.params,
         stack.lattice,
         stack.n_edits,
         int(field.contracted),
     )
     return out.reshape(tuple(count)).astype(bool)
+
+
+def _refined(
+    candidates: NDArray[np.int32], grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Which of the candidate blocks [C,3], counted from grid coordinates `lower`, are occupied."""
+    out = np.zeros(len(candidates), np.uint8)
+    _occupied_blocks(
+        out,
+        np.ascontiguousarray(candidates).reshape(-1),
+        ivec3(*lower.tolist()),
+        grid.index,
+        grid.density,
+        ivec3(*grid.field.resolution),
+        *_transform(grid.field),
+        stack.params,
+        stack.lattice,
+        stack.n_edits,
+        int(grid.field.contracted),
+    )
+    return out.astype(bool)
+
+
+def _transform(field: VoxelField) -> tuple[vec3, vec3, vec3]:
+    """Origin, scale and half as in `cagefield.rendering.march`."""
+    n = np.array(field.resolution)
+    if field.contracted:
+        origin, scale = field.center, 1.0 / field.half_size
+    else:
+        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
+    return vec3(*origin.tolist()), vec3(*scale.tolist()), vec3(*((n - 1) / 4).tolist())
 
 
 @qd.func
@@ -108,6 +147,51 @@ def uncontract_point(c: vec3):
     if m > 1.0:
         scale = m / qd.abs(c).max() / (m * (2.0 - m))
     return c * scale
+
+
+@qd.func
+def probe(
+    g: vec3,
+    origin: vec3,
+    scale: vec3,
+    half: vec3,
+    params: qd.template(),
+    lattice: qd.template(),
+    n_edits: qd.i32,
+    contracted: qd.i32,
+):
+    """(image, reach, empty) of grid coordinates g: image in grid coordinates, reach = row sums of |J|."""
+    p = vec3(0.0, 0.0, 0.0)
+    c = g / half - 2.0
+    if contracted == 1:
+        p = uncontract_point(c) / scale + origin
+    else:
+        p = g / scale + origin
+    reach = vec3(0.0, 0.0, 0.0)
+    image = g
+    empty = 0
+    for a in range(3):
+        # One cell along grid axis a, as a world-space displacement.
+        e = vec3(0.0, 0.0, 0.0)
+        if a == 0:
+            e.x = 1.0
+        elif a == 1:
+            e.y = 1.0
+        else:
+            e.z = 1.0
+        d = e / scale
+        if contracted == 1:
+            d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
+        length = qd.max(d.norm(), 1e-20)
+        q, v, stretch, emptied = map_sample(p, d / length, params, lattice, n_edits)
+        empty = emptied
+        along = v * stretch * length * scale
+        image = (q - origin) * scale
+        if contracted == 1:
+            along = contract_velocity(image, along) * half
+            image = (contract_point(image) + 2.0) * half
+        reach += qd.abs(along)
+    return image, reach, empty
 
 
 @qd.kernel
@@ -131,36 +215,7 @@ def _occupied_corners(
         j = (n // count.z) % count.y
         k = n % count.z
         g = qd.cast(lower + 2 * ivec3(i, j, k), qd.f32)
-        p = vec3(0.0, 0.0, 0.0)
-        c = g / half - 2.0
-        if contracted == 1:
-            p = uncontract_point(c) / scale + origin
-        else:
-            p = g / scale + origin
-        reach = vec3(0.0, 0.0, 0.0)
-        image = g
-        empty = 0
-        for a in range(3):
-            # One cell along grid axis a, as a world-space displacement.
-            e = vec3(0.0, 0.0, 0.0)
-            if a == 0:
-                e.x = 1.0
-            elif a == 1:
-                e.y = 1.0
-            else:
-                e.z = 1.0
-            d = e / scale
-            if contracted == 1:
-                d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
-            length = qd.max(d.norm(), 1e-20)
-            q, v, stretch, emptied = map_sample(p, d / length, params, lattice, n_edits)
-            empty = emptied
-            along = v * stretch * length * scale
-            image = (q - origin) * scale
-            if contracted == 1:
-                along = contract_velocity(image, along) * half
-                image = (contract_point(image) + 2.0) * half
-            reach += qd.abs(along)
+        image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted)
         found = 0
         if empty == 0:
             r = qd.min(reach + 0.5, MOST_CELLS)
@@ -175,3 +230,40 @@ def _occupied_corners(
                 x += 1
         out[n] = qd.cast(found, qd.u8)
 
+
+@qd.kernel
+def _occupied_blocks(
+    out: U8,
+    candidates: I32,
+    lower: ivec3,
+    index: I32,
+    density: F32,
+    resolution: ivec3,
+    origin: vec3,
+    scale: vec3,
+    half: vec3,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    contracted: qd.i32,
+):
+    for n in range(out.shape[0]):
+        block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
+        found = 0
+        k = 0
+        while k < 27 and found == 0:
+            g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
+            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted)
+            if empty == 0:
+                r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
+                first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
+                last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+                x = first.x
+                while x <= last.x and found == 0:
+                    for y in range(first.y, last.y + 1):
+                        for z in range(first.z, last.z + 1):
+                            if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                                found = 1
+                    x += 1
+            k += 1
+        out[n] = qd.cast(found, qd.u8)

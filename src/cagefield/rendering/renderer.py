@@ -66,7 +66,7 @@ class Renderer:
 
         stack = DeviceStack.from_stack(self.edits)
         jumps = any(edit.adjustment == "discrete" for edit in self.edits.active)
-        self._occupancy = deform(self._canonical, self.field, stack, jumps)
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps)
         self._codes = to_device(self._occupancy.codes)
         self._stack = stack
         self._boxes = to_device(stack.boxes.astype(np.float32))
