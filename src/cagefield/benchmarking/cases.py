@@ -29,11 +29,12 @@ class Case:
     scene: str
     name: str
     moved: Callable[[ProceduralScene], ProceduralScene] | None = None
+    named_file: str | None = None
 
     @property
     def file(self) -> str:
         """Name of the edit file."""
-        return f"{self.scene}_{self.name}.yaml"
+        return self.named_file or f"{self.scene}_{self.name}.yaml"
 
     @property
     def text(self) -> str:
@@ -47,20 +48,15 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """What the edits are: move, copy, delete or continuous."""
-        kinds = []
-        for edit in self.edits:
-            if edit.deleted:
-                kinds.append("delete")
-            elif edit.adjustment == "continuous":
-                kinds.append("continuous")
-            else:
-                kinds.append("copy" if edit.keep_source else "move")
-        return ", ".join(dict.fromkeys(kinds))
+        """What the edits are: continuous where one of them is, else what the first does."""
+        if any(edit.adjustment == "continuous" for edit in self.edits):
+            return "continuous"
+        first = self.edits[0]
+        return "delete" if first.deleted else "copy" if first.keep_source else "move"
 
 
 CASES = (
-    Case("digger", "raise_arm"),
+    Case("digger", "raise_arm", named_file="digger.yaml"),
     Case("digger", "move_cone", lambda s: s.move("cone", translate=(0, -0.97, 0))),
     Case("digger", "copy_cone", lambda s: s.duplicate("cone", translate=(-1.42, -1.03, 0))),
     Case("digger", "delete_bucket", lambda s: s.remove("bucket")),

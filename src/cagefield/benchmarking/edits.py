@@ -38,8 +38,8 @@ _COLUMNS = (
     "there carried", "frame time",
 )  # fmt: skip
 _SHOWN = (
-    "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there unedited", "there edited", "there lost",
-    "frame time",
+    "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there unedited", "there edited",
+    "there lost", "frame time",
 )  # fmt: skip
 
 
