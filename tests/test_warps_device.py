@@ -151,6 +151,19 @@ def test_boxes() -> None:
     assert empty.n_edits == 0 and empty.boxes.shape == (0, 2, 3)
 
 
+@pytest.mark.parametrize("turn", [1.0, np.pi])
+def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
+    from cagefield.warps.device import DeviceStack
+
+    folded = EditStack([Edit(INNER, OUTER, allow_folding=True).rotate((0, 0, turn))])
+    p, d = samples(5000)
+    points, viewdirs, stretch, _ = DeviceStack.from_stack(folded).to_canonical(p, d)
+    assert np.isfinite(points).all() and np.isfinite(viewdirs).all() and np.isfinite(stretch).all()
+    # Whatever sheet is shown, it is one of the outer cage's.
+    within = OUTER.contains(p)
+    assert (np.abs(points[within]) <= 0.8 + 1e-5).all() and np.array_equal(points[~within], p[~within])
+
+
 def test_lattices_are_kept_with_their_edit() -> None:
     from cagefield.warps import device
 

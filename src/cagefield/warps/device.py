@@ -109,9 +109,14 @@ class DeviceStack:
                 row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
                 offset += len(nodes)
                 lattices.append(nodes)
-        nodes = np.concatenate(lattices) if lattices else np.zeros((1, 3), dtype=np.float32)
-        boxes = [np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits]
-        return cls(params, nodes, len(edits), np.concatenate(boxes).astype(np.float32))
+        nodes = np.zeros((1, 3), dtype=np.float32)
+        if lattices:
+            nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
+        boxes = np.concatenate([np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits])
+        packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
+        for array in (packed.params, packed.lattice, packed.boxes):
+            array.setflags(write=False)
+        return packed
 
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
