@@ -173,3 +173,12 @@ def test_bad_options_are_refused(
 def test_one_picture_needs_one_view(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     error = refused(capsys, "render", scene, "-o", tmp_path / "one.png")
     assert "is one picture, the views are 2" in error
+
+
+def test_edits_that_fold_are_refused(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    inner = Cage.box((0, 0, 0), 1.2)
+    twisted = Edit(inner, inner.grown(0.5), name="twist").rotate((0, 0, 1.5))
+    Scene.open(scene).with_edits(EditStack([twisted])).save(tmp_path / "folded")
+    error = refused(capsys, "render", tmp_path / "folded", "-o", tmp_path / "out")
+    assert 'edit "twist"' in error and "is safe" in error
+    assert not (tmp_path / "out").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -119,7 +120,18 @@ def test_demo_runs_the_whole_chain(tmp_path: Path, capsys: pytest.CaptureFixture
     # The arm is in the right half of the picture; the tracks and the plate on the left stay as they are.
     assert changed[:, 240:].mean() > 0.02 and changed[300:, :200].mean() < 1e-3
     edited = Scene.open(out / "edited")
-    assert [edit.name for edit in edited.edits] == ["raise the arm"]
+    assert [edit.name for edit in edited.edits] == ["clear the gap under the bucket", "raise the arm"]
     before_files = files_of(tmp_path)
     assert "give a new one, or --overwrite" in refused(capsys, *argv)
     assert files_of(tmp_path) == before_files
+
+
+def test_missing_photos_are_one_line_of_warning(
+    photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(photos, tmp_path / "photos")
+    (tmp_path / "photos" / "train" / "r_3.png").unlink()
+    assert main(["train", str(tmp_path / "photos"), "-o", str(tmp_path / "scene"), *QUICK]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
+    assert len(warned) == 1 and warned[0].startswith("cagefield: warning: ") and "r_3" in warned[0]
+    assert len(Scene.open(tmp_path / "scene").cameras["train"]) == 7

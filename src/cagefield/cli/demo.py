@@ -20,8 +20,10 @@ _OWN = (
     "photos", "scene", "edited", "edits.yaml",
     "before.png", "after.png", "before_after.png", "turntable.mp4",
 )  # fmt: skip
-_EYE, _TARGET, _FOV_X = (1.6, -3.5, 1.3), (0.0, 0.0, 0.05), 0.62
+_EYE, _TARGET, _FOV_X = (1.6, -3.5, 1.3), (0.05, 0.0, 0.13), 0.62
 """Where before.png and after.png are taken from: radians, world units."""
+_MARGIN = 0.05
+"""Room around the digger in the field's box, world units."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,11 +36,9 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    seconds: float = 75.0
-    """How long to train."""
-    steps: int | None = None
-    """Train this many steps instead."""
-    resolution: int = 256
+    steps: int = 1200
+    """Number of training steps."""
+    resolution: int = 192
     """Voxels along the longest axis at the end."""
     frames: int = 48
     """Number of pictures in the turntable video."""
@@ -87,16 +87,19 @@ class Demo:
             )
 
     def _train(self, folder: Path) -> tuple[Scene, str]:
+        import numpy as np
+
         from cagefield import devices
         from cagefield.cli.train import summary, train_scene
         from cagefield.datasets import load_dataset
+        from cagefield.datasets.procedural import procedural_scene
         from cagefield.training.voxel import VoxelConfig
 
         devices.start(self.device)
-        config = VoxelConfig(minutes=self.seconds / 60.0, resolution=self.resolution)
-        if self.steps is not None:
-            config = dataclasses.replace(config, minutes=None, steps=self.steps)
-        scene, result = train_scene(load_dataset(folder / "photos"), config)
+        low, high = procedural_scene("digger").bounds
+        dataset = load_dataset(folder / "photos")
+        dataset = dataclasses.replace(dataset, bounds=np.stack([low - _MARGIN, high + _MARGIN]))
+        scene, result = train_scene(dataset, VoxelConfig(steps=self.steps, resolution=self.resolution))
         scene.save(folder / "scene")
         return scene, summary(result)
 
