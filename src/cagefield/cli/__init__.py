@@ -36,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"cagefield {cagefield.__version__}")
         return 0
     try:
-        command = _parse(args or ["--help"])
+        command = parse(args or ["--help"])
         if isinstance(command, int):
             return command
         with _warnings_in_one_line():
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _parse(args: list[str]) -> Command | int:
+def parse(args: list[str]) -> Command | int:
     """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after a complaint."""
     import tyro
 
