@@ -20,6 +20,9 @@ from cagefield.errors import CameraError
 
 Floats = npt.NDArray[np.float64]
 
+_SWING = 0.8
+"""Share of the covered arc that a swing uses: the outermost cameras see less that others see too."""
+
 
 @dataclass(frozen=True)
 class CameraPath:
@@ -67,8 +70,8 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
 
     The centre is the point nearest to all optical axes (least squares), the axis of the circle their
     shared up direction. Where the cameras cover less than two thirds of the circle (a capture from one side)
-    the path swings to and fro over the arc they cover instead, and stays where the field was seen. The field
-    of view is the first camera's, along the longer side.
+    the path swings to and fro over most of the arc they cover instead, and stays where the field was seen. The
+    field of view is the first camera's, along the longer side.
 
     Raises:
         CameraError: fewer than one camera, or `n` < 1.
@@ -95,7 +98,7 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
             center, math.hypot(reach, rise), n, elevation=math.atan2(rise, reach), up=up,
             width=width, height=height, fov_x=fov_x,
         )  # fmt: skip
-    swing = arc[0] + 0.5 * arc[1] * (1.0 - np.cos(2.0 * math.pi * np.arange(n) / n))
+    swing = arc[0] + 0.5 * arc[1] * (1.0 - _SWING * np.cos(2.0 * math.pi * np.arange(n) / n))
     eyes = center + rise * up + reach * (np.cos(swing)[:, None] * x_axis + np.sin(swing)[:, None] * y_axis)
     return tuple(Camera.look_at(eye, center, up, width=width, height=height, fov_x=fov_x) for eye in eyes)
 
