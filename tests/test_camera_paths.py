@@ -129,7 +129,7 @@ def test_orbit_of_a_one_sided_capture_stays_on_its_side() -> None:
     path = orbit(seen, 24, width=40, height=30)
     angles = np.degrees([math.atan2(camera.origin[1], camera.origin[0]) for camera in path])
     assert angles.min() == pytest.approx(28, abs=1e-6) and angles.max() == pytest.approx(92, abs=1e-6)
-    # closed: the last camera is a step of the swing away from the first, whose fastest is 32 degrees * 2 pi / 24
+    # closed: no step, the one from last to first included, exceeds the fastest of 32 degrees * 2 pi / 24
     assert np.abs(np.diff(angles, append=angles[0])).max() < 32 * math.pi / 12 + 1e-9
 
 

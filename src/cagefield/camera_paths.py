@@ -70,8 +70,8 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
 
     The centre is the point nearest to all optical axes (least squares), the axis of the circle their
     shared up direction. Where the cameras cover less than two thirds of the circle (a capture from one side)
-    the path swings to and fro over most of the arc they cover instead, and stays where the field was seen. The
-    field of view is the first camera's, along the longer side.
+    the path swings to and fro over most of the arc they cover instead, and stays where the field was seen.
+    The field of view is the first camera's, along the longer side.
 
     Raises:
         CameraError: fewer than one camera, or `n` < 1.
