@@ -59,10 +59,12 @@ class VoxelConfig:
         decay: of the running curvatures, for each touch of a voxel.
         damping: added to every curvature.
         largest_step: largest change of a voxel's optical depth in one step.
-        smooth_density, smooth_colour: weights of the Laplacian regularisation.
+        smooth: weight of the Laplacian regularisation; None takes 2e-4, or 2e-3 for an unbounded capture.
         prune: vertices whose largest weight stayed under this are dropped.
         step: distance between samples, in voxels.
         distortion: weight of mip-NeRF 360's distortion loss, against floaters.
+        near: distance, relative to the cameras' median distance to the centre, within which an unbounded
+            scene is empty.
         exposure: fit a colour gain to each photo; None does so for captures without alpha.
     """
 
@@ -73,16 +75,16 @@ class VoxelConfig:
     seed: int = 0
     batch_rays: int = 4096
     patch: int = 4
-    rate: tuple[float, float] = (2.0, 0.5)
+    rate: tuple[float, float] = (4.0, 0.4)
     decay: float = 0.95
     damping: float = 0.05
     largest_step: float = 0.3
-    smooth_density: float = 2e-3
-    smooth_colour: float = 2e-3
+    smooth: float | None = None
     prune: float = 0.01
     step: float = 0.7
     exposure: bool | None = None
     distortion: float = 0.0
+    near: float = 0.15
 
     def __post_init__(self) -> None:
         limits = {
@@ -212,6 +214,7 @@ class _Run:
         self.photos = Photos.load(dataset.train)
         self.exposure = (not self.photos.has_alpha) if config.exposure is None else config.exposure
         self.contracted = dataset.unbounded
+        self.smooth = config.smooth if config.smooth is not None else (2e-3 if self.contracted else 2e-4)
         self.workers = 1 if devices.is_gpu() else devices.threads()
         self.bounds = np.array(dataset.bounds, dtype=np.float64)
         if self.contracted:
@@ -223,7 +226,7 @@ class _Run:
         keep = None
         first = self._resolution(0)
         if self.contracted:
-            self.near = 0.15 * float(np.median([np.linalg.norm(v.camera.origin - middle) for v in dataset.train]))
+            self.near = config.near * float(np.median([np.linalg.norm(v.camera.origin - middle) for v in dataset.train]))
             keep = seen(dataset.train, self.bounds, first, self.near)
         self.all_patches = self.photos.patches(config.patch)
         self.step = 0
@@ -345,7 +348,8 @@ class _Run:
         from cagefield.training import kernels
 
         config, grid, photos = self.config, self.grid, self.photos
-        count = min(len(self.patches), config.batch_rays // config.patch**2)
+        last = self.stage + 1 == len(STAGES)
+        count = min(len(self.patches), (1 + last) * config.batch_rays // config.patch**2)
         if self.position + count > len(self.patches):
             self._shuffle()
         chosen = self.patches[self.order[self.position : self.position + count]]
@@ -363,10 +367,10 @@ class _Run:
             self._scratch(count if gpu else self.workers), losses, penalties, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
             step, self.near, config.distortion, self.reach, 1, vec3(1.0, 1.0, 1.0), grid.terms, self.contracted, gpu,
         )  # fmt: skip
-        if config.smooth_density > 0 or config.smooth_colour > 0:
+        if self.smooth > 0:
             kernels.laplacian(
                 grid.density, grid.sh, grid.index, grid.vertex_at, grid.cell, grid.accumulator, grid.slots,
-                ivec3(*grid.resolution), config.smooth_density, config.smooth_colour, grid.terms,
+                ivec3(*grid.resolution), self.smooth, self.smooth, grid.terms,
             )  # fmt: skip
         rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
         kernels.gauss_newton(
