@@ -245,7 +245,7 @@ def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
     edit = Edit(INNER, OUTER, name="arm").translate((0.6, 0, 0))
     message = (
         r'edit "arm": outer cage must contain the inner cage: inner corner \d at \(0\.9, .*\) is 0\.1 outside'
-        r' face \+x; 0\.83 of this translation .* is safe; enlarge the outer cage or use'
+        r" face \+x; 0\.83 of this translation .* is safe; enlarge the outer cage or use"
         ' adjustment="discrete"'
     )
     with pytest.raises(EditError, match=message):

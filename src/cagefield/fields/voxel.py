@@ -74,15 +74,24 @@ class VoxelField:
             raise FieldError(
                 f"vertices and density must be [M], got {self.vertices.shape} and {self.density.shape}"
             )
-        if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1] not in (1, 4, 9) or self.sh.shape[2] != 3:
+        if (
+            self.sh.ndim != 3
+            or self.sh.shape[0] != count
+            or self.sh.shape[1] not in (1, 4, 9)
+            or self.sh.shape[2] != 3
+        ):
             raise FieldError(f"sh must be [{count}, 1|4|9, 3] (degree 0 to 2), got {self.sh.shape}")
         total = int(np.prod(self.resolution))
-        if count and (self.vertices[0] < 0 or self.vertices[-1] >= total or (np.diff(self.vertices) <= 0).any()):
+        if count and (
+            self.vertices[0] < 0 or self.vertices[-1] >= total or (np.diff(self.vertices) <= 0).any()
+        ):
             raise FieldError(f"vertices must be strictly increasing and within [0, {total})")
         for name, values in (("density", self.density), ("sh", self.sh)):
             if not np.isfinite(values).all():
                 bad = int(np.argwhere(~np.isfinite(values.reshape(count, -1)).all(axis=1))[0, 0])
-                raise FieldError(f"{name} must be finite, vertex {bad} of {count} is not; train or bake the field again")
+                raise FieldError(
+                    f"{name} must be finite, vertex {bad} of {count} is not; train or bake the field again"
+                )
 
     @property
     def sh_degree(self) -> int:
@@ -114,14 +123,16 @@ class VoxelField:
 
     def grid_coordinates(self, positions: ArrayLike) -> NDArray[np.float64]:
         """Positions [N,3] in units of vertices: 0 at the first vertex, resolution - 1 at the last."""
-        points = np.asarray(positions, dtype=np.float64)
+        points: NDArray[np.float64] = np.asarray(positions, dtype=np.float64)
         if self.contracted:
-            points = contract((points - self.center) / self.half_size)
+            points = np.asarray(contract((points - self.center) / self.half_size), np.float64)
         lower, upper = self.grid_bounds
         return np.asarray((points - lower) / (upper - lower) * (np.array(self.resolution) - 1))
 
-    def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(sigma [N] per world unit, rgb [N,3]) at positions [N,3] (canonical) seen along unit viewdirs [N,3].
+    def __call__(
+        self, positions: ArrayLike, viewdirs: ArrayLike
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(sigma [N] per world unit, rgb [N,3]) at canonical positions [N,3] along unit viewdirs [N,3].
 
         Sigma is 0 outside the grid.
         """
@@ -183,12 +194,15 @@ class VoxelField:
                 metadata = file.metadata() or {}
                 tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         except (SafetensorError, OSError) as error:
-            raise FieldError(f"{path}: not a readable field file ({error}); it may be truncated, write it again") from error
+            raise FieldError(
+                f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+            ) from error
         if metadata.get("kind") != "VoxelField":
             raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected 'VoxelField'")
         if metadata.get("version") != FORMAT_VERSION:
             raise FieldError(
-                f"{path}: field format {metadata.get('version')!r}, this cagefield reads {FORMAT_VERSION!r}; update cagefield"
+                f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
+                f"{FORMAT_VERSION!r}; update cagefield"
             )
         missing = {"bounds", "resolution", "vertices", "density", "sh"} - tensors.keys()
         if missing:

@@ -78,7 +78,7 @@ def deform(canonical: Occupancy, grid: DeviceGrid, stack: DeviceStack, jumps: bo
 
 
 def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A world-space box [2,3] in grid coordinates, a little larger; in a contracted field the box around it."""
+    """A world-space box [2,3] in grid coordinates, a little larger; if contracted, the box around it."""
     if not field.contracted:
         return field.grid_coordinates(box) + np.array([[-0.01], [0.01]])
     t = np.linspace(0.0, 1.0, 9)
@@ -88,7 +88,11 @@ def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def _corners(
-    canonical: Occupancy, field: VoxelField, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
+    canonical: Occupancy,
+    field: VoxelField,
+    stack: DeviceStack,
+    lower: NDArray[np.int64],
+    count: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """Occupied block corners [count], the first at grid coordinates `lower`."""
     out = np.zeros(int(np.prod(count)), np.uint8)

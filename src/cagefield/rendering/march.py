@@ -180,7 +180,9 @@ def march_tiles(
                                         slope = slope * scale
                                     if qd.static(edited):
                                         if moved == 1:
-                                            slope = through_edits(slope, origin + t * d, params, lattice, n_edits)
+                                            slope = through_edits(
+                                                slope, origin + t * d, params, lattice, n_edits
+                                            )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
             at = 8 * pixel
@@ -240,7 +242,22 @@ def density_slope(density: qd.template(), slots: qd.template(), f: vec3):
     for c in qd.static(range(8)):
         r[c] = density[slots[c]]
     e = 1.0 - f
-    x = (r[4] - r[0]) * e.y * e.z + (r[5] - r[1]) * e.y * f.z + (r[6] - r[2]) * f.y * e.z + (r[7] - r[3]) * f.y * f.z
-    y = (r[2] - r[0]) * e.x * e.z + (r[3] - r[1]) * e.x * f.z + (r[6] - r[4]) * f.x * e.z + (r[7] - r[5]) * f.x * f.z
-    z = (r[1] - r[0]) * e.x * e.y + (r[3] - r[2]) * e.x * f.y + (r[5] - r[4]) * f.x * e.y + (r[7] - r[6]) * f.x * f.y
+    x = (
+        (r[4] - r[0]) * e.y * e.z
+        + (r[5] - r[1]) * e.y * f.z
+        + (r[6] - r[2]) * f.y * e.z
+        + (r[7] - r[3]) * f.y * f.z
+    )
+    y = (
+        (r[2] - r[0]) * e.x * e.z
+        + (r[3] - r[1]) * e.x * f.z
+        + (r[6] - r[4]) * f.x * e.z
+        + (r[7] - r[5]) * f.x * f.z
+    )
+    z = (
+        (r[1] - r[0]) * e.x * e.y
+        + (r[3] - r[2]) * e.x * f.y
+        + (r[5] - r[4]) * f.x * e.y
+        + (r[7] - r[6]) * f.x * f.y
+    )
     return vec3(x, y, z)

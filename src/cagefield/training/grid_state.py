@@ -90,7 +90,9 @@ class GridState:
             codes=to_device(bricks.codes),
             brick_dims=tuple(bricks.codes.shape),
             vertex_at=to_device(np.concatenate([np.zeros(1, np.int32), vertices.astype(np.int32)])),
-            cell=to_device(np.concatenate([np.ones(1, np.float32), cell_sizes(bounds, resolution, vertices, contracted)])),
+            cell=to_device(
+                np.concatenate([np.ones(1, np.float32), cell_sizes(bounds, resolution, vertices, contracted)])
+            ),
         )
 
     @classmethod
@@ -133,8 +135,10 @@ class GridState:
         """Floats of one accumulator."""
         return self.slots * (HEAD + 3 * self.terms)
 
-    def arrays(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-        """(density [M], sh [M,K,3], running curvature [M,2], largest weight [M]) on the host, in slot order."""
+    def arrays(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """(density [M], sh [M,K,3], running curvatures [M,2], largest weight [M]), in slot order."""
         return (
             self.density.to_numpy()[1:],
             self.sh.to_numpy().reshape(-1, self.terms, 3)[1:],
@@ -155,7 +159,7 @@ class GridState:
         )
 
     def pruned(self, least_weight: float, *, dilate: int = 1) -> "GridState":
-        """Without the vertices whose largest weight, and that of all neighbours, stayed under `least_weight`."""
+        """Without the vertices whose own and neighbours' largest weights stayed under `least_weight`."""
         density, sh, state, weight = self.arrays()
         full = np.zeros(self.resolution, bool)
         full.reshape(-1)[self.vertices[weight > least_weight]] = True
@@ -239,9 +243,12 @@ class GridState:
 
 
 def cell_sizes(
-    bounds: NDArray[np.float64], resolution: tuple[int, int, int], vertices: NDArray[np.int64], contracted: bool
+    bounds: NDArray[np.float64],
+    resolution: tuple[int, int, int],
+    vertices: NDArray[np.int64],
+    contracted: bool,
 ) -> NDArray[np.float32]:
-    """World-space voxel size [M] at each vertex; in a contracted grid along the radius, where it grows as m^2."""
+    """World-space voxel size [M] at each vertex; along the radius, growing as m^2, if contracted."""
     n = np.array(resolution) - 1
     if not contracted:
         return np.full(len(vertices), ((bounds[1] - bounds[0]) / n).max(), np.float32)

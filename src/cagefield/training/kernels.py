@@ -11,8 +11,8 @@ The loss of a ray is r^2 / 2 summed over channels, plus `distortion` times the d
 
 The march computes C and notes its few samples that carry weight in a scratch area of the worker; the way
 back over them has the gradients from S_i. (Marching twice instead, with nothing noted, took 1.5 times as long
-on a CPU.) b_v are trilinear weights. Each worker adds into its own accumulator, so that no atomics are needed on a CPU and the sums do
-not depend on timing; on a GPU one accumulator is shared, with atomic adds.
+on a CPU.) b_v are trilinear weights. Each worker adds into its own accumulator, so that no atomics are needed
+on a CPU and the sums do not depend on timing; on a GPU one accumulator is shared, with atomic adds.
 
 Accumulator record of a slot (stride 4 + 3K): density gradient, density curvature sum_c (dC_c/ds)^2,
 colour curvature w^2, largest weight, then the 3K colour gradients (basis-major).
@@ -66,7 +66,7 @@ def add(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
 def spread_slope(
     s: qd.f32, ds: qd.f32, w: qd.f32, before_w: qd.f32, before_ws: qd.f32, total_w: qd.f32, total_ws: qd.f32
 ):
-    """dL/dw of the distortion L = sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 ds_i (homogeneous: L = sum w u / 2)."""
+    """u = dL/dw of the distortion L = sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 ds_i = 1/2 sum_i w_i u_i."""
     after_w = total_w - before_w - w
     after_ws = total_ws - before_ws - w * s
     return 2.0 * (s * before_w - before_ws + after_ws - s * after_w) + (2.0 / 3.0) * w * ds
@@ -111,8 +111,9 @@ def march_batch(
     """Adds the gradients and curvatures of a batch of pixel patches to the accumulators.
 
     patches: [P, 3] (view, column, row of the first pixel). views: [V, 4] (first pixel, width, first
-    direction, height). poses: [V, 12] rows of c2w. gains: [V, 3]. Writes losses [rays] (squared error), penalties [rays]
-    (distortion term) and gain_sums [rays * 6] (C photo, C C per channel) for the exposure fit. World position p maps to grid
+    direction, height). poses: [V, 12] rows of c2w. gains: [V, 3]. Writes losses [rays] (squared error),
+    penalties [rays] (distortion term) and gain_sums [rays * 6] (C photo, C C per channel) for the exposure
+    fit. World position p maps to grid
     coordinates (p - lower) * scale; when contracted, `lower` is the centre, `scale` 1 / half size, and the
     result is contracted.
     """

@@ -106,7 +106,7 @@ class VoxelConfig:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands: `done` in [0,1], running loss (mean squared error) and its PSNR, rays/s, seconds."""
+    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, rays/s, seconds."""
 
     done: float
     step: int
@@ -226,7 +226,9 @@ class _Run:
         keep = None
         first = self._resolution(0)
         if self.contracted:
-            self.near = config.near * float(np.median([np.linalg.norm(v.camera.origin - middle) for v in dataset.train]))
+            self.near = config.near * float(
+                np.median([np.linalg.norm(v.camera.origin - middle) for v in dataset.train])
+            )
             keep = seen(dataset.train, self.bounds, first, self.near)
         self.all_patches = self.photos.patches(config.patch)
         self.step = 0
@@ -321,10 +323,20 @@ class _Run:
             count = len(self.all_patches)
             touched = to_device(np.zeros(count, np.int32))
             kernels.touched_patches(
-                touched, to_device(self.all_patches), count, self.config.patch, self.photos.views,
-                self.photos.poses, self.photos.directions, grid.codes, ivec3(*grid.brick_dims),
-                vec3(*lower), vec3(*scale), ivec3(*grid.resolution), self.near,
-            )  # fmt: skip
+                touched,
+                to_device(self.all_patches),
+                count,
+                self.config.patch,
+                self.photos.views,
+                self.photos.poses,
+                self.photos.directions,
+                grid.codes,
+                ivec3(*grid.brick_dims),
+                vec3(*lower),
+                vec3(*scale),
+                ivec3(*grid.resolution),
+                self.near,
+            )
             self.patches = self.all_patches[touched.to_numpy() > 0]
         self._shuffle()
 
@@ -361,22 +373,72 @@ class _Run:
         step = config.step if self.contracted else config.step / max(scale)
         gpu = devices.is_gpu()
         kernels.march_batch(
-            patches, count, config.patch, count if gpu else self.workers, self.step + 1000003 * config.seed,
-            photos.views, photos.poses, self.gains, photos.directions, photos.pixels,
-            grid.codes, grid.index, grid.density, grid.sh, grid.accumulator, grid.record,
-            self._scratch(count if gpu else self.workers), losses, penalties, gain_sums, ivec3(*grid.brick_dims), ivec3(*grid.resolution), vec3(*lower), vec3(*scale),
-            step, self.near, config.distortion, self.reach, 1, vec3(1.0, 1.0, 1.0), grid.terms, self.contracted, gpu,
-        )  # fmt: skip
+            patches,
+            count,
+            config.patch,
+            count if gpu else self.workers,
+            self.step + 1000003 * config.seed,
+            photos.views,
+            photos.poses,
+            self.gains,
+            photos.directions,
+            photos.pixels,
+            grid.codes,
+            grid.index,
+            grid.density,
+            grid.sh,
+            grid.accumulator,
+            grid.record,
+            self._scratch(count if gpu else self.workers),
+            losses,
+            penalties,
+            gain_sums,
+            ivec3(*grid.brick_dims),
+            ivec3(*grid.resolution),
+            vec3(*lower),
+            vec3(*scale),
+            step,
+            self.near,
+            config.distortion,
+            self.reach,
+            1,
+            vec3(1.0, 1.0, 1.0),
+            grid.terms,
+            self.contracted,
+            gpu,
+        )
         if self.smooth > 0:
             kernels.laplacian(
-                grid.density, grid.sh, grid.index, grid.vertex_at, grid.cell, grid.accumulator, grid.slots,
-                ivec3(*grid.resolution), self.smooth, self.smooth, grid.terms,
-            )  # fmt: skip
+                grid.density,
+                grid.sh,
+                grid.index,
+                grid.vertex_at,
+                grid.cell,
+                grid.accumulator,
+                grid.slots,
+                ivec3(*grid.resolution),
+                self.smooth,
+                self.smooth,
+                grid.terms,
+            )
         rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
         kernels.gauss_newton(
-            grid.density, grid.sh, grid.state, grid.weight, grid.cell, grid.accumulator, grid.record,
-            self.workers, grid.slots, config.decay, rate, rate, config.largest_step, config.damping, grid.terms,
-        )  # fmt: skip
+            grid.density,
+            grid.sh,
+            grid.state,
+            grid.weight,
+            grid.cell,
+            grid.accumulator,
+            grid.record,
+            self.workers,
+            grid.slots,
+            config.decay,
+            rate,
+            rate,
+            config.largest_step,
+            config.damping,
+            grid.terms,
+        )
         loss = float(losses.to_numpy().mean()) / 3.0
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
         self.rays += rays
@@ -454,11 +516,20 @@ class _Run:
         draft = path.with_name(path.name + ".part")
         with open(draft, "wb") as file:
             np.savez(
-                file, scalars=json.dumps(scalars), config=self._signature(), bounds=self.grid.bounds,
-                resolution=self.grid.resolution, vertices=self.grid.vertices, density=density, sh=sh,
-                state=state, weight=weight, patches=self.patches, gain_sums=self.gain_sums,
+                file,
+                scalars=json.dumps(scalars),
+                config=self._signature(),
+                bounds=self.grid.bounds,
+                resolution=self.grid.resolution,
+                vertices=self.grid.vertices,
+                density=density,
+                sh=sh,
+                state=state,
+                weight=weight,
+                patches=self.patches,
+                gain_sums=self.gain_sums,
                 gains=self.gains.to_numpy(),
-            )  # fmt: skip
+            )
         os.replace(draft, path)
 
     def restore(self, path: Path) -> None:
@@ -471,18 +542,28 @@ class _Run:
                 data = {name: file[name] for name in file.files}
             scalars = json.loads(str(data["scalars"]))
         except (OSError, ValueError, KeyError, EOFError) as error:
-            raise CagefieldError(f"{path}: not a readable checkpoint ({error}); start without resume") from error
+            raise CagefieldError(
+                f"{path}: not a readable checkpoint ({error}); start without resume"
+            ) from error
         except Exception as error:  # zipfile raises its own classes on damaged archives
-            raise CagefieldError(f"{path}: not a readable checkpoint ({error}); start without resume") from error
+            raise CagefieldError(
+                f"{path}: not a readable checkpoint ({error}); start without resume"
+            ) from error
         if str(data["config"]) != self._signature():
             raise CagefieldError(f"{path}: written for other photos or settings; start without resume")
         for name, value in scalars.items():
             setattr(self, name, value)
         resolution = tuple(int(n) for n in data["resolution"])
         self.grid = GridState.build(
-            data["bounds"], (resolution[0], resolution[1], resolution[2]), data["vertices"], data["density"],
-            data["sh"], data["state"], contracted=self.contracted, workers=self.workers,
-        )  # fmt: skip
+            data["bounds"],
+            (resolution[0], resolution[1], resolution[2]),
+            data["vertices"],
+            data["density"],
+            data["sh"],
+            data["state"],
+            contracted=self.contracted,
+            workers=self.workers,
+        )
         self.grid.weight.from_numpy(np.concatenate([np.zeros(1, np.float32), data["weight"]]))
         self.patches = data["patches"]
         self.gain_sums = data["gain_sums"]
