@@ -66,7 +66,7 @@ def add(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
 def spread_slope(
     s: qd.f32, ds: qd.f32, w: qd.f32, before_w: qd.f32, before_ws: qd.f32, total_w: qd.f32, total_ws: qd.f32
 ):
-    """u = dL/dw of the distortion L = sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 ds_i = 1/2 sum_i w_i u_i."""
+    """u = dL/dw of the distortion L = sum_ij w_i w_j |s_i - s_j| + sum_i w_i^2 ds_i / 3."""
     after_w = total_w - before_w - w
     after_ws = total_ws - before_ws - w * s
     return 2.0 * (s * before_w - before_ws + after_ws - s * after_w) + (2.0 / 3.0) * w * ds
