@@ -36,11 +36,11 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 1200
+    steps: int = 1000
     """Number of training steps."""
     resolution: int = 192
     """Voxels along the longest axis at the end."""
-    frames: int = 48
+    frames: int = 36
     """Number of pictures in the turntable video."""
     device: Device = "auto"
     """Where kernels run."""
