@@ -32,11 +32,11 @@ class Demo:
 
     out: Output = Path("cagefield-demo")
     """Folder for the results."""
-    views: int = 60
+    views: int = 50
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 1000
+    steps: int = 900
     """Number of training steps."""
     resolution: int = 192
     """Voxels along the longest axis at the end."""
@@ -124,7 +124,7 @@ class Demo:
         write_png(folder / "before.png", before)
         write_png(folder / "after.png", after)
         write_png(folder / "before_after.png", side_by_side(before, after))
-        path = orbit(scene.cameras["train"], self.frames, width=320, height=320)
+        path = orbit(scene.cameras["train"], self.frames, width=256, height=256)
         pictures = (
             side_by_side(scene.render(camera).rgb8(), edited.render(camera).rgb8())
             for camera in track(path, len(path), "Turntable")
