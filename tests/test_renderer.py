@@ -1,0 +1,194 @@
+"""The fused renderer against the plain sampled one, closed forms, and itself without skipping."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cagefield import devices
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.rendering import occupancy
+from cagefield.rendering.metrics import psnr
+from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.sampled import render_sampled
+
+devices.start("cpu")
+
+N = 49
+CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=40, height=32, fov_x=0.75)
+
+
+def ball(
+    contracted: bool = False, density: float = 25.0, radius: float = 0.55, degree: int = 1
+) -> VoxelField:
+    """A soft ball with a smooth pattern, in a box of half-size 1."""
+    extent = 2.0 if contracted else 1.0
+    axis = np.linspace(-extent, extent, N)
+    p = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    sigma = density * np.clip((radius - np.linalg.norm(p, axis=1)) / 0.1, -1, 1)
+    keep = np.flatnonzero(sigma > -density)
+    sh = np.zeros((len(keep), (degree + 1) ** 2, 3))
+    sh[:, 0] = np.sin(4 * p[keep] + [0, 1, 2])
+    if degree:
+        sh[:, 1:4] = 0.15 * np.cos(3 * p[keep])[:, None, :]
+    bounds = np.array([[-1.0] * 3, [1.0] * 3])
+    return VoxelField(bounds, (N, N, N), keep, sigma[keep], sh, contracted)
+
+
+def sampled(field: VoxelField, edits: EditStack | None = None, samples: int = 600, **options):
+    return render_sampled(
+        field, CAMERA, near=1.5, far=5.5, samples=samples, background="white", edits=edits, **options
+    )
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_fused_matches_the_plain_renderer(degree, contracted):
+    field = ball(contracted, degree=degree)
+    fused = Renderer(field, step=0.1).render(CAMERA, background="white")
+    plain = sampled(field)
+    # Both are midpoint rules with steps of a tenth of a voxel; rays stop at T = 1e-3.
+    assert psnr(fused.rgb, plain.rgb) > 50
+    np.testing.assert_allclose(fused.opacity, plain.opacity, atol=4e-3)
+    solid = plain.opacity > 0.9
+    assert solid.sum() > 50
+    np.testing.assert_allclose(fused.depth[solid], plain.depth[solid], atol=5e-3)
+
+
+def test_uniform_density_obeys_beer_lambert():
+    n = (9, 9, 9)
+    field = VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]), n, np.arange(729), np.full(729, 0.7), np.zeros((729, 1, 3))
+    )
+    camera = Camera.look_at((0, -4, 0), (0, 0, 0), width=5, height=5, fov_x=0.02)
+    frame = Renderer(field, step=0.25).render(camera, background="black")
+    # Every ray passes 2 units; colour 0.5 everywhere. The last step may overhang by half a step of 1/16.
+    expected = 1 - np.exp(-0.7 * 2)
+    np.testing.assert_allclose(frame.opacity, expected, atol=0.7 * np.exp(-1.4) / 16)
+    np.testing.assert_allclose(frame.rgb, 0.5 * frame.opacity[..., None].repeat(3, -1), atol=1e-4)
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+def test_skipping_empty_space_changes_nothing(contracted, monkeypatch):
+    field = ball(contracted)
+    skipped = Renderer(field).render(CAMERA, background="white")
+
+    def full(field_, threshold=0.0):
+        return occupancy.of_vertices(np.ones(field_.resolution, bool))
+
+    monkeypatch.setattr(occupancy, "of_field", full)
+    whole = Renderer(field).render(CAMERA, background="white")
+    if contracted:
+        # Steps follow the ray's own speed, so leaps move the samples: equal up to quadrature error.
+        assert psnr(skipped.rgb, whole.rgb) > 40
+    else:
+        np.testing.assert_allclose(skipped.rgb, whole.rgb, atol=2e-5)
+
+
+INNER = Cage.box((0.1, 0, 0.1), (0.7, 0.6, 0.8))
+OUTER = Cage.box((0.05, 0, 0.1), (2.4, 2.4, 2.4))
+EDITS = {
+    "continuous": EditStack([Edit(INNER, OUTER).rotate((0.1, 0.2, 0.3)).translate((0.1, 0.05, 0.1))]),
+    "corner": EditStack([Edit(INNER, OUTER).move_corner(7, (0.15, 0.1, 0.2))]),
+    "move": EditStack([Edit(INNER, adjustment="discrete").translate((0.2, -0.9, 0.3))]),
+    "copy out of bounds": EditStack(
+        [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.0, -1.2, 0.2))]
+    ),
+    "delete": EditStack([Edit.delete(INNER)]),
+    "two": EditStack(
+        [
+            Edit(INNER, adjustment="discrete").rotate((0, 0, 0.8)).translate((0, -0.5, 0)),
+            Edit(Cage.box((0, -0.4, 0.1), (0.9, 0.9, 0.9)), Cage.box((0, -0.4, 0.1), (1.8, 1.8, 1.8))).scale(
+                1.3
+            ),
+        ]
+    ),
+}
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+@pytest.mark.parametrize("name", list(EDITS))
+def test_edited_matches_the_plain_renderer(name, contracted):
+    field, edits = ball(contracted), EDITS[name]
+    renderer = Renderer(field, step=0.1).with_edits(edits)
+    fused = renderer.render(CAMERA, background="white")
+    plain = sampled(field, edits)
+    assert psnr(plain.rgb, sampled(field, samples=200).rgb) < 30  # the edit shows
+    # Jumps at cage faces are hit a fraction of a step apart; everything else agrees as without edits.
+    assert psnr(fused.rgb, plain.rgb) > 42
+    assert (np.abs(fused.opacity - plain.opacity) > 0.1).mean() < 0.01
+
+
+@pytest.mark.parametrize("name", list(EDITS))
+def test_deformed_occupancy_holds_all_density_and_is_tight(name):
+    """No point with density lies in a block marked empty; the marked blocks are not many more."""
+    field, edits = ball(), EDITS[name]
+    occupied = Renderer(field, edits)._occupancy
+    rng = np.random.default_rng(0)
+    low, high = np.minimum(-1, edits.bounds[0]), np.maximum(1, edits.bounds[1])
+    p = rng.uniform(low, high, (60000, 3))
+    c = edits.to_canonical(p)
+    sigma, _ = field(c.points, np.tile([0.0, 0, 1], (len(p), 1)))
+    sigma = np.where(c.emptied, 0, sigma)
+    block = (np.floor(field.grid_coordinates(p)).astype(int) - occupied.origin) // 2
+    inside = ((block >= 0) & (block < occupied.blocks.shape)).all(axis=1)
+    assert not (sigma[~inside] > 0).any()
+    marked = occupied.blocks[tuple(block[inside].T)]
+    assert not (sigma[inside][~marked] > 0).any()
+    # Tight: by volume, at most a block's layer more than what has density (a ball of 13 blocks across).
+    assert marked.mean() < 2.2 * (sigma[inside] > 0).mean()
+
+
+def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
+    field = ball(density=200.0)
+    frame = Renderer(field, step=0.25).render(CAMERA, normals=True)
+    origins, directions = CAMERA.rays()
+    solid = (frame.opacity > 0.99).ravel()
+    points = origins + directions * np.where(solid, frame.depth.ravel(), 0)[:, None]
+    outward = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
+    facing = (np.einsum("nc,nc->n", outward, directions) < -0.5) & solid
+    cosine = np.einsum("nc,nc->n", outward, frame.normals.reshape(-1, 3))[facing]
+    assert facing.sum() > 30
+    assert cosine.min() > 0.97  # a soft ball on a grid of 49: within 14 degrees
+    turned = EditStack([Edit(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9)).scale(1.1)])
+    after = Renderer(field, turned, step=0.25).render(CAMERA, normals=True)
+    both = (after.opacity.ravel() > 0.99) & facing
+    assert np.einsum("nc,nc->n", outward, after.normals.reshape(-1, 3))[both].mean() > 0.97
+
+
+def test_a_frame_can_be_abandoned_between_bands():
+    calls = []
+
+    def stop() -> bool:
+        calls.append(1)
+        return len(calls) > 1
+
+    camera = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=40, height=80, fov_x=0.75)
+    renderer = Renderer(ball())
+    assert renderer.render(camera, should_stop=stop) is None
+    assert len(calls) == 2
+    whole = renderer.render(camera)
+    banded = renderer.render(camera, should_stop=lambda: False)
+    np.testing.assert_array_equal(whole.rgb, banded.rgb)
+
+
+def test_a_distorted_camera_is_rendered_with_its_own_rays():
+    field = ball()
+    bent = Camera(
+        c2w=CAMERA.c2w,
+        width=40,
+        height=32,
+        fx=CAMERA.fx,
+        fy=CAMERA.fy,
+        cx=CAMERA.cx,
+        cy=CAMERA.cy,
+        model="opencv",
+        distortion=(-0.5, 0.1, 0.02, 0.0),
+    )
+    fused = Renderer(field, step=0.1).render(bent, background="white")
+    plain = render_sampled(field, bent, near=1.5, far=5.5, samples=600, background="white")
+    assert psnr(fused.rgb, plain.rgb) > 50
+    assert psnr(fused.rgb, sampled(field).rgb) < 40

@@ -1,0 +1,94 @@
+"""Training end to end: it learns, the seed decides, an interrupted run goes on to the same field."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from cagefield import devices
+from cagefield.datasets import load_dataset
+from cagefield.datasets.procedural import make_scene
+from cagefield.errors import CagefieldError
+from cagefield.training.voxel import VoxelConfig, train_voxel
+
+devices.start("cpu")
+
+CONFIG = VoxelConfig(steps=150, resolution=48, batch_rays=1024)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("data") / "plant"
+    make_scene("plant", folder, views=16, size=48, test_views=4)
+    return load_dataset(folder)
+
+
+@pytest.fixture(scope="module")
+def trained(dataset):
+    return train_voxel(dataset, CONFIG)
+
+
+def test_it_learns_views_it_has_not_seen(trained):
+    assert trained.finished
+    assert trained.steps == 150
+    # A white picture scores about 12 dB on this scene, a grey silhouette about 17.
+    assert trained.test_psnr > 21
+    assert trained.test_ssim > 0.75
+    assert trained.train_psnr > trained.test_psnr - 1
+    # Space is empty but for the scene.
+    assert len(trained.field.vertices) < 0.4 * np.prod(trained.field.resolution)
+
+
+def test_the_seed_decides(dataset, trained):
+    again = train_voxel(dataset, CONFIG, evaluate=False)
+    np.testing.assert_array_equal(again.field.density, trained.field.density)
+    np.testing.assert_array_equal(again.field.sh, trained.field.sh)
+    other = train_voxel(
+        dataset, VoxelConfig(steps=150, resolution=48, batch_rays=1024, seed=1), evaluate=False
+    )
+    assert other.field.density.shape != trained.field.density.shape or not np.array_equal(
+        other.field.density, trained.field.density
+    )
+
+
+def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path):
+    checkpoint = tmp_path / "run.npz"
+
+    def press_ctrl_c(progress):
+        if progress.step == 90:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    first = train_voxel(dataset, CONFIG, checkpoint=checkpoint, on_progress=press_ctrl_c, evaluate=False)
+    assert not first.finished
+    assert first.steps < 150
+    assert checkpoint.is_file()
+    second = train_voxel(dataset, CONFIG, checkpoint=checkpoint, resume=True, evaluate=False)
+    assert second.finished
+    np.testing.assert_array_equal(second.field.vertices, trained.field.vertices)
+    np.testing.assert_array_equal(second.field.density, trained.field.density)
+
+
+def test_a_damaged_or_foreign_checkpoint_is_refused(dataset, tmp_path):
+    with pytest.raises(CagefieldError, match="no checkpoint"):
+        train_voxel(dataset, CONFIG, checkpoint=tmp_path / "none.npz", resume=True)
+    bad = tmp_path / "bad.npz"
+    bad.write_bytes(b"PK\x03\x04 not really")
+    with pytest.raises(CagefieldError, match="not a readable checkpoint"):
+        train_voxel(dataset, CONFIG, checkpoint=bad, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"steps": 0}, "steps is 0"),
+        ({"resolution": 4}, "resolution is 4"),
+        ({"sh_degree": 3}, "sh_degree is 3"),
+        ({"minutes": -1.0}, "minutes is -1"),
+    ],
+)
+def test_impossible_settings_are_named(settings, message):
+    with pytest.raises(CagefieldError, match=message):
+        VoxelConfig(**settings)
