@@ -164,11 +164,11 @@ def march_tiles(
                             w = T * (1.0 - keep)
                             T *= keep
                             if w > 1e-4:
-                                c = vec3(0.0, 0.0, 0.0)
-                                if moved == 1:
-                                    c = gather_rgb(sh, slots, b, sh_basis(view, K), K)
-                                else:
-                                    c = gather_rgb(sh, slots, b, basis, K)
+                                seen = basis
+                                if qd.static(edited):
+                                    if moved == 1:
+                                        seen = sh_basis(view, K)
+                                c = gather_rgb(sh, slots, b, seen, K)
                                 rgb += w * qd.max(qd.min(c, 1.0), 0.0)
                                 depth += w * t
                                 if with_normals == 1:
