@@ -26,6 +26,11 @@ def dataset(tmp_path_factory):
     return load_dataset(folder)
 
 
+def test_the_box_that_the_photos_come_with_is_read(dataset):
+    assert not dataset.unbounded
+    assert (dataset.bounds[1] - dataset.bounds[0]).max() < 2.6  # the plant, not the default 3 units
+
+
 @pytest.fixture(scope="module")
 def trained(dataset):
     return train_voxel(dataset, CONFIG)
@@ -92,3 +97,23 @@ def test_a_damaged_or_foreign_checkpoint_is_refused(dataset, tmp_path):
 def test_impossible_settings_are_named(settings, message):
     with pytest.raises(CagefieldError, match=message):
         VoxelConfig(**settings)
+
+
+def test_a_damaged_box_is_named(dataset, tmp_path):
+    import json
+    import shutil
+
+    shutil.copytree(dataset.path, tmp_path / "data")
+    path = tmp_path / "data" / "transforms_train.json"
+    document = json.loads(path.read_text())
+    document["aabb"] = [[1, 1, 1], [0, 2, 2]]
+    path.write_text(json.dumps(document))
+    with pytest.raises(CagefieldError, match="'aabb' must be"):
+        load_dataset(tmp_path / "data")
+
+
+def test_a_run_by_the_clock_gives_each_stage_its_steps(dataset):
+    """However slow the machine, a grid has learnt something before it is refined."""
+    result = train_voxel(dataset, VoxelConfig(minutes=0.001, resolution=48, batch_rays=256), evaluate=False)
+    assert result.finished
+    assert len(result.field.vertices) > 8

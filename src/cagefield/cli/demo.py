@@ -22,8 +22,6 @@ _OWN = (
 )  # fmt: skip
 _EYE, _TARGET, _FOV_X = (1.6, -3.5, 1.3), (0.05, 0.0, 0.13), 0.62
 """Where before.png and after.png are taken from: radians, world units."""
-_MARGIN = 0.05
-"""Room around the digger in the field's box, world units."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +34,7 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 900
+    steps: int = 1500
     """Number of training steps."""
     resolution: int = 192
     """Voxels along the longest axis at the end."""
@@ -87,18 +85,13 @@ class Demo:
             )
 
     def _train(self, folder: Path) -> tuple[Scene, str]:
-        import numpy as np
-
         from cagefield import devices
         from cagefield.cli.train import summary, train_scene
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.procedural import procedural_scene
         from cagefield.training.voxel import VoxelConfig
 
         devices.start(self.device)
-        low, high = procedural_scene("digger").bounds
         dataset = load_dataset(folder / "photos")
-        dataset = dataclasses.replace(dataset, bounds=np.stack([low - _MARGIN, high + _MARGIN]))
         scene, result = train_scene(dataset, VoxelConfig(steps=self.steps, resolution=self.resolution))
         scene.save(folder / "scene")
         return scene, summary(result)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -99,10 +98,6 @@ def train_scene(
                 f"{progress.rays_per_second / 1e3:.0f} k rays/s, {progress.resolution}^3 grid",
             )
 
-        if config.minutes is not None:
-            # The clock of a training runs from its first batch: compile the kernels before.
-            once = dataclasses.replace(config, minutes=None, steps=1)
-            train_voxel(dataclasses.replace(dataset, train=dataset.train[:2]), once, evaluate=False)
         result = train_voxel(dataset, config, checkpoint=checkpoint, resume=resume, on_progress=show)
     cameras = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     scene = Scene(

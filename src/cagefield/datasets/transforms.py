@@ -284,9 +284,22 @@ def _extent(
         )
     if aabb_scale is not None and aabb_scale <= 1:
         return False, _ngp_unit_cube(file)
+    if synthetic and "aabb" in file.values:
+        return False, _box(where, file.values["aabb"])
     if synthetic and cut_out and aabb_scale is None:
         return False, np.array([[-_SYNTHETIC_HALF_SIZE] * 3, [_SYNTHETIC_HALF_SIZE] * 3])
     return aabb_scale is not None or not cut_out, cube_of_interest(cameras)
+
+
+def _box(where: str, value: object) -> npt.NDArray[np.float64]:
+    """The scene's box that a file gives as [[min], [max]]."""
+    try:
+        box = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        box = np.full((2, 3), np.nan)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
+        raise DatasetError(f"{where}: key 'aabb' must be [[min x, y, z], [max x, y, z]], got {value}")
+    return box
 
 
 def _ngp_unit_cube(file: _TransformsFile) -> npt.NDArray[np.float64]:

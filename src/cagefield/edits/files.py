@@ -39,7 +39,7 @@ from cagefield.cages import Cage
 from cagefield.edits import nodes, operations
 from cagefield.edits.edit import Edit
 from cagefield.edits.nodes import Node
-from cagefield.edits.operations import Operation
+from cagefield.edits.operations import Operation, euler_degrees
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
 from cagefield.hexahedron import Array
@@ -245,7 +245,7 @@ def _from_cage(cage: Cage) -> dict[str, Any]:
     """A cage as centre, size and rotation where that gives back its very corners, else as corners."""
     R, _ = np.linalg.qr(cage.affine[0])
     R = R * np.sign(np.diag(R.T @ cage.affine[0]))
-    rotation = Rotation.from_matrix(R).as_euler("XYZ", degrees=True, suppress_warnings=True)
+    rotation = euler_degrees(Rotation.from_matrix(R))
     size = np.linalg.norm(cage.affine[0], axis=0)
     for digits in (12, 9, 6):
         # What a person wrote has few digits; what a program computed is tried as it is, last.

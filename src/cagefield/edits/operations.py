@@ -6,11 +6,12 @@ shears times t, the rotation about the same axis by t times the angle, scale fac
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, fields
 from typing import ClassVar, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from cagefield.cages import Axes, Cage, factors, vector
@@ -60,11 +61,17 @@ class Rotate:
     def part(self, t: float) -> Rotate:
         """The turn about the same axis by t times the angle."""
         turn = Rotation.from_euler("XYZ", self.degrees, degrees=True).as_rotvec()
-        part = Rotation.from_rotvec(t * turn).as_euler("XYZ", degrees=True, suppress_warnings=True)
-        return Rotate(_triple(part), self.axes)
+        return Rotate(_triple(euler_degrees(Rotation.from_rotvec(t * turn))), self.axes)
 
     def __str__(self) -> str:
         return f"by {_show(self.degrees)} degrees"
+
+
+def euler_degrees(rotation: Rotation) -> NDArray[np.float64]:
+    """Intrinsic XYZ angles [3] in degrees; in gimbal lock the last one is 0, without SciPy's warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(rotation.as_euler("XYZ", degrees=True))
 
 
 @dataclass(frozen=True)

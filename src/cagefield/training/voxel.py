@@ -43,6 +43,14 @@ PRUNE_WITHIN = 0.4
 """A stage is pruned once more after this share of it."""
 
 
+_SCALARS = (
+    "step", "stage", "stage_began", "pruned", "seconds", "rays", "running_loss", "epoch", "position",
+)  # fmt: skip
+
+LEAST_STEPS = 60
+"""Steps that a stage has at least when a run is limited by time."""
+
+
 @dataclass(frozen=True)
 class VoxelConfig:
     """How a VoxelField is trained.
@@ -233,7 +241,9 @@ class _Run:
         self.all_patches = self.photos.patches(config.patch)
         self.step = 0
         self.stage = 0
+        self.stage_began = 0
         self.pruned = True
+        self.cold = True
         self.seconds = 0.0
         self.rays = 0
         self.running_loss = float("nan")
@@ -244,8 +254,7 @@ class _Run:
         self._buffers: dict[int, tuple[Any, Any, Any, Any]] = {}
         self._notes: tuple[int, Any] | None = None
         self.grid: GridState = GridState.dense(
-            self.bounds,
-            (first,) * 3,
+            *((self.bounds, (first,) * 3) if self.contracted else _cubic_voxels(self.bounds, first)),
             opacity=0.5 / first,
             degree=config.sh_degree,
             contracted=self.contracted,
@@ -270,8 +279,9 @@ class _Run:
         """One batch; before it, the next stage or a pruning where one is due."""
         began = time.perf_counter()
         done = self.done
-        if self.stage + 1 < len(STAGES) and done >= STAGES[self.stage + 1][1]:
+        if self._stage_is_over(done):
             self.stage += 1
+            self.stage_began = self.step
             self._next_grid()
         elif not self.pruned:
             start = STAGES[self.stage][1]
@@ -281,7 +291,15 @@ class _Run:
                 self.pruned = True
         self._batch(done)
         self.step += 1
-        self.seconds += time.perf_counter() - began
+        # The first batch of a process compiles the kernels, which is no training.
+        self.seconds += 0.0 if self.cold else time.perf_counter() - began
+        self.cold = False
+
+    def _stage_is_over(self, done: float) -> bool:
+        if self.stage + 1 == len(STAGES) or done < STAGES[self.stage + 1][1]:
+            return False
+        # By the clock, a slow machine could reach a stage's end before its grid has learnt anything.
+        return self.config.minutes is None or self.step - self.stage_began >= LEAST_STEPS
 
     def _next_grid(self) -> None:
         self._prune(choose=False)
@@ -289,12 +307,7 @@ class _Run:
         if self.contracted:
             self.grid = self.grid.refined(self.bounds, (resolution,) * 3)
         else:
-            box = self.grid.support()
-            voxel = float((box[1] - box[0]).max()) / (resolution - 1)
-            n = np.maximum(np.ceil((box[1] - box[0]) / voxel - 1e-6).astype(int) + 1, 2)
-            middle = box.mean(axis=0)
-            box = np.stack([middle - (n - 1) * voxel / 2, middle + (n - 1) * voxel / 2])
-            self.grid = self.grid.refined(box, (int(n[0]), int(n[1]), int(n[2])))
+            self.grid = self.grid.refined(*_cubic_voxels(self.grid.support(), resolution))
         self.pruned = False
         self._choose_patches()
 
@@ -509,10 +522,7 @@ class _Run:
     def store(self, path: Path) -> None:
         """Writes the run's state, atomically."""
         density, sh, state, weight = self.grid.arrays()
-        scalars = {
-            name: getattr(self, name)
-            for name in ("step", "stage", "pruned", "seconds", "rays", "running_loss", "epoch", "position")
-        }
+        scalars = {name: getattr(self, name) for name in _SCALARS}
         draft = path.with_name(path.name + ".part")
         with open(draft, "wb") as file:
             np.savez(
@@ -573,6 +583,17 @@ class _Run:
     def _signature(self) -> str:
         settings = dataclasses.asdict(self.config)
         return json.dumps([settings, list(self.photos.names), self.photos.sizes.tolist()])
+
+
+def _cubic_voxels(
+    box: NDArray[np.float64], resolution: int
+) -> tuple[NDArray[np.float64], tuple[int, int, int]]:
+    """The box, grown so that cubic voxels fill it, and its vertices: `resolution` along the longest axis."""
+    voxel = float((box[1] - box[0]).max()) / (resolution - 1)
+    n = np.maximum(np.ceil((box[1] - box[0]) / voxel - 1e-6).astype(int) + 1, 2)
+    middle = box.mean(axis=0)
+    grown = np.stack([middle - (n - 1) * voxel / 2, middle + (n - 1) * voxel / 2])
+    return grown, (int(n[0]), int(n[1]), int(n[2]))
 
 
 def seen(
