@@ -34,9 +34,9 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 1500
+    steps: int = 800
     """Number of training steps."""
-    resolution: int = 192
+    resolution: int = 160
     """Voxels along the longest axis at the end."""
     frames: int = 36
     """Number of pictures in the turntable video."""
