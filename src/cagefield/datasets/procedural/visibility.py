@@ -1,0 +1,62 @@
+"""Which surfaces of an edited scene the photos of the scene as it was can have shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera
+from cagefield.datasets.procedural.parts import Part, apply
+from cagefield.datasets.procedural.scene import ProceduralScene
+from cagefield.datasets.procedural.tracing import trace
+
+Mask = NDArray[np.bool_]
+
+REACH = 0.008
+"""A surface counts as shown where a photo's ray ends within this distance of it, in world units: a voxel."""
+
+
+def unseen(
+    moved: ProceduralScene,
+    camera: Camera,
+    photographed: ProceduralScene,
+    photos: Sequence[Camera],
+    where: Mask | None = None,
+) -> Mask:
+    """Pixels [H,W] of `moved` whose surface none of the photos of `photographed` showed.
+
+    `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
+    centre is followed to its surface, and that point of its part back to where the photos were taken.
+    Only pixels of the mask `where` [H,W] are looked at; others, and those without a surface, are False.
+    """
+    shape = (camera.height, camera.width)
+    pixels = np.flatnonzero(np.ones(shape, bool) if where is None else where)
+    directions = apply(camera.c2w[:3, :3], camera.local_directions()[pixels].T)
+    hits = trace(moved.placed, camera.origin, directions)
+    met = np.flatnonzero(hits.primitive >= 0)
+    points = camera.origin[:, None] + hits.t[met] * directions[:, met].astype(np.float64)
+    for index, placed in enumerate(moved.placed):
+        rows = np.flatnonzero(hits.primitive[met] == index)
+        back = _original(placed.part, photographed).motion @ np.linalg.inv(placed.part.motion)
+        points[:, rows] = back[:3, :3] @ points[:, rows] + back[:3, 3:]
+    hidden = np.ones(len(met), bool)
+    for photo in photos:
+        rows = np.flatnonzero(hidden)
+        if not len(rows):
+            break
+        at, depth = photo.project(points[:, rows].T)
+        rows = rows[((at >= 0) & (at < (photo.width, photo.height))).all(axis=1) & (depth > 0)]
+        toward = points[:, rows] - photo.origin[:, None]
+        distance = np.linalg.norm(toward, axis=0)
+        ends = trace(photographed.placed, photo.origin, (toward / distance).astype(np.float32)).t
+        hidden[rows[ends > distance - REACH]] = False
+    result = np.zeros(shape, bool)
+    result.reshape(-1)[pixels[met[hidden]]] = True
+    return result
+
+
+def _original(part: Part, scene: ProceduralScene) -> Part:
+    """The part of the scene that `part` was moved or copied from."""
+    return next(known for known in scene.parts if known.primitives is part.primitives)

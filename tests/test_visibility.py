@@ -1,0 +1,58 @@
+"""What the photos of a scene showed of its surfaces, on a box on a plate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.cameras import Camera, turntable
+from cagefield.datasets.procedural.parts import Part, Primitive, place
+from cagefield.datasets.procedural.scene import ProceduralScene
+from cagefield.datasets.procedural.shapes import Box
+from cagefield.datasets.procedural.textures import Plain
+from cagefield.datasets.procedural.visibility import unseen
+
+GREY = Plain(np.array([0.5, 0.5, 0.5]))
+
+
+def box_on_plate() -> ProceduralScene:
+    plate = Part("plate", (Primitive(Box((0.8, 0.8, 0.1), 0.01), GREY, place((0, 0, -0.1))[None]),))
+    box = Part("box", (Primitive(Box((0.2, 0.2, 0.2), 0.01), GREY, place((0, 0, 0.2))[None]),))
+    return ProceduralScene("box on plate", (plate, box))
+
+
+def photos() -> tuple[Camera, ...]:
+    return turntable((0, 0, 0), 4.0, 12, elevation=0.6, width=32, height=32, fov_x=0.7)
+
+
+def above() -> Camera:
+    return Camera.look_at((0, 0.01, 4.0), (0, 0, 0), width=80, height=80, fov_x=0.5)
+
+
+def test_nothing_is_unseen_where_nothing_moved() -> None:
+    scene = box_on_plate()
+    assert not unseen(scene, above(), scene, photos()).any()
+
+
+def test_ground_under_a_moved_box_is_unseen() -> None:
+    scene = box_on_plate()
+    hidden = unseen(scene.move("box", translate=(0.0, 0.55, 0.0)), above(), scene, photos())
+    # the box's foot, 0.4 x 0.4 of a picture 2 * 4 * tan(0.25) wide, less the rows the box now hides: none
+    share = 0.4**2 / (8 * np.tan(0.25)) ** 2
+    np.testing.assert_allclose(hidden.mean(), share, rtol=0.15)
+
+
+def test_foot_of_a_turned_box_is_unseen() -> None:
+    scene = box_on_plate()
+    lying = scene.move("box", rotate=(np.pi, 0.0, 0.0), translate=(0, 0, 0.3), pivot=(0, 0, 0.2))
+    hidden = unseen(lying, above(), scene, photos())
+    assert hidden[40, 40]
+    assert not hidden[8, 8]
+
+
+def test_only_pixels_of_the_mask_are_looked_at() -> None:
+    scene = box_on_plate()
+    moved = scene.move("box", translate=(0.0, 0.55, 0.0))
+    where = np.zeros((80, 80), bool)
+    where[:, :40] = True
+    everywhere = unseen(moved, above(), scene, photos())
+    np.testing.assert_array_equal(unseen(moved, above(), scene, photos(), where), everywhere & where)
