@@ -29,13 +29,16 @@ SEAT_Z = -0.12
 
 
 def chair() -> ProceduralScene:
-    """Scene with the parts seat, cushion, back, four legs and two arm rests."""
+    """Scene with the parts seat, cushion, back, four legs and two arm rests.
+
+    Back, cushion and arm rests stand on the seat and touch nothing else, so that a cage can hold one alone.
+    """
     legs = [
         _leg(f"leg {end} {side}", x, y)
         for end, x in (("front", 0.4), ("back", -0.4))
         for side, y in (("left", 0.4), ("right", -0.4))
     ]
-    arms = [_arm("arm rest left", 0.47), _arm("arm rest right", -0.47)]
+    arms = [_arm("arm rest left", 1.0), _arm("arm rest right", -1.0)]
     return ProceduralScene("chair", (_seat(), _cushion(), _back(), *legs, *arms), lowest=-15.0)
 
 
@@ -50,30 +53,30 @@ def _seat() -> Part:
 
 def _cushion() -> Part:
     corners = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    piping = [(0.03 + 0.383 * x, 0.398 * y, SEAT_Z + 0.16) for x, y in (*corners, corners[0])]
+    piping = [(0.05 + 0.358 * x, 0.383 * y, SEAT_Z + 0.16) for x, y in (*corners, corners[0])]
     buttons = [
-        place((0.03 + 0.18 * x, 0.18 * y, SEAT_Z + 0.228), scale=(0.025, 0.025, 0.012)) for x, y in corners
+        place((0.05 + 0.18 * x, 0.18 * y, SEAT_Z + 0.228), scale=(0.025, 0.025, 0.012)) for x, y in corners
     ]
     return part(
         "cushion",
-        at(Box((0.385, 0.4, 0.07), 0.065), FABRIC, (0.03, 0, SEAT_Z + 0.16), gloss=MATTE),
+        at(Box((0.36, 0.385, 0.07), 0.065), FABRIC, (0.05, 0, SEAT_Z + 0.16), gloss=MATTE),
         tube(piping, 0.016, Plain(GOLD), gloss=MATTE),
         posed(Sphere(), Plain(GOLD), buttons),
     )
 
 
 def _back() -> Part:
-    """Frame and panel in a plane that leans back: local x across, local y up, local z to the rear."""
+    """Frame and panel on two stiles, in a plane that leans back: local x across, y up, z to the rear."""
     lean = (
-        place((-0.42, 0, SEAT_Z + 0.04), (0, -10, 0))
+        place((-0.4, 0, SEAT_Z + 0.08), (0, -10, 0))
         @ place((0, 0, 0), (90, 0, 0))
         @ place((0, 0, 0), (0, 90, 0))
     )
     crown: Points2 = smooth(
         [(0.45, 0.72), (0.3, 0.88), (0.12, 0.98), (0, 1.0), (-0.12, 0.98), (-0.3, 0.88), (-0.45, 0.72)], 3
     )
-    frame = [(0.4, 0.0), *crown, (-0.4, 0.0)]
-    middle = np.array([0.0, 0.5])
+    frame = [(0.41, 0.2), *crown, (-0.41, 0.2)]
+    middle = np.array([0.0, 0.6])
     inner = [(0.78 * x, float(middle[1] + 0.78 * (y - middle[1]) + 0.02)) for x, y in frame]
 
     def panel(
@@ -92,6 +95,11 @@ def _back() -> Part:
         "back",
         panel(frame, 0.0, 0.035, Wood(LIGHT, DARK, axis=1), 0.015, SATIN),
         panel(inner, 0.0, 0.065, FABRIC, 0.025, MATTE),
+        posed(
+            Box((0.03, 0.11, 0.03), 0.01),
+            Wood(LIGHT, DARK, axis=1),
+            [lean @ place((x, 0.117, 0)) for x in (-0.38, 0.38)],
+        ),
         posed(Sphere(0.045), Plain(GOLD), [lean @ place((0, 1.035, 0))], gloss=SHINY),
     )
 
@@ -106,13 +114,15 @@ def _leg(name: str, x: float, y: float) -> Part:
     return part(name, turned(profile, OAK, (x, y, 0.0)))
 
 
-def _arm(name: str, y: float) -> Part:
-    top = SEAT_Z + 0.42
-    path = smooth([(-0.44, 0.0), (-0.25, 0.03), (0.1, 0.02), (0.36, -0.01), (0.43, -0.06)], 3)
-    post = smooth([(0.33, top - 0.03), (0.36, top - 0.16), (0.32, SEAT_Z + 0.15), (0.35, SEAT_Z + 0.02)], 3)
+def _arm(name: str, side: float) -> Part:
+    """The arm rest at +y (side 1) or -y (side -1), on a post that leans outwards from the seat."""
+    top, foot, y = SEAT_Z + 0.42, SEAT_Z + 0.115, 0.49 * side
+    path = smooth([(-0.4, 0.0), (-0.25, 0.03), (0.1, 0.02), (0.36, -0.01), (0.43, -0.06)], 3)
+    post = smooth([(0.33, top - 0.03), (0.37, top - 0.14), (0.4, foot + 0.06), (0.435, foot)], 3)
+    lean = np.linspace(y, 0.443 * side, len(post))
     return part(
         name,
         tube([(x, y, top + z) for x, z in path], 0.045, Wood(LIGHT, DARK, axis=0)),
-        tube([(x, y, z) for x, z in post], 0.034, OAK),
+        tube([(x, at_y, z) for (x, z), at_y in zip(post, lean, strict=True)], 0.034, OAK),
         at(Box((0.13, 0.05, 0.034), 0.03), Plain(SPRIG, 0.08, 0.05), (-0.02, y, top + 0.045), gloss=MATTE),
     )
