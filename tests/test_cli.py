@@ -301,8 +301,11 @@ def test_make_scene_writes_photos(capsys: pytest.CaptureFixture[str], tmp_path: 
     assert "exists already and is not empty; give a new one, or --overwrite" in refused(capsys, *argv)
     assert files_of(out) == before
     (out / "notes.txt").write_text("mine")
-    printed(capsys, *argv[:4], "--views", 1, "--size", 8, "--test-views", 1, "--overwrite")
+    assert (out / "test" / "r_0_depth.npy").is_file() and not (out / "train" / "r_0_depth.npy").exists()
+    small = (*argv[:4], "--views", 1, "--size", 8, "--test-views", 1)
+    printed(capsys, *small, "--depth", "all", "--overwrite")
     assert len(cagefield.load_dataset(out).train) == 1 and (out / "notes.txt").read_text() == "mine"
+    assert (out / "train" / "r_0_depth.npy").is_file()
 
 
 def test_make_scene_refuses_unknown_names_and_other_folders(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -29,6 +29,8 @@ class MakeScene:
     """Number of test photos; a quarter of the training photos if left out."""
     seed: int = 0
     """Where the cameras stand."""
+    depth: Literal["all", "test", "none"] = "test"
+    """Whose depth to write too: NAME_depth.npy, distances along the rays."""
     overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Replace photos that an earlier call wrote there."""
 
@@ -50,6 +52,7 @@ class MakeScene:
                 size=self.size,
                 test_views=self.test_views,
                 seed=self.seed,
+                depth=self.depth,
                 scene=scene,
                 progress=lambda done, total: move(done, total, f"{done}/{total}"),
             )
