@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shlex
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +22,9 @@ from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Settings, Workbench, digest
 from cagefield.cages import Cage
-from cagefield.cli import main
-from cagefield.cli.bench import BenchEdits, BenchSpeed, command_line
+from cagefield.cli import main, parse
+from cagefield.cli.bench import BenchEdits, BenchSpeed, BenchTraining, command_line
+from cagefield.cli.options import PhotoOptions, TrainingOptions
 from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
@@ -476,8 +478,13 @@ def test_bench_training_writes_curve_and_scene(
 
 
 def test_command_lines() -> None:
-    options = BenchEdits(scenes=("chair",), steps=5, retrain=True, workdir=Path("w"), overwrite=True)
-    assert command_line("bench edits", options) == "cagefield bench edits --scenes chair --steps 5 --retrain"
+    short = TrainingOptions(steps=5)
+    options = BenchEdits(scenes=("chair",), training=short, retrain=True, workdir=Path("w"), overwrite=True)
+    repeated = command_line("bench edits", options)
+    assert repeated == "cagefield bench edits --scenes chair --steps 5 --retrain"
+    assert parse(shlex.split(repeated)[1:]).what.training == short
+    curve = BenchTraining(PhotoOptions(Path("d"), holdout=4), Path("c.csv"), TrainingOptions(sh_degree=2))
+    assert command_line("bench training", curve) == "cagefield bench training d --holdout 4 --sh-degree 2"
     assert command_line("bench speed", BenchSpeed(Path("my scene"))) == "cagefield bench speed 'my scene'"
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Literal
 
 import tyro
 
-from cagefield.cli.options import Output, check_folder, progress_bar
+from cagefield.cli.options import Flag, Output, check_folder, progress_bar
 
 _MARK = "transforms_train.json"
 _OWN = (_MARK, "transforms_test.json", "transforms_val.json", "train", "test", "val")
@@ -31,7 +31,7 @@ class MakeScene:
     """Where the cameras stand."""
     depth: Literal["all", "test", "none"] = "test"
     """Whose depth to write too: NAME_depth.npy, distances along the rays."""
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    overwrite: Flag = False
     """Replace photos that an earlier call wrote there."""
 
     def run(self) -> None:

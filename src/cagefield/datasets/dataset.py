@@ -24,7 +24,7 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
     side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
     name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
 
-    Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` that is
+    Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` of
     1 or below 0, whether there is a test split or not.
     """
     check_holdout(holdout)
