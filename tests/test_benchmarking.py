@@ -369,7 +369,7 @@ def test_frame_times() -> None:
 # -- training curves ---------------------------------------------------------------------------------------
 
 
-def test_curve_stops_and_goes_on_to_the_same_field(bench: Workbench) -> None:
+def test_curve_is_taken_on_the_way_to_the_same_field(bench: Workbench) -> None:
     dataset = bench.photos("microphone")
     curve = training.measure(dataset, TINY.config, views=2, shares=(0.2, 0.6))
     assert [point.step for point in curve.points] == [12, 36, 60]

@@ -30,7 +30,6 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.benchmarking.cases import Case
     from cagefield.benchmarking.workbench import Workbench
-    from cagefield.training.voxel import Progress
 
 _SILENT = ("workdir", "out", "pictures", "picture_size", "error_panel", "overwrite", "scene_out")
 
@@ -232,11 +231,13 @@ class BenchTraining:
             )
 
         with progress_bar("Training") as move:
-
-            def show(progress: Progress) -> None:
-                move(progress.done, 1.0, f"PSNR {progress.psnr:.1f} dB, {progress.resolution}^3 grid")
-
-            curve = measure(dataset, config, views=self.curve_views, on_progress=show, on_point=tell)
+            curve = measure(
+                dataset,
+                config,
+                views=self.curve_views,
+                on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
+                on_point=tell,
+            )
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench training', self)}`")
         result = curve.table(dataset.name, notes)
         result.show()

@@ -61,19 +61,16 @@ def train_scene(
     Its background is what the photos have: white behind cut-outs, else black.
     """
     from cagefield.scene import Scene
-    from cagefield.training.voxel import Progress, train_voxel
+    from cagefield.training.voxel import train_voxel
 
     with progress_bar("Training") as move:
-
-        def show(progress: Progress) -> None:
-            move(
-                progress.done,
-                1.0,
-                f"loss {progress.loss:.5f}, PSNR {progress.psnr:.1f} dB, "
-                f"{progress.rays_per_second / 1e3:.0f} k rays/s, {progress.resolution}^3 grid",
-            )
-
-        result = train_voxel(dataset, config, checkpoint=checkpoint, resume=resume, on_progress=show)
+        result = train_voxel(
+            dataset,
+            config,
+            checkpoint=checkpoint,
+            resume=resume,
+            on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
+        )
     cameras = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     scene = Scene(
         result.field,
