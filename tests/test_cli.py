@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -155,6 +156,13 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
         '2. "gone": delete',
     ):
         assert fact in text
+
+
+def test_info_shows_the_brightness_of_the_photos(capsys: pytest.CaptureFixture[str], scene: Path) -> None:
+    assert "exposure    " not in printed(capsys, "info", scene)
+    gains = ((0.9, 1.0, 1.1), (1.0, 1.0, 1.0), (1.1, 1.0, 0.75))
+    replace(Scene.open(scene), gains=gains).save(scene, overwrite=True)
+    assert "exposure    gains of 3 training photos, from 0.750 to 1.100\n" in printed(capsys, "info", scene)
 
 
 def test_info_names_edits_that_cannot_be_evaluated(

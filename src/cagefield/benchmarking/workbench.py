@@ -132,11 +132,7 @@ class Workbench:
             )
         if not result.finished:
             raise KeyboardInterrupt
-        cameras = {"train": dataset.train, "test": dataset.test}
-        scene = Scene(
-            result.field,
-            cameras={split: tuple(view.camera for view in views) for split, views in cameras.items()},
-        )
+        scene = Scene.trained(result, dataset)
         scene.save(path, overwrite=True)
         return scene
 

@@ -245,14 +245,7 @@ class BenchTraining:
         write_text(self.out.with_suffix(".md"), result.markdown())
         print(f"curve written to {self.out} and {self.out.with_suffix('.md')}")
         if self.scene_out is not None:
-            views = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
-            Scene(
-                curve.result.field,
-                cameras={
-                    split: tuple(v.camera for v in members) for split, members in views.items() if members
-                },
-                background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
-            ).save(self.scene_out, self.overwrite)
+            Scene.trained(curve.result, dataset).save(self.scene_out, self.overwrite)
             print(f"scene written to {self.scene_out}")
 
 

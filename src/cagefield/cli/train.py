@@ -56,10 +56,7 @@ class Train:
 def train_scene(
     dataset: Dataset, config: VoxelConfig, checkpoint: Path | None = None, *, resume: bool = False
 ) -> tuple[Scene, TrainResult]:
-    """The trained scene, with a progress bar on stderr, and the figures of the training.
-
-    Its background is what the photos have: white behind cut-outs, else black.
-    """
+    """The trained scene, with a progress bar on stderr, and the figures of the training."""
     from cagefield.scene import Scene
     from cagefield.training.voxel import train_voxel
 
@@ -71,13 +68,7 @@ def train_scene(
             resume=resume,
             on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
         )
-    cameras = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
-    scene = Scene(
-        result.field,
-        cameras={split: tuple(view.camera for view in views) for split, views in cameras.items() if views},
-        background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
-    )
-    return scene, result
+    return Scene.trained(result, dataset), result
 
 
 def summary(result: TrainResult) -> str:
