@@ -31,6 +31,7 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.scene import Scene
 from cagefield.training.voxel import VoxelConfig, train_voxel
+from commands import refused
 from scenes import ball_scene, files_of
 
 DISCRETE = [case for case in CASES if case.moved is not None]
@@ -398,14 +399,6 @@ def test_curves_refuse_what_they_cannot_measure(bench: Workbench) -> None:
 # -- commands ----------------------------------------------------------------------------------------------
 
 
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line that a refused benchmark prints on stderr."""
-    assert main(["bench", *map(str, argv)]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith("cagefield: ") and err.count("\n") == 1
-    return err
-
-
 def test_bench_speed_writes_json_and_markdown(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "scene")
     argv = ["bench", "speed", str(tmp_path / "scene"), "--size", "24x16", "--rounds", "1", "--cameras", "1"]
@@ -417,10 +410,12 @@ def test_bench_speed_writes_json_and_markdown(capsys: pytest.CaptureFixture[str]
     assert (tmp_path / "speed.md").read_text().startswith("# Frame times at 24x16")
     before = files_of(tmp_path)
     assert "speed.json exists already" in refused(
-        capsys, "speed", tmp_path / "scene", "-o", tmp_path / "speed.json"
+        capsys, "bench", "speed", tmp_path / "scene", "-o", tmp_path / "speed.json"
     )
-    assert "must end in .json" in refused(capsys, "speed", tmp_path / "scene", "-o", tmp_path / "speed.txt")
-    assert "--cameras is 0" in refused(capsys, "speed", tmp_path / "scene", "--cameras", 0)
+    assert "must end in .json" in refused(
+        capsys, "bench", "speed", tmp_path / "scene", "-o", tmp_path / "speed.txt"
+    )
+    assert "--cameras is 0" in refused(capsys, "bench", "speed", tmp_path / "scene", "--cameras", 0)
     assert files_of(tmp_path) == before
 
 
@@ -428,8 +423,8 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     (tmp_path / "edits.md").write_text("mine")
     (tmp_path / "digger_move_cone.png").write_text("mine")
     before = files_of(tmp_path)
-    assert "edits.md exists already" in refused(capsys, "edits", "-o", tmp_path / "edits.md")
-    new = ["edits", "-o", tmp_path / "new.md"]
+    assert "edits.md exists already" in refused(capsys, "bench", "edits", "-o", tmp_path / "edits.md")
+    new = ["bench", "edits", "-o", tmp_path / "new.md"]
     assert "move_cone.png exists already" in refused(capsys, *new, "--pictures", tmp_path)
     assert "no scene 'castle'" in refused(capsys, *new, "--scenes", "castle")
     assert "minutes is 0.0" in refused(capsys, *new, "--minutes", 0)
@@ -459,9 +454,11 @@ def test_bench_edits_writes_table_and_pictures(
 
 def test_bench_training_refuses(capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench) -> None:
     data = bench.photos("microphone").path
-    assert "must end in .csv" in refused(capsys, "training", data, "-o", tmp_path / "curve.md")
+    assert "must end in .csv" in refused(capsys, "bench", "training", data, "-o", tmp_path / "curve.md")
     (tmp_path / "curve.md").write_text("mine")
-    assert "curve.md exists already" in refused(capsys, "training", data, "-o", tmp_path / "curve.csv")
+    assert "curve.md exists already" in refused(
+        capsys, "bench", "training", data, "-o", tmp_path / "curve.csv"
+    )
     assert files_of(tmp_path) == {"curve.md": b"mine"}
 
 

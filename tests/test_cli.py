@@ -14,6 +14,7 @@ import pytest
 import cagefield
 from cagefield import Scene, load_edits
 from cagefield.cli import main
+from commands import printed, refused
 from scenes import ball_scene, files_of
 
 GOOD_EDIT = """
@@ -41,24 +42,6 @@ def edit_file(tmp_path: Path) -> Path:
     """An edit file with a continuous edit and a delete."""
     (tmp_path / "edits.yaml").write_text(GOOD_EDIT)
     return tmp_path / "edits.yaml"
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line that a refused command prints on stderr."""
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("cagefield: ") and err.count("\n") == 1 and err.endswith("\n")
-    assert "Traceback" not in err
-    return err
-
-
-def printed(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """What a command that succeeds prints on stdout."""
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 0
-    return capsys.readouterr().out
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
