@@ -28,13 +28,6 @@ def safe_inverse(d: vec3):
 
 
 @qd.func
-def brick_code(codes: qd.template(), cell: ivec3, origin: ivec3, dims: ivec3):
-    """The code of the brick that holds a cell; cells outside the brick grid take the nearest brick."""
-    b = qd.max(qd.min((cell - origin) >> 2, dims - 1), 0)
-    return codes[(b.x * dims.y + b.y) * dims.z + b.z]
-
-
-@qd.func
 def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims: ivec3):
     """The ray parameter to the exit of the empty block around grid coordinates g; -1 where it is occupied."""
     cell = qd.cast(qd.floor(g), qd.i32) - origin
@@ -61,6 +54,16 @@ def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims:
 
 
 @qd.func
+def is_occupied(codes: qd.template(), g: vec3, dims: ivec3):
+    """True where the sub-block around grid coordinates g is occupied; the brick grid begins at 0."""
+    cell = qd.cast(g, qd.i32)
+    b = qd.min(cell >> 2, dims - 1)
+    code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
+    s = (cell >> 1) & 1
+    return code < 256 and (code >> (s.x * 4 + s.y * 2 + s.z)) & 1 == 1
+
+
+@qd.func
 def look_ahead(
     codes: qd.template(),
     q: vec3,
@@ -72,12 +75,12 @@ def look_ahead(
     dims: ivec3,
     contracted: qd.template(),
 ):
-    """(g, h, leap, last) at a point q of a ray with velocity gd and its inverse.
+    """(g, h, empty, leap, last) at a point q of a ray with velocity gd and its inverse.
 
-    q and gd are in grid coordinates or, when contracted, normalised ones, with half = (resolution - 1) / 4.
-    g: grid coordinates of q. h: ray parameter of one step. leap: the ray parameter to go on by through empty
-    space, whole steps in a bounded grid; -1 where the block is occupied. last: 1 from half a voxel before
-    infinity on.
+    q and gd are in grid coordinates or, when contracted, normalised ones; half = (resolution - 1) / 4.
+    g: grid coordinates of q. h: ray parameter of one step. empty: 1 where the block around q is. leap: the
+    ray parameter to go on by then, whole steps if bounded. last: 1 from half a voxel before infinity on,
+    where a contracted march ends.
 
     A contracted ray is bent outside the inner box: it goes half of the straight run there, and no farther
     than a quarter of the way to the centre.
