@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 import numpy as np
-from hypothesis import assume, settings
+from hypothesis import HealthCheck, assume, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -30,9 +30,17 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def examples(count: int) -> settings:
-    """Settings for a property test: always the same examples, times CAGEFIELD_EXAMPLES if that is set."""
+    """Settings for a property test: always the same examples, times CAGEFIELD_EXAMPLES if that is set.
+
+    How fast they are made is the machine's affair: no deadline, no complaint about slow generation.
+    """
     times = int(os.environ.get("CAGEFIELD_EXAMPLES", "1"))
-    return settings(max_examples=count * times, deadline=None, derandomize=True)
+    return settings(
+        max_examples=count * times,
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
 
 
 @st.composite

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shlex
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -21,14 +22,16 @@ from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Settings, Workbench, digest
 from cagefield.cages import Cage
-from cagefield.cli import main
-from cagefield.cli.bench import BenchEdits, BenchSpeed, command_line
+from cagefield.cli import main, parse
+from cagefield.cli.bench import BenchEdits, BenchSpeed, BenchTraining, command_line
+from cagefield.cli.options import PhotoOptions, TrainingOptions
 from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.scene import Scene
 from cagefield.training.voxel import VoxelConfig, train_voxel
+from commands import refused
 from scenes import ball_scene, files_of
 
 DISCRETE = [case for case in CASES if case.moved is not None]
@@ -367,7 +370,7 @@ def test_frame_times() -> None:
 # -- training curves ---------------------------------------------------------------------------------------
 
 
-def test_curve_stops_and_goes_on_to_the_same_field(bench: Workbench) -> None:
+def test_curve_is_taken_on_the_way_to_the_same_field(bench: Workbench) -> None:
     dataset = bench.photos("microphone")
     curve = training.measure(dataset, TINY.config, views=2, shares=(0.2, 0.6))
     assert [point.step for point in curve.points] == [12, 36, 60]
@@ -396,14 +399,6 @@ def test_curves_refuse_what_they_cannot_measure(bench: Workbench) -> None:
 # -- commands ----------------------------------------------------------------------------------------------
 
 
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line that a refused benchmark prints on stderr."""
-    assert main(["bench", *map(str, argv)]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith("cagefield: ") and err.count("\n") == 1
-    return err
-
-
 def test_bench_speed_writes_json_and_markdown(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "scene")
     argv = ["bench", "speed", str(tmp_path / "scene"), "--size", "24x16", "--rounds", "1", "--cameras", "1"]
@@ -415,10 +410,12 @@ def test_bench_speed_writes_json_and_markdown(capsys: pytest.CaptureFixture[str]
     assert (tmp_path / "speed.md").read_text().startswith("# Frame times at 24x16")
     before = files_of(tmp_path)
     assert "speed.json exists already" in refused(
-        capsys, "speed", tmp_path / "scene", "-o", tmp_path / "speed.json"
+        capsys, "bench", "speed", tmp_path / "scene", "-o", tmp_path / "speed.json"
     )
-    assert "must end in .json" in refused(capsys, "speed", tmp_path / "scene", "-o", tmp_path / "speed.txt")
-    assert "--cameras is 0" in refused(capsys, "speed", tmp_path / "scene", "--cameras", 0)
+    assert "must end in .json" in refused(
+        capsys, "bench", "speed", tmp_path / "scene", "-o", tmp_path / "speed.txt"
+    )
+    assert "--cameras is 0" in refused(capsys, "bench", "speed", tmp_path / "scene", "--cameras", 0)
     assert files_of(tmp_path) == before
 
 
@@ -426,8 +423,8 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     (tmp_path / "edits.md").write_text("mine")
     (tmp_path / "digger_move_cone.png").write_text("mine")
     before = files_of(tmp_path)
-    assert "edits.md exists already" in refused(capsys, "edits", "-o", tmp_path / "edits.md")
-    new = ["edits", "-o", tmp_path / "new.md"]
+    assert "edits.md exists already" in refused(capsys, "bench", "edits", "-o", tmp_path / "edits.md")
+    new = ["bench", "edits", "-o", tmp_path / "new.md"]
     assert "move_cone.png exists already" in refused(capsys, *new, "--pictures", tmp_path)
     assert "no scene 'castle'" in refused(capsys, *new, "--scenes", "castle")
     assert "minutes is 0.0" in refused(capsys, *new, "--minutes", 0)
@@ -457,9 +454,11 @@ def test_bench_edits_writes_table_and_pictures(
 
 def test_bench_training_refuses(capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Workbench) -> None:
     data = bench.photos("microphone").path
-    assert "must end in .csv" in refused(capsys, "training", data, "-o", tmp_path / "curve.md")
+    assert "must end in .csv" in refused(capsys, "bench", "training", data, "-o", tmp_path / "curve.md")
     (tmp_path / "curve.md").write_text("mine")
-    assert "curve.md exists already" in refused(capsys, "training", data, "-o", tmp_path / "curve.csv")
+    assert "curve.md exists already" in refused(
+        capsys, "bench", "training", data, "-o", tmp_path / "curve.csv"
+    )
     assert files_of(tmp_path) == {"curve.md": b"mine"}
 
 
@@ -476,8 +475,13 @@ def test_bench_training_writes_curve_and_scene(
 
 
 def test_command_lines() -> None:
-    options = BenchEdits(scenes=("chair",), steps=5, retrain=True, workdir=Path("w"), overwrite=True)
-    assert command_line("bench edits", options) == "cagefield bench edits --scenes chair --steps 5 --retrain"
+    short = TrainingOptions(steps=5)
+    options = BenchEdits(scenes=("chair",), training=short, retrain=True, workdir=Path("w"), overwrite=True)
+    repeated = command_line("bench edits", options)
+    assert repeated == "cagefield bench edits --scenes chair --steps 5 --retrain"
+    assert parse(shlex.split(repeated)[1:]).what.training == short
+    curve = BenchTraining(PhotoOptions(Path("d"), holdout=4), Path("c.csv"), TrainingOptions(sh_degree=2))
+    assert command_line("bench training", curve) == "cagefield bench training d --holdout 4 --sh-degree 2"
     assert command_line("bench speed", BenchSpeed(Path("my scene"))) == "cagefield bench speed 'my scene'"
 
 

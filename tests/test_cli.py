@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import cagefield
 from cagefield import Scene, load_edits
 from cagefield.cli import main
+from commands import printed, refused
 from scenes import ball_scene, files_of
 
 GOOD_EDIT = """
@@ -40,24 +42,6 @@ def edit_file(tmp_path: Path) -> Path:
     """An edit file with a continuous edit and a delete."""
     (tmp_path / "edits.yaml").write_text(GOOD_EDIT)
     return tmp_path / "edits.yaml"
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """The one line that a refused command prints on stderr."""
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("cagefield: ") and err.count("\n") == 1 and err.endswith("\n")
-    assert "Traceback" not in err
-    return err
-
-
-def printed(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """What a command that succeeds prints on stdout."""
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 0
-    return capsys.readouterr().out
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,6 +139,13 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
         '2. "gone": delete',
     ):
         assert fact in text
+
+
+def test_info_shows_the_brightness_of_the_photos(capsys: pytest.CaptureFixture[str], scene: Path) -> None:
+    assert "exposure    " not in printed(capsys, "info", scene)
+    gains = ((0.9, 1.0, 1.1), (1.0, 1.0, 1.0), (1.1, 1.0, 0.75))
+    replace(Scene.open(scene), gains=gains).save(scene, overwrite=True)
+    assert "exposure    gains of 3 training photos, from 0.750 to 1.100\n" in printed(capsys, "info", scene)
 
 
 def test_info_names_edits_that_cannot_be_evaluated(
@@ -301,8 +292,11 @@ def test_make_scene_writes_photos(capsys: pytest.CaptureFixture[str], tmp_path: 
     assert "exists already and is not empty; give a new one, or --overwrite" in refused(capsys, *argv)
     assert files_of(out) == before
     (out / "notes.txt").write_text("mine")
-    printed(capsys, *argv[:4], "--views", 1, "--size", 8, "--test-views", 1, "--overwrite")
+    assert (out / "test" / "r_0_depth.npy").is_file() and not (out / "train" / "r_0_depth.npy").exists()
+    small = (*argv[:4], "--views", 1, "--size", 8, "--test-views", 1)
+    printed(capsys, *small, "--depth", "all", "--overwrite")
     assert len(cagefield.load_dataset(out).train) == 1 and (out / "notes.txt").read_text() == "mine"
+    assert (out / "train" / "r_0_depth.npy").is_file()
 
 
 def test_make_scene_refuses_unknown_names_and_other_folders(

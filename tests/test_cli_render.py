@@ -12,6 +12,7 @@ import pytest
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cli import main
 from cagefield.rendering.images import read_image
+from commands import refused
 from scenes import ball_scene, files_of
 
 
@@ -26,14 +27,6 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(*argv: object) -> None:
     assert main([str(arg) for arg in argv]) == 0
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith("cagefield: ") and err.count("\n") == 1
-    return err
 
 
 def video(path: Path) -> tuple[dict[str, object], int]:

@@ -13,6 +13,7 @@ from cagefield import Scene, load_dataset
 from cagefield.cli import main
 from cagefield.datasets.procedural import make_scene
 from cagefield.rendering.images import read_image
+from commands import refused
 from scenes import ball_scene, files_of
 
 QUICK = ("--steps", "60", "--resolution", "48")
@@ -23,14 +24,6 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A few small photos of the chair."""
     path = tmp_path_factory.mktemp("photos") / "chair"
     return make_scene("chair", path, views=8, size=48, test_views=2)
-
-
-def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    capsys.readouterr()
-    assert main([str(arg) for arg in argv]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith("cagefield: ") and err.count("\n") == 1
-    return err
 
 
 def test_train_writes_a_scene(photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

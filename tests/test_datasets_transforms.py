@@ -413,6 +413,13 @@ def test_bad_options(tmp_path, options, message):
         load_dataset(tmp_path, **options)
 
 
+def test_bad_holdout_of_a_capture_with_a_test_split(tmp_path):
+    _synthetic(tmp_path)
+    with pytest.raises(DatasetError, match=r"holdout must be 0 .* or a whole number from 2, got 1"):
+        load_dataset(tmp_path, holdout=1)
+    assert len(load_dataset(tmp_path, holdout=2).test) == 3  # the split's own views
+
+
 @pytest.fixture(scope="module")
 def fox():
     if not (DATA / "fox").is_dir():

@@ -421,6 +421,19 @@ def test_make_scene_is_a_nerf_synthetic_data_set(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mic"]
 
 
+@pytest.mark.parametrize(
+    ("depth", "splits"), [("all", ["test", "train", "val"]), ("test", ["test"]), ("none", [])]
+)
+def test_make_scene_writes_the_depth_that_is_asked_for(tmp_path, depth, splits):
+    out = make_scene("plant", tmp_path / "plant", views=1, size=12, test_views=1, depth=depth)
+    written = sorted(out.rglob("*_depth.npy"))
+    assert [path.parent.name for path in written] == splits
+    scene, data = procedural_scene("plant"), load_dataset(out)
+    for path in written:
+        truth = scene.photograph(getattr(data, path.parent.name)[0].camera).depth
+        np.testing.assert_array_equal(np.load(path), truth)
+
+
 def test_make_scene_of_a_moved_scene_and_other_seeds(tmp_path):
     scene = procedural_scene("plant").remove("pinecone")
     out = make_scene("plant", tmp_path / "bare", views=1, size=24, test_views=1, seed=5, scene=scene)
@@ -437,6 +450,8 @@ def test_make_scene_refuses_what_is_there_and_leaves_no_half(tmp_path):
         make_scene("sofa", tmp_path / "a")
     with pytest.raises(DatasetError, match="views must be at least 1, not 0"):
         make_scene("chair", tmp_path / "a", views=0)
+    with pytest.raises(DatasetError, match="depth must be one of all, test, none, not 'train'"):
+        make_scene("chair", tmp_path / "a", depth="train")
 
     def interrupt(done, total):
         raise KeyboardInterrupt

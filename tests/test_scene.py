@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cagefield import Cage, Edit, EditStack, Scene
+from cagefield import Cage, Edit, EditStack, Scene, load_dataset
 from cagefield.cameras import Camera
+from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
 from cagefield.fields.voxel import VoxelField
 from cagefield.scene import check_destination
+from cagefield.training.voxel import TrainResult
 from scenes import ball_field, ball_scene, files_of
 
 
@@ -39,6 +42,28 @@ def test_round_trip_is_exact(tmp_path: Path) -> None:
 def test_background_none_survives(tmp_path: Path) -> None:
     Scene(ball_field(), background=None).save(tmp_path / "scene")
     assert Scene.open(tmp_path / "scene").background is None
+
+
+def test_gains_survive_saving_and_editing(tmp_path: Path) -> None:
+    gains = ((0.9, 1.0, 1.1), (1.0, 1.0, 1.0), (1.1, 1.0, 0.9))
+    dataclasses.replace(ball_scene(), gains=gains).save(tmp_path / "scene")
+    edited = Scene.open(tmp_path / "scene").with_edits(EditStack([Edit.delete(Cage.box((0, 0, 0), 0.2))]))
+    edited.save(tmp_path / "edited")
+    assert Scene.open(tmp_path / "edited").gains == gains
+    ball_scene().save(tmp_path / "plain")
+    assert "gains" not in json.loads((tmp_path / "plain" / "scene.json").read_text())
+    assert Scene.open(tmp_path / "plain").gains == ()
+
+
+def test_a_trained_scene_has_the_gains_that_were_fitted(tmp_path: Path) -> None:
+    dataset = load_dataset(make_scene("plant", tmp_path / "photos", views=3, size=16, test_views=1))
+    gains = np.array([[0.9, 1.0, 1.1], [1.0, 1.0, 1.0], [1.1, 1.0, 0.9]], np.float32)
+    result = TrainResult(ball_field(), 1, 1.0, 0.0, 0.0, 0.0, gains, True)
+    scene = Scene.trained(result, dataset)
+    np.testing.assert_array_equal(np.array(scene.gains, np.float32), gains)
+    assert [len(scene.cameras[split]) for split in ("train", "test", "val")] == [3, 1, 1]
+    assert scene.background == (1.0, 1.0, 1.0)
+    assert Scene.trained(dataclasses.replace(result, gains=np.ones_like(gains)), dataset).gains == ()
 
 
 def test_existing_scene_needs_overwrite(tmp_path: Path) -> None:
@@ -149,6 +174,9 @@ def test_truncated_file_is_named(
         ({"format": "other"}, "format is 'other', expected \"cagefield-scene\""),
         ({"background": [0, 0, 2]}, r"scene\.json: background must be three numbers in \[0, 1\]"),
         ({"background": "pink"}, r"scene\.json: background must be"),
+        ({"gains": [[1, 1, 1]]}, r"scene\.json: 1 gains for 3 train cameras"),
+        ({"gains": [[1, 1]] * 3}, r"scene\.json: gains must be a list of \[r, g, b\]"),
+        ({"gains": [[1, 1, 1], [1, 0, 1], [1, 1, 1]]}, r"scene\.json: gains\[1\] is \[1.0, 0.0, 1.0\]; each"),
     ],
 )
 def test_bad_manifest_is_named(tmp_path: Path, changes: dict[str, object], message: str) -> None:

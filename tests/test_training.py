@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from cagefield import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
+from cagefield.training.progress import Snapshots
 from cagefield.training.voxel import VoxelConfig, train_voxel
 
 devices.start("cpu")
@@ -74,6 +77,50 @@ def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path)
     assert second.finished
     np.testing.assert_array_equal(second.field.vertices, trained.field.vertices)
     np.testing.assert_array_equal(second.field.density, trained.field.density)
+
+
+def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, trained):
+    fields, clock = {}, {}
+
+    def take(progress, field):
+        fields[progress.step] = field
+        time.sleep(1.0)
+
+    def look(progress):
+        clock[progress.step] = progress.seconds
+
+    result = train_voxel(
+        dataset, CONFIG, on_progress=look, snapshots=Snapshots(take, steps=(90, 2, 150)), evaluate=False
+    )
+    assert list(fields) == [2, 90, 150]
+    np.testing.assert_array_equal(fields[150].density, trained.field.density)
+    np.testing.assert_array_equal(result.field.density, trained.field.density)
+    # A batch of 1,024 rays takes milliseconds; the second of sleep before it does not count.
+    assert clock[91] - clock[90] < 0.5
+
+
+def test_snapshots_by_the_clock_come_once_each(dataset):
+    seen = []
+    train_voxel(
+        dataset,
+        replace(CONFIG, steps=4),
+        snapshots=Snapshots(lambda progress, _: seen.append(progress.seconds), minutes=(1e-9, 2e-9)),
+        evaluate=False,
+    )
+    assert len(seen) == 1 and seen[0] > 0
+    times = Snapshots(lambda progress, field: None, steps=(3,), minutes=(0.5, 0.51))
+    assert times.due((2, 0.0), (3, 1.0)) and not times.due((3, 0.0), (4, 1.0))
+    assert times.due((4, 29.0), (5, 30.0)) and not times.due((5, 30.0), (6, 30.5))
+    assert times.due((6, 30.5), (7, 31.0)) and not times.due((7, 31.0), (8, 60.0))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [({"steps": (5, 0)}, "after step 0; it must be"), ({"minutes": (-1.0,)}, r"after -1.0 minutes; it must")],
+)
+def test_impossible_snapshots_are_named(settings, message):
+    with pytest.raises(CagefieldError, match=message):
+        Snapshots(print, **settings)
 
 
 def test_a_damaged_or_foreign_checkpoint_is_refused(dataset, tmp_path):

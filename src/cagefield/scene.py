@@ -4,7 +4,8 @@
       field.safetensors   the VoxelField, in canonical space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
-      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null}
+      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
+                          "gains": [[r, g, b], ...] if photos were brighter or darker than the field}
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
@@ -30,7 +31,9 @@ from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
 
 if TYPE_CHECKING:
+    from cagefield.datasets import Dataset
     from cagefield.rendering.renderer import Renderer
+    from cagefield.training.voxel import TrainResult
 
 FORMAT = "cagefield-scene"
 VERSION = 1
@@ -44,11 +47,12 @@ class Scene:
     """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
 
     Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
-    when it is rendered.
+    when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
+    the field's picture, per channel, one for each "train" camera; empty where none were fitted.
 
     Raises:
         CagefieldError: a background outside [0, 1].
-        SceneError: a version this cagefield does not write.
+        SceneError: a version this cagefield does not write, gains that do not fit the cameras.
     """
 
     field: VoxelField
@@ -56,6 +60,7 @@ class Scene:
     cameras: Mapping[str, tuple[Camera, ...]] = dataclasses.field(default_factory=dict)
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     version: int = VERSION
+    gains: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -63,6 +68,21 @@ class Scene:
         object.__setattr__(self, "background", background_rgb(self.background))
         if self.version != VERSION:
             raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
+        object.__setattr__(self, "gains", _gains(self.gains, len(cameras.get("train", ()))))
+
+    @classmethod
+    def trained(cls, result: TrainResult, dataset: Dataset) -> Scene:
+        """The scene of a field trained on a data set, with its cameras and no edits.
+
+        Its background is what the photos have: white behind cut-outs, else black.
+        """
+        splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
+        return cls(
+            result.field,
+            cameras={split: tuple(view.camera for view in views) for split, views in splits.items() if views},
+            background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
+            gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
+        )
 
     @classmethod
     def open(cls, path: Path | str) -> Scene:
@@ -76,13 +96,17 @@ class Scene:
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        background = _read_manifest(folder)
+        background, gains = _read_manifest(folder)
         for name in (_FIELD, _CAMERAS, _EDITS):
             if not (folder / name).is_file():
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
         cameras = _read_cameras(folder / _CAMERAS)
         edits = load_edits(folder / _EDITS, check=False)
-        return cls(VoxelField.load(folder / _FIELD), edits, cameras, background)
+        field = VoxelField.load(folder / _FIELD)
+        try:
+            return cls(field, edits, cameras, background, gains=gains)
+        except SceneError as error:
+            raise SceneError(f"{folder / _MANIFEST}: {error}") from None
 
     def save(self, path: Path | str, overwrite: bool = False) -> None:
         """Writes the scene folder `path`, complete or not at all.
@@ -102,6 +126,8 @@ class Scene:
                 draft / _CAMERAS,
             )
             manifest = {"format": FORMAT, "version": self.version, "background": self.background}
+            if self.gains:
+                manifest["gains"] = self.gains
             _write_json(manifest, draft / _MANIFEST)
 
     def with_edits(self, edits: EditStack) -> Scene:
@@ -187,7 +213,22 @@ def is_scene(path: Path | str) -> bool:
     return isinstance(document, dict) and document.get("format") == FORMAT
 
 
-def _read_manifest(folder: Path) -> tuple[float, float, float] | None:
+def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
+    """The gains as tuples, none or `count` of them."""
+    try:
+        gains = tuple((float(r), float(g), float(b)) for r, g, b in values)
+    except (TypeError, ValueError):
+        raise SceneError(f"gains must be a list of [r, g, b], got {values!r}") from None
+    if gains and len(gains) != count:
+        raise SceneError(f"{len(gains)} gains for {count} train cameras; give each one, or none")
+    for index, gain in enumerate(gains):
+        if not all(0.0 < channel < math.inf for channel in gain):
+            raise SceneError(f"gains[{index}] is {list(gain)}; each must be a number above 0")
+    return gains
+
+
+def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any]:
+    """Background and gains, the latter unchecked."""
     path = folder / _MANIFEST
     if not path.is_file():
         raise SceneError(
@@ -206,7 +247,7 @@ def _read_manifest(folder: Path) -> tuple[float, float, float] | None:
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
     try:
-        return background_rgb(document.get("background"))
+        return background_rgb(document.get("background")), document.get("gains", ())
     except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
 

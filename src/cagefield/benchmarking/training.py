@@ -5,18 +5,15 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
-import signal
-import tempfile
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from cagefield.benchmarking.tables import Table, number
-from cagefield.datasets import Dataset
+from cagefield.datasets import Dataset, View
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
-from cagefield.training.voxel import Progress, TrainResult, VoxelConfig, evaluate_views, train_voxel
+from cagefield.training.progress import Progress, Snapshots
+from cagefield.training.voxel import TrainResult, VoxelConfig, evaluate_views, train_voxel
 
 SHARES = (0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
 """Shares of the training at which the curve has a point, before the last at its end."""
@@ -93,11 +90,8 @@ def measure(
 ) -> Curve:
     """The curve of one training; its points are on `views` test views, spread evenly over the split.
 
-    The training is interrupted as by Ctrl-C at each share and resumed from its checkpoint, so it must run in
-    the main thread.
-
     Raises:
-        CagefieldError: no test views, another thread, shares that do not grow from 0 to 1.
+        CagefieldError: no test views, shares that do not grow from 0 to 1.
         KeyboardInterrupt: Ctrl-C.
     """
     if not dataset.test:
@@ -106,49 +100,40 @@ def measure(
         raise CagefieldError(f"views is {views}; it must be at least 1")
     if any(a >= b for a, b in zip((0.0, *shares), (*shares, 1.0), strict=True)):
         raise CagefieldError(f"shares must grow and lie between 0 and 1, got {list(shares)}")
-    if threading.current_thread() is not threading.main_thread():
-        raise CagefieldError("a training curve must be measured in the main thread")
     some = dataset.test[:: -(-len(dataset.test) // views)]
-    last: list[Progress] = []
     points: list[Point] = []
+    last: list[Progress] = []
 
-    def add(field: VoxelField, chosen: Sequence[object]) -> None:
-        psnr, ssim = evaluate_views(field, tuple(chosen))  # type: ignore[arg-type]
-        now = last[-1]
+    def add(now: Progress, field: VoxelField, chosen: tuple[View, ...] = some) -> None:
+        psnr, ssim = evaluate_views(field, chosen)
         points.append(
             Point(now.seconds, now.step, now.resolution, now.voxels, now.psnr, psnr, ssim, len(chosen))
         )
         if on_point is not None:
             on_point(points[-1])
 
-    with tempfile.TemporaryDirectory(prefix="cagefield-") as folder:
-        checkpoint = Path(folder) / "training.npz"
-        for share in (*shares, 2.0):
-            stopped: list[bool] = []
+    def watch(progress: Progress) -> None:
+        last[:] = [progress]
+        if on_progress is not None:
+            on_progress(progress)
 
-            def watch(progress: Progress, share: float = share, stopped: list[bool] = stopped) -> None:
-                last[:] = [progress]
-                if on_progress is not None:
-                    on_progress(progress)
-                if share <= progress.done < 1.0 and not stopped:
-                    stopped.append(True)
-                    signal.raise_signal(signal.SIGINT)
-
-            result = train_voxel(
-                dataset,
-                config,
-                checkpoint=checkpoint,
-                resume=checkpoint.is_file(),
-                on_progress=watch,
-                evaluate=False,
-            )
-            if result.finished:
-                break
-            if not stopped:
-                raise KeyboardInterrupt
-            add(result.field, some)
-    add(result.field, dataset.test)
+    result = train_voxel(
+        dataset, config, on_progress=watch, snapshots=_snapshots(config, shares, add), evaluate=False
+    )
+    if not result.finished:
+        raise KeyboardInterrupt
+    add(last[0], result.field, dataset.test)
     return Curve(tuple(points), result)
+
+
+def _snapshots(
+    config: VoxelConfig, shares: Sequence[float], on_field: Callable[[Progress, VoxelField], None]
+) -> Snapshots:
+    """Snapshots at shares of a training that `config` limits by the clock or by steps."""
+    if config.minutes is not None:
+        return Snapshots(on_field, minutes=tuple(share * config.minutes for share in shares))
+    steps = [max(1, round(share * config.steps)) for share in shares]
+    return Snapshots(on_field, steps=tuple(step for step in steps if step < config.steps))
 
 
 def _plain(value: float) -> str:

@@ -32,7 +32,7 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.images import replaced_whole
 from cagefield.rendering.sampled import render_sampled
 from cagefield.scene import Scene
-from cagefield.training.voxel import Progress, VoxelConfig, train_voxel
+from cagefield.training.voxel import VoxelConfig, train_voxel
 
 UInt8 = NDArray[np.uint8]
 Move = Callable[[float, float, str], None]
@@ -124,18 +124,15 @@ class Workbench:
         if path.is_dir() and not self.retrain:
             return Scene.open(path)
         with self.bar(f"{name}: training") as move:
-
-            def show(progress: Progress) -> None:
-                move(progress.done, 1.0, f"PSNR {progress.psnr:.1f} dB, {progress.resolution}^3 grid")
-
-            result = train_voxel(dataset, config, on_progress=show, evaluate=False)
+            result = train_voxel(
+                dataset,
+                config,
+                on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
+                evaluate=False,
+            )
         if not result.finished:
             raise KeyboardInterrupt
-        cameras = {"train": dataset.train, "test": dataset.test}
-        scene = Scene(
-            result.field,
-            cameras={split: tuple(view.camera for view in views) for split, views in cameras.items()},
-        )
+        scene = Scene.trained(result, dataset)
         scene.save(path, overwrite=True)
         return scene
 

@@ -7,7 +7,7 @@ import shlex
 import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +18,9 @@ from cagefield.cli.options import (
     Flag,
     OptionalOutput,
     Output,
+    Photos,
+    Training,
+    TrainingOptions,
     check_file,
     parse_size,
     progress_bar,
@@ -27,9 +30,7 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.benchmarking.cases import Case
     from cagefield.benchmarking.workbench import Workbench
-    from cagefield.training.voxel import Progress, VoxelConfig
 
-_Overwrite = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 _SILENT = ("workdir", "out", "pictures", "picture_size", "error_panel", "overwrite", "scene_out")
 
 
@@ -49,12 +50,7 @@ class BenchEdits:
     """Width and height of the photos in pixels."""
     test_views: int = 20
     """Number of test photos."""
-    minutes: float = 5.0
-    """How long to train each field."""
-    steps: int | None = None
-    """Train this many steps instead."""
-    resolution: int = 256
-    """Voxels along the longest axis."""
+    training: Training = field(default_factory=TrainingOptions)
     exact_size: int = 128
     """Width and height of the pictures of continuous edits, whose truth is slow to render."""
     exact_views: int = 6
@@ -74,8 +70,7 @@ class BenchEdits:
     only_pictures: Flag = False
     """Write the pictures and no table."""
     device: Device = "auto"
-    """Where kernels run."""
-    overwrite: _Overwrite = False
+    overwrite: Flag = False
     """Replace files that are there."""
 
     def run(self) -> None:
@@ -99,7 +94,7 @@ class BenchEdits:
             self.views,
             self.size,
             self.test_views,
-            _config(self.minutes, self.steps, self.resolution),
+            self.training.config(),
             self.exact_size,
             self.exact_views,
             self.exact_samples,
@@ -157,8 +152,7 @@ class BenchSpeed:
     out: OptionalOutput = None
     """JSON file for the figures; the same as a Markdown table beside it, ending .md."""
     device: Device = "auto"
-    """Where kernels run."""
-    overwrite: _Overwrite = False
+    overwrite: Flag = False
     """Replace files that are there."""
 
     def run(self) -> None:
@@ -199,31 +193,16 @@ class BenchSpeed:
 class BenchTraining:
     """Test PSNR against training time on a data set; writes the curve as CSV."""
 
-    data: tyro.conf.Positional[Path]
-    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model."""
+    photos: Photos
     out: Output
     """CSV file for the curve; the same as a Markdown table beside it, ending .md."""
-    minutes: float = 5.0
-    """How long to train, evaluation left out."""
-    steps: int | None = None
-    """Train this many steps instead."""
-    resolution: int = 256
-    """Voxels along the longest axis at the end."""
-    sh_degree: int = 1
-    """Degree of the colour's spherical harmonics, 0 to 2."""
+    training: Training = field(default_factory=TrainingOptions)
     curve_views: int = 10
     """Number of test views for the points of the curve; the last point is on all."""
-    downscale: int | None = None
-    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
-    holdout: int = 8
-    """Keep every so-many-th photo for testing where the data set has no test views."""
-    seed: int = 0
-    """Of the order of the photos' pixels and of all other chance."""
     scene_out: Path | None = None
     """Folder for the trained scene, if it is to be kept."""
     device: Device = "auto"
-    """Where kernels run."""
-    overwrite: _Overwrite = False
+    overwrite: Flag = False
     """Replace files that are there."""
 
     def run(self) -> None:
@@ -232,7 +211,6 @@ class BenchTraining:
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_text
         from cagefield.benchmarking.training import Point, measure
-        from cagefield.datasets import load_dataset
         from cagefield.scene import Scene, check_destination
 
         if self.out.suffix.lower() != ".csv":
@@ -241,8 +219,8 @@ class BenchTraining:
             check_file(path, self.overwrite)
         if self.scene_out is not None:
             check_destination(self.scene_out, self.overwrite)
-        config = _config(self.minutes, self.steps, self.resolution, sh_degree=self.sh_degree, seed=self.seed)
-        dataset = load_dataset(self.data, downscale=self.downscale, holdout=self.holdout)
+        config = self.training.config()
+        dataset = self.photos.load()
         devices.start(self.device)
 
         def tell(point: Point) -> None:
@@ -253,11 +231,13 @@ class BenchTraining:
             )
 
         with progress_bar("Training") as move:
-
-            def show(progress: Progress) -> None:
-                move(progress.done, 1.0, f"PSNR {progress.psnr:.1f} dB, {progress.resolution}^3 grid")
-
-            curve = measure(dataset, config, views=self.curve_views, on_progress=show, on_point=tell)
+            curve = measure(
+                dataset,
+                config,
+                views=self.curve_views,
+                on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
+                on_point=tell,
+            )
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench training', self)}`")
         result = curve.table(dataset.name, notes)
         result.show()
@@ -265,14 +245,7 @@ class BenchTraining:
         write_text(self.out.with_suffix(".md"), result.markdown())
         print(f"curve written to {self.out} and {self.out.with_suffix('.md')}")
         if self.scene_out is not None:
-            views = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
-            Scene(
-                curve.result.field,
-                cameras={
-                    split: tuple(v.camera for v in members) for split, members in views.items() if members
-                },
-                background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
-            ).save(self.scene_out, self.overwrite)
+            Scene.trained(curve.result, dataset).save(self.scene_out, self.overwrite)
             print(f"scene written to {self.scene_out}")
 
 
@@ -295,27 +268,25 @@ class Bench:
 
 def command_line(name: str, options: Any, silent: Collection[str] = _SILENT) -> str:
     """The command that repeats a benchmark: what differs from the defaults, without the files' places."""
-    words = ["cagefield", *name.split()]
+    return shlex.join(["cagefield", *name.split(), *_words(options, silent)])
+
+
+def _words(options: Any, silent: Collection[str]) -> Iterator[str]:
     for option in dataclasses.fields(options):
         value = getattr(options, option.name)
         if option.name in silent or value == option.default or value is None:
             continue
-        if option.default is dataclasses.MISSING:
-            words.append(str(value))
+        if dataclasses.is_dataclass(value):
+            yield from _words(value, silent)
             continue
-        words.append("--" + option.name.replace("_", "-"))
+        if option.default is dataclasses.MISSING:
+            yield str(value)
+            continue
+        yield "--" + option.name.replace("_", "-")
         if isinstance(value, tuple):
-            words += [str(item) for item in value]
+            yield from map(str, value)
         elif not isinstance(value, bool):
-            words.append(str(value))
-    return shlex.join(words)
-
-
-def _config(minutes: float, steps: int | None, resolution: int, **more: Any) -> VoxelConfig:
-    from cagefield.training.voxel import VoxelConfig
-
-    timed = {"minutes": minutes} if steps is None else {"steps": steps}
-    return VoxelConfig(resolution=resolution, **timed, **more)
+            yield str(value)
 
 
 def _evenly(count: int, chosen: int) -> list[int]:

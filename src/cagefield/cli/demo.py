@@ -7,11 +7,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
-
-from cagefield.cli.options import Device, Output, check_folder, progress_bar, track
+from cagefield.cli.options import Device, Flag, Output, check_folder, progress_bar, track
 
 if TYPE_CHECKING:
     from cagefield.scene import Scene
@@ -41,8 +39,7 @@ class Demo:
     frames: int = 36
     """Number of pictures in the turntable video."""
     device: Device = "auto"
-    """Where kernels run."""
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    overwrite: Flag = False
     """Replace the results of an earlier call."""
 
     def run(self) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import tyro
 
@@ -26,7 +25,7 @@ class ApplyEdits:
     """Put the file's edits after those the scene has, instead of in their place."""
     check: Flag = False
     """Only say what would change; write nothing."""
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    overwrite: Flag = False
     """Replace the scene that is there."""
 
     def run(self) -> None:

@@ -38,6 +38,9 @@ class Info:
         for split, cameras in scene.cameras.items():
             sizes = sorted({f"{camera.width}x{camera.height}" for camera in cameras})
             print(f"cameras     {split}: {len(cameras)} {', '.join(sizes)}".rstrip())
+        if scene.gains:
+            low, high = (choose(map(choose, scene.gains)) for choose in (min, max))
+            print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")
         for line in describe_edits(scene.edits, field):
             print(f"edits       {line}")
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Literal
 
 import tyro
 
-from cagefield.cli.options import Output, check_folder, progress_bar
+from cagefield.cli.options import Flag, Output, check_folder, progress_bar
 
 _MARK = "transforms_train.json"
 _OWN = (_MARK, "transforms_test.json", "transforms_val.json", "train", "test", "val")
@@ -29,7 +29,9 @@ class MakeScene:
     """Number of test photos; a quarter of the training photos if left out."""
     seed: int = 0
     """Where the cameras stand."""
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    depth: Literal["all", "test", "none"] = "test"
+    """Whose depth to write too: NAME_depth.npy, distances along the rays."""
+    overwrite: Flag = False
     """Replace photos that an earlier call wrote there."""
 
     def run(self) -> None:
@@ -50,6 +52,7 @@ class MakeScene:
                 size=self.size,
                 test_views=self.test_views,
                 seed=self.seed,
+                depth=self.depth,
                 scene=scene,
                 progress=lambda done, total: move(done, total, f"{done}/{total}"),
             )

@@ -5,18 +5,75 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
 from cagefield.errors import CagefieldError
 
-Device = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
+if TYPE_CHECKING:
+    from cagefield.datasets import Dataset
+    from cagefield.training.voxel import VoxelConfig
+
+Device = Annotated[
+    Literal["auto", "cpu", "cuda", "metal", "vulkan"], tyro.conf.arg(help="Where kernels run.")
+]
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]
 Flag = tyro.conf.FlagCreatePairsOff[bool]
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class PhotoOptions:
+    """Which photos are used."""
+
+    data: tyro.conf.Positional[Path]
+    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model."""
+    downscale: int | None = None
+    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
+    holdout: int = 8
+    """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
+
+    def load(self) -> Dataset:
+        """The data set."""
+        from cagefield.datasets import load_dataset
+
+        return load_dataset(self.data, downscale=self.downscale, holdout=self.holdout)
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """How a field is trained."""
+
+    minutes: float = 5.0
+    """How long to train."""
+    steps: int | None = None
+    """Train this many steps instead: on a CPU the same seed then gives the same field."""
+    resolution: int = 256
+    """Voxels along the longest axis at the end."""
+    sh_degree: int = 1
+    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view."""
+    seed: int = 0
+    """Of the order of the photos' pixels and of all other chance."""
+
+    def config(self) -> VoxelConfig:
+        """The trainer's configuration."""
+        from cagefield.training.voxel import VoxelConfig
+
+        return VoxelConfig(
+            steps=VoxelConfig.steps if self.steps is None else self.steps,
+            minutes=self.minutes if self.steps is None else None,
+            resolution=self.resolution,
+            sh_degree=self.sh_degree,
+            seed=self.seed,
+        )
+
+
+Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]
+Training = tyro.conf.OmitArgPrefixes[TrainingOptions]
 
 
 def parse_size(text: str | None, width: int, height: int) -> tuple[int, int]:

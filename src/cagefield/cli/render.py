@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import tyro
 
@@ -62,8 +62,7 @@ class Render:
     fps: float | None = None
     """Pictures a second in a video: 24, or what the camera path says."""
     device: Device = "auto"
-    """Where kernels run."""
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    overwrite: Flag = False
     """Replace files that are there."""
 
     def run(self) -> None:

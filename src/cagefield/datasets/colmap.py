@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets.colmap_files import check_whole
-from cagefield.datasets.llff import stored_camera
+from cagefield.datasets.llff import stored_camera, unbounded_capture
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
-from cagefield.datasets.views import Dataset, View, hold_out, report_missing
+from cagefield.datasets.views import Dataset, View, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
 
@@ -75,19 +75,9 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         view = View(image.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
     report_missing(root, sorted(missing), len(images))
-    train, test = hold_out(views, holdout)
     points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3) @ levelling[:3, :3].T
-    return Dataset(
-        name=root.resolve().name,
-        path=root,
-        train=train,
-        test=test,
-        val=(),
-        unbounded=True,
-        bounds=cube_of_interest([view.camera for view in views], points=points),
-        white_background=False,
-        source_to_world=levelling,
-    )
+    bounds = cube_of_interest([view.camera for view in views], points=points)
+    return unbounded_capture(root, views, holdout, bounds, levelling)
 
 
 def _read_model(folder: Path) -> tuple[Any, list[Any]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
 from cagefield.datasets.transforms import load_transforms
-from cagefield.datasets.views import Dataset, View
+from cagefield.datasets.views import Dataset, View, check_holdout
 from cagefield.errors import DatasetError
 
 __all__ = ["Dataset", "View", "load_dataset"]
@@ -24,8 +24,10 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
     side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
     name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
 
-    Raises DatasetError, with file, key and cure, for anything that cannot be read.
+    Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` of
+    1 or below 0, whether there is a test split or not.
     """
+    check_holdout(holdout)
     path = Path(path).expanduser()
     if not path.exists():
         raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")

@@ -8,6 +8,7 @@ folder also has the COLMAP model, opening that (`sparse/0`) honours it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,19 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             raise DatasetError(f"{where}: {error}") from error
         view = View(photo.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
+    return unbounded_capture(
+        folder, views, holdout, cube_of_interest([view.camera for view in views], rows[:, 15:]), levelling
+    )
+
+
+def unbounded_capture(
+    folder: Path,
+    views: Sequence[View],
+    holdout: int,
+    bounds: npt.NDArray[np.float64],
+    levelling: npt.NDArray[np.float64],
+) -> Dataset:
+    """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
     train, test = hold_out(views, holdout)
     return Dataset(
         name=folder.resolve().name,
@@ -70,7 +84,7 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
         test=test,
         val=(),
         unbounded=True,
-        bounds=cube_of_interest([view.camera for view in views], rows[:, 15:]),
+        bounds=bounds,
         white_background=False,
         source_to_world=levelling,
     )

@@ -85,13 +85,17 @@ class Dataset:
             raise DatasetError(f"{self.path}: no training views; check the split")
 
 
+def check_holdout(every: int) -> None:
+    """Passes 0 and whole numbers from 2. Raises DatasetError for anything else."""
+    if isinstance(every, bool) or int(every) != every or every < 0 or every == 1:
+        raise DatasetError(f"holdout must be 0 (no test views) or a whole number from 2, got {every}")
+
+
 def hold_out(views: Sequence[View], every: int) -> tuple[tuple[View, ...], tuple[View, ...]]:
     """Training and test views: sorted by name, the first and each `every`-th after it test; 0 holds none out.
 
-    A single view trains. Raises DatasetError for `every` = 1 or below 0.
+    A single view trains.
     """
-    if isinstance(every, bool) or int(every) != every or every < 0 or every == 1:
-        raise DatasetError(f"holdout must be 0 (no test views) or a whole number from 2, got {every}")
     ordered = sorted(views, key=lambda view: view.name)
     if every == 0 or len(ordered) == 1:
         return tuple(ordered), ()

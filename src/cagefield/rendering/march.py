@@ -23,7 +23,7 @@ from cagefield.rendering.grid import (
     sh_basis,
     vec3,
 )
-from cagefield.rendering.traverse import empty_run, is_occupied, safe_inverse, slab
+from cagefield.rendering.traverse import is_occupied, look_ahead, safe_inverse, slab
 from cagefield.warps.device import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
@@ -118,29 +118,14 @@ def march_tiles(
             normal = vec3(0.0, 0.0, 0.0)
             depth = 0.0
             while t < t_end and T > 1e-3:
-                q = go + t * gd
-                g = q
-                h = step
-                inv = inverse
-                leap = 1.0
-                limit = 1e30
+                g, h, empty, leap, last = look_ahead(
+                    codes, go + t * gd, gd, inverse, half, step, brick_origin, brick_dims, contracted
+                )
                 if qd.static(contracted):
-                    v = contract_velocity(q, gd) * half
-                    g = (contract_point(q) + 2.0) * half
-                    inv = safe_inverse(v)
-                    h = step / qd.abs(v).max()
-                    m = qd.abs(q).max()
-                    if m > 1.0:
-                        leap = 0.5
-                        limit = 0.25 * m / qd.abs(gd).max()
-                    if m > 2.0 * half.x:
+                    if last == 1:
                         t_end = t
-                run = empty_run(codes, g, inv, brick_origin, brick_dims)
-                if run >= 0.0:
-                    if qd.static(contracted):
-                        t += qd.max(qd.min(run * leap, limit), h)
-                    else:
-                        t += (qd.floor(run / step) + 1.0) * step
+                if empty == 1:
+                    t += leap
                 else:
                     moved = 0
                     alive = 1

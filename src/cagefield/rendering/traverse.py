@@ -2,7 +2,7 @@
 
 import quadrants as qd
 
-from cagefield.rendering.grid import ivec3, vec3
+from cagefield.rendering.grid import contract_point, contract_velocity, ivec3, vec3
 
 vec2 = qd.types.vector(2, qd.f32)
 
@@ -61,3 +61,54 @@ def is_occupied(codes: qd.template(), g: vec3, dims: ivec3):
     code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
     s = (cell >> 1) & 1
     return code < 256 and (code >> (s.x * 4 + s.y * 2 + s.z)) & 1 == 1
+
+
+@qd.func
+def look_ahead(
+    codes: qd.template(),
+    q: vec3,
+    gd: vec3,
+    inverse: vec3,
+    half: vec3,
+    step: qd.f32,
+    origin: ivec3,
+    dims: ivec3,
+    contracted: qd.template(),
+):
+    """(g, h, empty, leap, last) at a point q of a ray with velocity gd and its inverse.
+
+    q and gd are in grid coordinates or, when contracted, normalised ones; half = (resolution - 1) / 4.
+    g: grid coordinates of q. h: ray parameter of one step. empty: 1 where the block around q is. leap: the
+    ray parameter to go on by then, whole steps if bounded. last: 1 from half a voxel before infinity on,
+    where a contracted march ends.
+
+    A contracted ray is bent outside the inner box: it goes half of the straight run there, and no farther
+    than a quarter of the way to the centre.
+    """
+    g = q
+    h = step
+    leap = 0.0
+    empty = 0
+    last = 0
+    if qd.static(contracted):
+        v = contract_velocity(q, gd) * half
+        g = (contract_point(q) + 2.0) * half
+        h = step / qd.abs(v).max()
+        share = 1.0
+        limit = 1e30
+        m = qd.abs(q).max()
+        if m > 1.0:
+            share = 0.5
+            limit = 0.25 * m / qd.abs(gd).max()
+        if m > 2.0 * half.x:
+            last = 1
+        run = empty_run(codes, g, safe_inverse(v), origin, dims)
+        if run >= 0.0:
+            empty = 1
+            leap = qd.max(qd.min(run * share, limit), h)
+    else:
+        run = empty_run(codes, g, inverse, origin, dims)
+        if run >= 0.0:
+            empty = 1
+            leap = (qd.floor(run / step) + 1.0) * step
+    return g, h, empty, leap, last

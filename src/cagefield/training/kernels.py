@@ -34,7 +34,7 @@ from cagefield.rendering.grid import (
     sh_basis,
     vec3,
 )
-from cagefield.rendering.traverse import empty_run, safe_inverse, slab
+from cagefield.rendering.traverse import empty_run, look_ahead, safe_inverse, slab
 
 HEAD = 4
 SAMPLE = 8
@@ -184,29 +184,22 @@ def march_batch(
                     total_w = 0.0
                     total_ws = 0.0
                     while t < t_end and T > 1e-3:
-                        q = go + t * gd
-                        g = q
-                        h = step
-                        inv = inverse
-                        leap = 1.0
-                        limit = 1e30
+                        g, h, empty, leap, last = look_ahead(
+                            codes,
+                            go + t * gd,
+                            gd,
+                            inverse,
+                            half,
+                            step,
+                            ivec3(0, 0, 0),
+                            brick_dims,
+                            contracted,
+                        )
                         if qd.static(contracted):
-                            v = contract_velocity(q, gd) * half
-                            g = (contract_point(q) + 2.0) * half
-                            inv = safe_inverse(v)
-                            h = step / qd.abs(v).max()
-                            far = qd.abs(q).max()
-                            if far > 1.0:
-                                leap = 0.5
-                                limit = 0.25 * far / qd.abs(gd).max()
-                            if far > 2.0 * half.x:
+                            if last == 1:
                                 t_end = t
-                        run = empty_run(codes, g, inv, ivec3(0, 0, 0), brick_dims)
-                        if run >= 0.0:
-                            if qd.static(contracted):
-                                t += qd.max(qd.min(run * leap, limit), h)
-                            else:
-                                t += (qd.floor(run / step) + 1.0) * step
+                        if empty == 1:
+                            t += leap
                         else:
                             cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
                             slots = corner_slots(index, cell, resolution.y, resolution.z)

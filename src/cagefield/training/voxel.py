@@ -32,6 +32,7 @@ from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.training.photos import Photos
+from cagefield.training.progress import Progress, Snapshots
 
 if TYPE_CHECKING:
     from cagefield.training.grid_state import GridState
@@ -112,21 +113,6 @@ class VoxelConfig:
             raise CagefieldError(f"decay is {self.decay}; it must be between 0 and 1")
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, rays/s, seconds."""
-
-    done: float
-    step: int
-    loss: float
-    psnr: float
-    rays_per_second: float
-    seconds: float
-    seconds_left: float
-    resolution: int
-    voxels: int
-
-
 @dataclass(frozen=True, eq=False)
 class TrainResult:
     """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none."""
@@ -148,13 +134,14 @@ def train_voxel(
     checkpoint: Path | None = None,
     resume: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
+    snapshots: Snapshots | None = None,
     evaluate: bool = True,
 ) -> TrainResult:
     """The field trained on the data set's photos, with PSNR and SSIM on its test views.
 
     With `checkpoint`, the state of the run is written there every minute and when it is interrupted
     (Ctrl-C ends the run early, `finished` is then False); `resume` goes on from it. On a CPU a resumed run
-    of given `steps` ends in the same field as an uninterrupted one.
+    of given `steps` ends in the same field as an uninterrupted one. `snapshots` are handed out on the way.
 
     Raises:
         DatasetError: no photos, or photos that cannot be read.
@@ -169,9 +156,12 @@ def train_voxel(
     saved = run.seconds
     with _interruptible() as interrupted:
         while run.done < 1.0 and not interrupted():
+            before = run.step, run.seconds
             run.advance()
             if on_progress is not None:
                 on_progress(run.progress())
+            if snapshots is not None and snapshots.due(before, (run.step, run.seconds)):
+                snapshots.on_field(run.progress(), run.grid.to_field())
             if checkpoint is not None and run.seconds - saved > 60.0:
                 run.store(checkpoint)
                 saved = run.seconds

@@ -2,6 +2,6 @@
 
 from cagefield.datasets.procedural.catalogue import SCENES, procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
-from cagefield.datasets.procedural.writer import make_scene, viewpoints
+from cagefield.datasets.procedural.writer import DepthViews, make_scene, viewpoints
 
-__all__ = ["SCENES", "ProceduralScene", "make_scene", "procedural_scene", "viewpoints"]
+__all__ = ["SCENES", "DepthViews", "ProceduralScene", "make_scene", "procedural_scene", "viewpoints"]

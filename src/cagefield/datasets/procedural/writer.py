@@ -2,7 +2,8 @@
 
 transforms_{train,val,test}.json   camera_angle_x, aabb, frames: file_path, transform_matrix (OpenGL c2w)
 {train,val,test}/r_0.png ...       RGBA, straight alpha
-test/r_0_depth.npy ...             float32 [H,W], distance along the ray in world units, inf off the surface
+test/r_0_depth.npy ...             float32 [H,W], distance along the ray in world units, inf off the surface;
+                                   in the other splits only where it is asked for
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -26,6 +28,9 @@ FOV_X = 0.6911112
 RADIUS = 4.0
 HIGHEST = 80.0
 """Elevation of the highest camera, in degrees."""
+
+DepthViews = Literal["all", "test", "none"]
+"""Whose depth is written."""
 
 _SPLITS = ("train", "val", "test")
 
@@ -69,6 +74,7 @@ def make_scene(
     size: int = 400,
     test_views: int | None = None,
     seed: int = 0,
+    depth: DepthViews = "test",
     scene: ProceduralScene | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -76,15 +82,20 @@ def make_scene(
 
     views     training views; test_views (default: a quarter of them, at least 4) are other views; a fifth of
               those, at least 1, again elsewhere, are the val split
+    depth     the views whose depth is written: all, those of the test split, or none (depth has 4 bytes a
+              pixel, about ten times its photo's size)
     progress  called with (views done, views in all) after each view
 
-    Raises SceneError for an unknown name, DatasetError for impossible sizes and a folder that is not empty.
+    Raises SceneError for an unknown name, DatasetError for impossible sizes, an unknown `depth` and a folder
+    that is not empty.
     """
     scene = procedural_scene(name) if scene is None else scene
     tests = max(views // 4, 4) if test_views is None else test_views
     for what, number in (("views", views), ("size", size), ("test_views", tests)):
         if number < 1:
             raise DatasetError(f"{what} must be at least 1, not {number}")
+    if depth not in get_args(DepthViews):
+        raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = Path(out_dir).resolve()
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
@@ -97,7 +108,7 @@ def make_scene(
             (draft / split).mkdir()
             for index, frame in enumerate(photographs(scene, cameras)):
                 write_png(draft / split / f"r_{index}.png", frame.rgba8())
-                if split == "test":
+                if depth in ("all", split):
                     np.save(draft / split / f"r_{index}_depth.npy", frame.depth)
                 done += 1
                 if progress is not None:

@@ -1,0 +1,25 @@
+"""The command line as a test sees it: what it prints, and the one line with which it refuses."""
+
+from __future__ import annotations
+
+import pytest
+
+from cagefield.cli import main
+
+
+def printed(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    """What a command that succeeds prints on stdout."""
+    capsys.readouterr()
+    assert main([str(arg) for arg in argv]) == 0
+    return capsys.readouterr().out
+
+
+def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    """The one line that a refused command prints on stderr."""
+    capsys.readouterr()
+    assert main([str(arg) for arg in argv]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("cagefield: ") and err.count("\n") == 1 and err.endswith("\n")
+    assert "Traceback" not in err
+    return err
