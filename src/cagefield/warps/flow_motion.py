@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cagefield import hexahedron
@@ -96,8 +97,7 @@ class Extended:
         """True when no two coordinates are the same point: det dx/dxi > 0 inside the cage and around it."""
         if self.is_affine:
             return True
-        corners = _SIGNS + bend(self.bend, _SIGNS)
-        return hexahedron.is_positive(hexahedron.determinant_coefficients(_extensions(corners)))
+        return bends_one_to_one(self.bend[None])
 
 
 def bend(K: Array, xi: Array) -> Array:
@@ -110,6 +110,13 @@ def bend_slope(K: Array, xi: Array) -> Array:
     x, y, z = xi[:, :1], xi[:, 1:2], xi[:, 2:]
     along = (y * K[0] + z * K[1] + y * z * K[3], x * K[0] + z * K[2] + x * z * K[3])
     return np.stack([*along, x * K[1] + y * K[2] + x * y * K[3]], axis=2)
+
+
+def bends_one_to_one(K: Array) -> bool:
+    """True when xi + B(clamp(xi)) takes no two xi to the same point, for each of the bends K [B,4,3]."""
+    corners = _SIGNS + np.stack([bend(k, _SIGNS) for k in K])
+    pieces = corners[:, _NEXT_TO] + _AWAY  # [B,27,8,3]; the map is trilinear on each
+    return hexahedron.is_positive(hexahedron.determinant_coefficients(pieces))
 
 
 def straightened_slope(K: Array, xi: Array) -> Array:
@@ -249,8 +256,7 @@ class Motion:
     @cached_property
     def is_one_to_one(self) -> bool:
         """True when the cage stays a valid one, and space around it too, all the way."""
-        bends = [Extended(np.zeros(3), np.eye(3), self.bend(t)) for t in (0.0, 0.25, 0.5, 0.75, 1.0)]
-        return self.is_affine or all(b.is_one_to_one for b in bends)
+        return self.is_affine or bends_one_to_one(np.stack([self.bend(t) for t in np.linspace(0.0, 1.0, 5)]))
 
 
 def _products(xi: Array) -> Array:
@@ -261,17 +267,17 @@ def _products(xi: Array) -> Array:
 _SIGNS = 2.0 * hexahedron.BITS - 1.0
 
 
-def _extensions(corners: Array) -> Array:
-    """Corners [27,8,3] of the cage and of the pieces of space around it, one unit thick along its axes."""
-    pieces = []
-    for side in np.stack(np.meshgrid(*3 * [[-1, 0, 1]], indexing="ij"), axis=-1).reshape(-1, 3):
-        piece = np.empty((8, 3))
-        for k, sign in enumerate(_SIGNS):
-            on = np.where(side == 0, sign, side)  # the cage's corner that this one is next to
-            away = (side != 0) & (sign == side)
-            piece[k] = corners[int(((on + 1) / 2) @ [1, 2, 4])] + side * away
-        pieces.append(piece)
-    return np.array(pieces)
+def _pieces() -> tuple[NDArray[np.intp], Array]:
+    """The cage and the 26 pieces of space around it, one unit thick along its axes: for corner k of piece n
+
+    the cage's corner [27,8] that it is at or next to, and how far it is from there [27,8,3].
+    """
+    sides = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    on = np.where(sides == 0.0, _SIGNS, sides)
+    return (0.5 * (on + 1.0) @ [1.0, 2.0, 4.0]).astype(np.intp), sides * (sides == _SIGNS)
+
+
+_NEXT_TO, _AWAY = _pieces()
 
 
 def _surface(nodes: int) -> Array:
