@@ -154,18 +154,19 @@ def velocity(
             dxi = straighten_slope(xi, dxi, lattice, moment + 10)
             dv += rows_times(lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14))
     # Outside the outer cage everything is at rest, also after a stage's rounding.
-    still = qd.max(1.0 - z * z, 0.0)
-    far = lattice[base + 7] * still
+    far = lattice[base + 7] * (1.0 - z * z)
     g = 0.0
     out = vec3(0.0, 0.0, 0.0)
     dout = vec3(0.0, 0.0, 0.0)
-    if far.min() > 0.0:
+    if far.min() > 1e-6:
         height = lattice[moment + 8]
         e = height * qd.max(qd.abs(xi) - 1.0, 0.0)
-        E = e.dot(e)
         inverse = 1.0 / far
-        F = inverse.dot(inverse)
-        q = qd.sqrt(E * F)
+        ee = e * e
+        ff = inverse * inverse
+        E = ee.dot(ee)
+        F = ff.dot(ff)
+        q = qd.sqrt(qd.sqrt(E * F))
         r = 1.0 / (1.0 + q)
         per_width = lattice[base + 8].z
         g = qd.max((r - 1.0) * per_width + 1.0, 0.0)
@@ -176,14 +177,14 @@ def velocity(
         out = w * v
         if qd.static(tangent):
             dw = 0.0
-            if q > 1e-12 and g > 0.0:
+            if q > 1e-6 and g > 0.0:
                 sign = vec3(1.0, 1.0, 1.0)
                 for a in qd.static(range(3)):
                     if xi[a] < 0.0:
                         sign[a] = -1.0
-                dE = (e * height * sign).dot(dxi)
-                dF = 2.0 * (inverse * inverse * inverse * lattice[base + 7] * z).dot(dz)
-                dw = -r * r * per_width * (F * dE + E * dF) / q
+                dE = (ee * e * height * sign).dot(dxi)
+                dF = 2.0 * (ff * ff * inverse * lattice[base + 7] * z).dot(dz)
+                dw = -r * r * per_width * q * (dE / E + dF / F)
                 if not linear:
                     dw *= 6.0 * g * (1.0 - g)
             dout = w * dv + dw * v

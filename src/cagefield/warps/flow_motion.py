@@ -10,8 +10,8 @@ so inside the cage x is the trilinear map of its corners, and outside it goes on
 F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its polar
 decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
 degrees at most), the stretch is log-linear, the bend K goes linearly from the one cage's to the other's,
-and k >= 0 shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight line, in
-the outer cage's coordinates where a straight one in space would leave it.
+and k >= 0 shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight
+line, in the outer cage's coordinates where a straight one in space would leave it.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class Motion:
         grown = np.exp(t[:, None] * stretch) * np.exp(-k * np.sin(np.pi * t))[:, None]
         F = R @ (V * grown[:, None, :]) @ V.T @ self.start.frame
         rate = stretch - (k * np.pi * np.cos(np.pi * t))[:, None]
-        omega = np.cross(np.eye(3), -turn)
+        omega = np.cross(np.eye(3), turn)  # omega v = turn x v
         dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ V.T @ self.start.frame
         c, dc = self._centre(t)
         return c, F, dc, dF

@@ -14,7 +14,7 @@ from cagefield.warps.flow_motion import Extended, Motion, bend, bend_slope
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
 
-POWER = 2
+POWER = 4
 """Exponent p of the distances' norm."""
 
 LEAST_GAP = 2e-3
@@ -70,9 +70,10 @@ class FlowShell:
     backwards through the same times, its Jacobian is that of the discrete scheme, and `to_deformed` is the
     inverse of `to_canonical` as computed.
 
-    Chosen by measurement (`benchmarks/flow_profiles.py`, 16 edits), geometric means of the least det J and
-    the largest stretch: p = 2 smooth 0.23 and 6.4; p = 4 0.20 and 7.2; p = 8 0.19 and 7.9; p = 8 with the
-    distances of all six planes in d_o 0.16 and 9.4; p = 2 linear 0.15 and 10.6.
+    Chosen by measurement (`benchmarks/flow_profiles.py`, 14 edits), geometric means of the least det J and
+    the largest stretch, smooth: p = 2 0.192 and 9.6; p = 4 0.190 and 8.6; p = 8 0.187 and 8.9; linear: p = 2
+    0.139 and 13.6, p = 8 0.130 and 12.4 (better for translations alone); w = 1 / (1 + (d_i / d_o)^2), p = 2:
+    0.141 and 12.3.
 
     Parameters: the canonical and the deformed inner cage, the outer cage, the falloff, the strain of a step.
     """
