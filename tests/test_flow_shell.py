@@ -1,4 +1,4 @@
-"""The flow shell's float64 reference: exact at both cages, one to one between them, for every pair of cages."""
+"""The flow shell's float64 reference: exact at both cages, one to one between them, for all cages."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def test_continuous_across_both_cages(name: str) -> None:
     shell = shell_of(edit)
     warp = edit.warp
     for cage, tolerance in ((shell.deformed, 1e-5), (shell.outer, 1e-6)):
-        p, xi = face_points(cage, 200)
+        _, xi = face_points(cage, 200)
         place = Extended.of(cage)
         inside, outside = place.points(xi * (1 - 1e-7)), place.points(xi * (1 + 1e-7))
         jump = np.abs(warp.to_canonical(inside).points - warp.to_canonical(outside).points)
@@ -218,7 +218,7 @@ def test_rates_are_the_derivatives_of_the_motion() -> None:
         before, after, here = motion.frames(t - h), motion.frames(t + h), motion.frames(t)
         np.testing.assert_allclose((after[0] - before[0]) / (2 * h), here[2], atol=1e-8)
         np.testing.assert_allclose((after[1] - before[1]) / (2 * h), here[3], atol=1e-7)
-        z, dz = motion.surface(t)
+        _, dz = motion.surface(t)
         np.testing.assert_allclose(
             (motion.surface(t + h)[0] - motion.surface(t - h)[0]) / (2 * h), dz, atol=1e-7
         )
@@ -275,7 +275,7 @@ PROBLEMS = [
     ),
     (Edit(INNER, OUTER).translate((0.6, 0, 0)), "outer cage must contain the inner cage: inner corner 1"),
     (
-        # The outer cage's top is a saddle; the turned cage's corners lie on its level lines, its edges do not.
+        # The outer cage's top is a saddle; the turned cage's corners lie on its level lines, not its edges.
         Edit(
             Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)),
             OUTER.move_corner(5, (0, 0, -0.6)).move_corner(6, (0, 0, -0.6)),
