@@ -15,7 +15,7 @@ from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
-from cagefield.warps import SHELLS, Shell, Warp
+from cagefield.warps import FALLOFFS, SHELLS, Falloff, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp, lattice_error
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron import HexahedronMap
@@ -35,11 +35,14 @@ class Edit:
     - outer: the outer cage V^o, which confines a continuous edit; ignored by a discrete one.
     - adjustment: "continuous" (the shell between the cages is interpolated and the field stays connected) or
       "discrete" (only the inner region changes: moved, with `keep_source` copied, with `deleted` removed).
-    - shell: the continuous map between the cages, a name in `warps.SHELLS`.
+    - shell: the continuous map between the cages, a name in `warps.SHELLS`: "flow" cannot fold, "trilinear" is
+      the paper's.
     - operations: what moved the inner cage, in order; `deformed` is the result.
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.
     - enabled: False hides the edit in a stack.
+    - falloff: how the motion fades through a flow shell, "smooth" or "linear".
+    - width: how much of the flow shell moves, in (0, 1]: from "only near the inner cage" to the whole shell.
     - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
       sheets is shown.
 
@@ -50,7 +53,7 @@ class Edit:
     inner: Cage
     outer: Cage | None = None
     adjustment: Adjustment = "continuous"
-    shell: str = "trilinear"
+    shell: str = "flow"
     keep_source: bool = False
     name: str = ""
     operations: tuple[Operation, ...] = ()
@@ -58,6 +61,8 @@ class Edit:
     enabled: bool = True
     allow_folding: bool = False
     deleted: bool = False
+    falloff: str = "smooth"
+    width: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -149,7 +154,7 @@ class Edit:
         inner = HexahedronMap(self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
             return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source)
-        return ContinuousWarp(inner, self.outer, self._shell(self.deformed))
+        return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property
     def warp(self) -> Warp:
@@ -220,7 +225,9 @@ class Edit:
             return True
         if not self.outer.contains(deformed.corners).all():
             return False
-        return self.allow_folding or self._shell(deformed).problem() is None
+        if self.shell == "trilinear" and self.allow_folding:
+            return True
+        return self._shell(deformed).problem() is None
 
     def _problem(self, deformed: Cage) -> tuple[str, str]:
         """(what is wrong, the cure) with the inner cage at a `deformed` that is not safe."""
@@ -245,7 +252,17 @@ class Edit:
     def _shell(self, deformed: Cage) -> Shell:
         if self.outer is None:
             raise self._error("a shell needs an outer cage")
-        return SHELLS[self.shell](self.inner, deformed, self.outer)
+        if deformed is self.deformed:
+            return self._last_shell
+        return SHELLS[self.shell](self.inner, deformed, self.outer, Falloff(self.falloff, self.width))
+
+    @cached_property
+    def _last_shell(self) -> Shell:
+        """The shell with all operations done."""
+        if self.outer is None:
+            raise self._error("a shell needs an outer cage")
+        falloff = Falloff(self.falloff, self.width)
+        return SHELLS[self.shell](self.inner, self.deformed, self.outer, falloff)
 
     def _check_options(self) -> None:
         if self.adjustment not in ("continuous", "discrete"):
@@ -264,6 +281,7 @@ class Edit:
                 )
         if self.deleted and (self.operations or self.keep_source):
             raise self._error("a delete has no operations and keeps no source")
+        self._check_falloff()
         low, high = LATTICE_RANGE
         if self.lattice is not None and not (
             isinstance(self.lattice, int)
@@ -274,6 +292,20 @@ class Edit:
                 f"lattice must be None (exact) or a whole number of nodes per axis from {low} to {high}"
                 f" (64, 128 or 256, say), got {self.lattice!r}"
             )
+
+    def _check_falloff(self) -> None:
+        if self.falloff not in FALLOFFS:
+            raise self._error(f'falloff must be one of {", ".join(FALLOFFS)}, got "{self.falloff}"')
+        if not 0.0 < self.width <= 1.0:
+            raise self._error(f"width must be above 0 and at most 1 (the whole shell), got {self.width!r}")
+        fades = self.adjustment == "continuous" and self.shell == "flow"
+        for name, value, default in (("falloff", self.falloff, "smooth"), ("width", self.width, 1.0)):
+            if value != default and not fades:
+                other = "discrete edit" if self.adjustment == "discrete" else f"{self.shell} shell"
+                raise self._error(
+                    f'{name} is an option of the flow shell, and a {other} has none; set shell="flow" (and'
+                    f' adjustment="continuous") or leave {name} out'
+                )
 
     def _error(self, message: str) -> EditError:
         return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")

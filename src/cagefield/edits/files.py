@@ -14,7 +14,9 @@
           - move_edge: {edge: [0, 1], by: [0, 0, 0.1]}
           - move_face: {face: +x, by: [0.2, 0, 0]}
         adjustment: continuous                # or discrete
-        shell: trilinear
+        shell: flow                           # or trilinear; flow if left out
+        falloff: smooth                       # of the flow shell: smooth (if left out) or linear
+        width: 1                              # of the flow shell: how much of it moves, up to 1, all of it
         lattice: 64                           # nodes per axis; left out: exact
       - name: no cup
         delete: true
@@ -115,6 +117,8 @@ def _edit(node: Node, check: bool) -> Edit:
             "operations",
             "adjustment",
             "shell",
+            "falloff",
+            "width",
             "keep_source",
             "delete",
             "lattice",
@@ -130,12 +134,14 @@ def _edit(node: Node, check: bool) -> Edit:
     options["adjustment"] = "discrete" if deleted else "continuous"
     if "adjustment" in keys:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
-    for name in ("name", "shell"):
+    for name in ("name", "shell", "falloff"):
         if name in keys:
             options[name] = keys[name].text()
     for name in ("keep_source", "enabled", "allow_folding"):
         if name in keys:
             options[name] = keys[name].boolean()
+    if "width" in keys:
+        options["width"] = keys["width"].number()
     if "lattice" in keys and not keys["lattice"].is_null:
         options["lattice"] = keys["lattice"].integer(2, 512)
     try:
@@ -230,6 +236,10 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["adjustment"] = edit.adjustment
     if edit.adjustment == "continuous":
         content["shell"] = edit.shell
+        if edit.falloff != "smooth":
+            content["falloff"] = edit.falloff
+        if edit.width != 1.0:
+            content["width"] = edit.width
     if edit.keep_source:
         content["keep_source"] = True
     if edit.lattice is not None:

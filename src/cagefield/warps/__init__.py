@@ -2,7 +2,8 @@
 
 Notation: V^c canonical inner cage, V deformed inner cage, V^o outer cage, phi the inner map V -> V^c,
 phi' the shell map V^o \\ V -> V^o \\ V^c; p a point, J the Jacobian of the map at p. Everything here is the
-float64 reference, vectorised over points [N,3]; `device` has the same maps for one sample in a kernel.
+float64 reference, vectorised over points [N,3]; `device` and `flow_device` have the same maps for one sample
+in a kernel.
 
 One method per file; a continuous shell is chosen by its name in `SHELLS`.
 """
@@ -12,13 +13,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from cagefield.warps.flow_shell import FALLOFFS, Falloff, FlowShell
 from cagefield.warps.maps import Mapped, Shell, Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 if TYPE_CHECKING:
     from cagefield.cages import Cage
 
-SHELLS: dict[str, Callable[[Cage, Cage, Cage], Shell]] = {"trilinear": TrilinearShell}
-"""Shell by name: called with (canonical inner, deformed inner, outer) cages."""
 
-__all__ = ["SHELLS", "Mapped", "Shell", "TrilinearShell", "Warp"]
+def _trilinear(inner: Cage, deformed: Cage, outer: Cage, _falloff: Falloff) -> Shell:
+    return TrilinearShell(inner, deformed, outer)
+
+
+SHELLS: dict[str, Callable[[Cage, Cage, Cage, Falloff], Shell]] = {
+    "flow": FlowShell,
+    "trilinear": _trilinear,
+}
+"""Shell by name: called with (canonical inner, deformed inner, outer) cages and the falloff, which only the
+flow shell has."""
+
+__all__ = ["FALLOFFS", "SHELLS", "Falloff", "FlowShell", "Mapped", "Shell", "TrilinearShell", "Warp"]

@@ -11,9 +11,9 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,7 +24,10 @@ from cagefield import devices, hexahedron
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
 from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps import flow_device
 from cagefield.warps.discrete import DiscreteWarp
+from cagefield.warps.flow_device import flow_point, flow_sample
+from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.maps import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
@@ -42,12 +45,17 @@ OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no fu
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
+FLOW = 31  # 1 where the shell is an exact flow, whose table is in `lattice` at the offset [10], [11]
 RECORDS = 32
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
 EDGE = 1e-6
 """A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""
+
+LATTICE_STRAIN = 0.5
+"""Strain of a step (see `FlowShell`) for a lattice of 32^3 nodes. Finer ones take shorter steps, so that the
+integration stays well below the interpolation's error."""
 
 BOX_SLACK = 1e-5
 """Boxes are this share of their size larger than the edit, so that no float32 sample inside it is missed."""
@@ -78,7 +86,7 @@ class DeviceStack:
     """An edit stack packed for kernels.
 
     params [max(E,1), WIDTH] float32; lattice [M,3] float32, all edits' nodes one after the other (x fastest),
-    displacements in world units; n_edits E; boxes [B,2,3] float32 (min, max), one or two for each edit,
+    displacements in world units, and the tables of exact flow shells (see `flow_device`); n_edits E; boxes [B,2,3] float32 (min, max), one or two for each edit,
     outside all of which a sample is canonical as it is.
     """
 
@@ -106,9 +114,14 @@ class DeviceStack:
                 row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
                 row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
                 row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
-                row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
-                offset += len(nodes)
-                lattices.append(nodes)
+            elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+                nodes = _kept(_tables, edit, lambda shell=warp.shell: flow_device.table(shell))
+                row[FLOW] = 1.0
+            else:
+                continue
+            row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
+            offset += len(nodes)
+            lattices.append(nodes)
         nodes = np.zeros((1, 3), dtype=np.float32)
         if lattices:
             nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
@@ -162,6 +175,7 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     continuous = params[e, CONTINUOUS] > 0.5
     emptied = 0
     use_lattice = 0
+    use_flow = 0
     hit = -1
     best = 1e30
     at = vec3(0.0, 0.0, 0.0)
@@ -204,13 +218,24 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
                 elif resolution > 0:
                     use_lattice = 1
                     break
+                elif params[e, FLOW] > 0.5:
+                    use_flow = 1
+                    break
     q = p
     v = d
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
+    elif use_flow == 1:
+        q, v = flow_sample(p, d, lattice, first_entry(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
+
+
+@qd.func
+def first_entry(params: qd.template(), e: qd.i32):
+    """Where edit e's nodes or table begin in `lattice`."""
+    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
@@ -355,8 +380,7 @@ def interpolate(
     g = qd.max(qd.min(g, top), 0.0)
     cell = qd.min(qd.cast(g, qd.i32), resolution - 2)
     f = g - qd.cast(cell, qd.f32)
-    offset = qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
-    n = offset + (cell.z * resolution + cell.y) * resolution + cell.x
+    n = first_entry(params, e) + (cell.z * resolution + cell.y) * resolution + cell.x
     plane = resolution * resolution
     v000 = lattice[n]
     v010 = lattice[n + resolution]
@@ -405,31 +429,65 @@ def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, fra
         nodes[n] = q - p
 
 
-_lattices: "WeakKeyDictionary[Any, NDArray[np.float32]]" = WeakKeyDictionary()
+@qd.kernel
+def _sample_flow_lattice(
+    nodes: Nodes,
+    params: Params,
+    table: Nodes,
+    origin: vec3,
+    frame: mat3,
+    resolution: qd.i32,
+    bent: qd.template(),
+):
+    for n in range(nodes.shape[0]):
+        i = n % resolution
+        j = (n // resolution) % resolution
+        k = n // (resolution * resolution)
+        p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
+        xi, error = locate(p, params, 0, RECORDS)
+        if error <= EDGE:
+            q, _v = image(xi, vec3(1.0, 0.0, 0.0), params, 0, RECORDS)
+            nodes[n] = q - p
+        else:
+            nodes[n] = flow_point(p, table, 0, bent) - p
+
+
+_Kept: TypeAlias = "WeakKeyDictionary[Any, NDArray[np.float32]]"
+_lattices: _Kept = WeakKeyDictionary()
+_tables: _Kept = WeakKeyDictionary()
+
+
+def _kept(kept: _Kept, edit: PackedEdit, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:
+    """What `make` returns, made once in the edit's life."""
+    known = kept.get(edit)
+    if known is None:
+        known = make()
+        known.setflags(write=False)
+        kept[edit] = known
+    return known
 
 
 def _lattice(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     """The nodes [R^3,3] of a continuous edit's lattice, from its packed row with resolution 0."""
-    known = _lattices.get(edit)
-    if known is None:
-        warp, resolution = edit.exact_warp, edit.lattice
-        if not isinstance(warp, ContinuousWarp) or resolution is None:
-            raise EditError("only a continuous edit has a lattice")
-        devices.start()
-        origin, frame = warp.outer.frame
-        known = np.empty((resolution**3, 3), dtype=np.float32)
-        none = np.zeros((1, 3), dtype=np.float32)
-        _sample_lattice(
-            known,
-            np.ascontiguousarray(row[None]),
-            none,
-            vec3(*origin.tolist()),
-            mat3(frame.tolist()),
-            resolution,
-        )
-        known.setflags(write=False)
-        _lattices[edit] = known
-    return known
+    return _kept(_lattices, edit, lambda: _sampled(edit, row))
+
+
+def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
+    warp, resolution = edit.exact_warp, edit.lattice
+    if not isinstance(warp, ContinuousWarp) or resolution is None:
+        raise EditError("only a continuous edit has a lattice")
+    devices.start()
+    origin, frame = warp.outer.frame
+    nodes = np.empty((resolution**3, 3), dtype=np.float32)
+    place = (vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    params = np.ascontiguousarray(row[None])
+    if isinstance(warp.shell, FlowShell):
+        shell = replace(warp.shell, strain=LATTICE_STRAIN * (32.0 / resolution) ** 0.5)
+        bent = not (shell.motion.is_affine and warp.outer.is_affine)
+        _sample_flow_lattice(nodes, params, flow_device.table(shell), *place, bent)
+    else:
+        _sample_lattice(nodes, params, np.zeros((1, 3), dtype=np.float32), *place)
+    return nodes
 
 
 def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
@@ -445,13 +503,15 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
         return
     if not isinstance(warp, ContinuousWarp):
         raise EditError(f"a {type(warp).__name__} has no kernel")
-    if not isinstance(warp.shell, TrilinearShell):
-        raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
-    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 8, 1
+    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 2, 1
     _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
     _record(row, 1, warp.outer.corners)
-    for n in range(6):
-        _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
+    if isinstance(warp.shell, TrilinearShell):
+        row[LAST] = 8
+        for n in range(6):
+            _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
+    elif not isinstance(warp.shell, FlowShell):
+        raise EditError(f"a {type(warp.shell).__name__} has no kernel")
     origin, frame = warp.outer.frame
     row[TO_NODES : TO_NODES + 3] = origin
     if edit.lattice is not None:

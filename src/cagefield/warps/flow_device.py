@@ -1,0 +1,280 @@
+"""The flow shell for one sample, inside Quadrants kernels, in float32, from a table of the cage's motion.
+
+Everything is done in Z = W_o (p - c_o), the affine coordinates of the outer cage, and the table holds, for the
+times of the Runge-Kutta steps from t = 1 to 0, the affine maps from Z to the inner cage's coordinates and to
+the velocity. It is a list of vec3, appended to the lattices' nodes:
+
+    0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
+    7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
+    9     linear 0 or 1, outer cage affine 0 or 1
+    10-13 bend K_o of the outer cage    14-17 dK/dt of the inner cage
+
+then for each of 2 steps + 1 moments `MOMENT` of them:
+
+    0-3   y = rows . Z + [3]            4-7   velocity of the affine part = rows . Z + [7]
+    8     distances h of the faces      9     step h from this knot on, at even moments
+    10-13 bend K at that time           14-16 rows of W_o F, which takes the bend's velocity to Z
+
+The float64 reference, and the mathematics, are in `flow_shell`.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import numpy as np
+import quadrants as qd
+from numpy.typing import NDArray
+
+from cagefield.warps.flow_shell import FlowShell
+
+vec3 = qd.math.vec3
+
+HEADER, MOMENT = 18, 17
+
+
+def table(shell: FlowShell) -> NDArray[np.float32]:
+    """The table [T,3] of a flow shell, with the steps that its `strain` asks for."""
+    motion, knots = shell.motion, shell.knots[::-1]
+    steps = len(knots) - 1
+    times = np.empty(2 * steps + 1)
+    times[::2], times[1::2] = knots, 0.5 * (knots[1:] + knots[:-1])
+    outer = motion.confines
+    c, F, dc, dF = motion.frames(times)
+    W = np.linalg.inv(F)
+    unit = outer.heights.max()  # float32 has no room for the powers of any unit of length
+    bend_rate = motion.end.bend - motion.start.bend
+    head = np.zeros((HEADER, 3))
+    head[0:3], head[3], head[4:7], head[7] = outer.inverse, outer.centre, outer.frame, 0.5 * outer.heights / unit
+    head[8] = steps, motion.is_affine, 1.0 / shell.falloff.width
+    head[9, :2] = shell.falloff.profile == "linear", outer.is_affine
+    head[10:14], head[14:18] = outer.bend, bend_rate
+    rows = np.zeros((2 * steps + 1, MOMENT, 3))
+    rows[:, 0:3] = W @ outer.frame
+    rows[:, 3] = (W @ (outer.centre - c)[:, :, None])[:, :, 0]
+    L = outer.inverse @ dF @ W  # velocity in Z per offset of p from the cage's centre
+    rows[:, 4:7] = L @ outer.frame
+    rows[:, 7] = (L @ (outer.centre - c)[:, :, None])[:, :, 0] + dc @ outer.inverse.T
+    rows[:, 8] = 1.0 / np.linalg.norm(W, axis=2) / unit
+    rows[:-1:2, 9, 0] = np.diff(knots)
+    rows[:, 10:14] = motion.start.bend + times[:, None, None] * bend_rate
+    rows[:, 14:17] = outer.inverse @ F
+    return np.concatenate([head, rows.reshape(-1, 3)]).astype(np.float32)
+
+
+@qd.func
+def flow_sample(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32):
+    """(canonical point, J d) of a deformed point p in the shell; J is that of the discrete scheme."""
+    return flow(p, d, lattice, base, True, True)
+
+
+@qd.func
+def flow_point(p: vec3, lattice: qd.template(), base: qd.i32, bent: qd.template()):
+    """The canonical point of a deformed point p; bent is False where both cages are parallelepipeds."""
+    q, _v = flow(p, vec3(0.0, 0.0, 0.0), lattice, base, False, bent)
+    return q
+
+
+@qd.func
+def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.template(), bent: qd.template()):
+    """(canonical point, J d); d is not looked at, and returned, where there is no tangent."""
+    Z = rows_times(lattice, base, p - lattice[base + 3])
+    D = rows_times(lattice, base, d)
+    steps = qd.cast(lattice[base + 8].x, qd.i32)
+    z = qd.max(qd.min(Z, 1.0), -1.0)
+    xi = rows_times(lattice, base + HEADER, Z) + lattice[base + HEADER + 3]
+    if qd.static(not bent):
+        if qd.abs(Z).max() >= 1.0:
+            steps = 0
+    # The stages are a loop, not four copies: compilers take minutes for those.
+    for n in range(steps):
+        at = base + HEADER + 2 * MOMENT * n
+        h = lattice[at + 9].x
+        sum_Z = vec3(0.0, 0.0, 0.0)
+        sum_D = vec3(0.0, 0.0, 0.0)
+        k = vec3(0.0, 0.0, 0.0)
+        l = vec3(0.0, 0.0, 0.0)
+        share = 0.0
+        for stage in range(4):
+            middle = stage == 1 or stage == 2
+            if stage == 1:
+                share = 0.5 * h
+            elif stage == 3:
+                share = h
+            k, l, z, xi = velocity(
+                Z + share * k, D + share * l, z, xi, lattice, base, at + ((stage + 1) // 2) * MOMENT, tangent, bent
+            )
+            weight = 2.0 if middle else 1.0
+            sum_Z += weight * k
+            if qd.static(tangent):
+                sum_D += weight * l
+        Z += (h / 6.0) * sum_Z
+        if qd.static(tangent):
+            D += (h / 6.0) * sum_D
+    q = p
+    v = d
+    if steps > 0:
+        q = lattice[base + 3] + rows_times(lattice, base + 4, Z)
+        if qd.static(tangent):
+            v = rows_times(lattice, base + 4, D)
+    return q, v
+
+
+@qd.func
+def velocity(
+    Z: vec3,
+    D: vec3,
+    z_guess: vec3,
+    xi_guess: vec3,
+    lattice: qd.template(),
+    base: qd.i32,
+    moment: qd.i32,
+    tangent: qd.template(),
+    bent: qd.template(),
+):
+    """(dZ/dt, its change along D, z, xi) at Z; the guesses are z and xi of the last call."""
+    z = Z
+    dz = D
+    if qd.static(bent):
+        if lattice[base + 9].y < 0.5:
+            z = straighten(Z, z_guess, lattice, base + 10)
+            if qd.static(tangent):
+                dz = straighten_slope(z, D, lattice, base + 10)
+    y = rows_times(lattice, moment, Z) + lattice[moment + 3]
+    v = rows_times(lattice, moment + 4, Z) + lattice[moment + 7]
+    xi = y
+    dxi = vec3(0.0, 0.0, 0.0)
+    dv = vec3(0.0, 0.0, 0.0)
+    if qd.static(tangent):
+        dxi = rows_times(lattice, moment, D)
+        dv = rows_times(lattice, moment + 4, D)
+    if qd.static(bent):
+        if lattice[base + 8].y < 0.5:
+            xi = straighten(y, xi_guess, lattice, moment + 10)
+            held = qd.max(qd.min(xi, 1.0), -1.0)
+            v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
+            if qd.static(tangent):
+                dxi = straighten_slope(xi, dxi, lattice, moment + 10)
+                dv += rows_times(lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14))
+    # Outside the outer cage everything is at rest, also after a stage's rounding.
+    still = qd.max(1.0 - z * z, 0.0)
+    far = lattice[base + 7] * still
+    g = 0.0
+    out = vec3(0.0, 0.0, 0.0)
+    dout = vec3(0.0, 0.0, 0.0)
+    if far.min() > 0.0:
+        height = lattice[moment + 8]
+        e = height * qd.max(qd.abs(xi) - 1.0, 0.0)
+        E = e.dot(e)
+        inverse = 1.0 / far
+        F = inverse.dot(inverse)
+        q = qd.sqrt(E * F)
+        r = 1.0 / (1.0 + q)
+        per_width = lattice[base + 8].z
+        g = qd.max((r - 1.0) * per_width + 1.0, 0.0)
+        linear = lattice[base + 9].x > 0.5
+        w = g
+        if not linear:
+            w = g * g * (3.0 - 2.0 * g)
+        out = w * v
+        if qd.static(tangent):
+            dw = 0.0
+            if q > 1e-12 and g > 0.0:
+                sign = vec3(1.0, 1.0, 1.0)
+                for a in qd.static(range(3)):
+                    if xi[a] < 0.0:
+                        sign[a] = -1.0
+                dE = (e * height * sign).dot(dxi)
+                dF = 2.0 * (inverse * inverse * inverse * lattice[base + 7] * z).dot(dz)
+                dw = -r * r * per_width * (F * dE + E * dF) / q
+                if not linear:
+                    dw *= 6.0 * g * (1.0 - g)
+            dout = w * dv + dw * v
+    return out, dout, z, xi
+
+
+@qd.func
+def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32):
+    """xi with xi + B(clamp(xi)) = y for the bend at a row of the table: Newton's method, halved where it fails."""
+    xi = start
+    enough = 3e-7 * (1.0 + qd.abs(y).max())
+    size = 1e30
+    best = start
+    step = vec3(0.0, 0.0, 0.0)
+    share = 1.0
+    for _ in range(24):
+        residual = xi + bend(qd.max(qd.min(xi, 1.0), -1.0), lattice, K) - y
+        new = qd.abs(residual).max()
+        if new < size:
+            best = xi
+            size = new
+            if new <= enough:
+                break
+            step = straighten_slope(xi, residual, lattice, K)
+            share = 1.0
+        else:
+            share *= 0.5
+            if share < 0.01:
+                break
+        xi = best - share * step
+    return best
+
+
+@qd.func
+def straighten_slope(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
+    """(d(xi + B(clamp(xi)))/dxi)^-1 d, by Cramer's rule."""
+    x = qd.max(qd.min(xi, 1.0), -1.0)
+    a = lattice[K]
+    b = lattice[K + 1]
+    c = lattice[K + 2]
+    g = lattice[K + 3]
+    u = vec3(1.0, 0.0, 0.0)
+    v = vec3(0.0, 1.0, 0.0)
+    w = vec3(0.0, 0.0, 1.0)
+    if qd.abs(xi.x) <= 1.0:
+        u += x.y * a + x.z * b + x.y * x.z * g
+    if qd.abs(xi.y) <= 1.0:
+        v += x.x * a + x.z * c + x.x * x.z * g
+    if qd.abs(xi.z) <= 1.0:
+        w += x.x * b + x.y * c + x.x * x.y * g
+    vw = v.cross(w)
+    det = u.dot(vw)
+    if qd.abs(det) < 1e-6:
+        det = 1e-6 if det >= 0.0 else -1e-6
+    return vec3(d.dot(vw), d.dot(w.cross(u)), d.dot(u.cross(v))) / det
+
+
+@qd.func
+def bend(xi: vec3, lattice: qd.template(), K: qd.i32):
+    """B(xi) of the bend at a row of the table."""
+    return (
+        xi.x * xi.y * lattice[K]
+        + xi.x * xi.z * lattice[K + 1]
+        + xi.y * xi.z * lattice[K + 2]
+        + xi.x * xi.y * xi.z * lattice[K + 3]
+    )
+
+
+@qd.func
+def bend_along(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
+    """dB/dxi d of the bend at a row of the table."""
+    return (
+        (d.x * xi.y + xi.x * d.y) * lattice[K]
+        + (d.x * xi.z + xi.x * d.z) * lattice[K + 1]
+        + (d.y * xi.z + xi.y * d.z) * lattice[K + 2]
+        + (d.x * xi.y * xi.z + xi.x * d.y * xi.z + xi.x * xi.y * d.z) * lattice[K + 3]
+    )
+
+
+@qd.func
+def inside(xi: vec3, d: vec3):
+    """The change of clamp(xi) along d."""
+    out = d
+    for a in qd.static(range(3)):
+        if qd.abs(xi[a]) > 1.0:
+            out[a] = 0.0
+    return out
+
+
+@qd.func
+def rows_times(lattice: qd.template(), at: qd.i32, v: vec3):
+    """The matrix whose rows are three entries of the table, times v."""
+    return vec3(lattice[at].dot(v), lattice[at + 1].dot(v), lattice[at + 2].dot(v))
