@@ -12,14 +12,15 @@ from scipy import sparse
 
 from cagefield import hexahedron
 from cagefield.benchmarking.distortion import distortion, shell_points
-from cagefield.benchmarking.methods import MAPS, exact_map
-from cagefield.benchmarking.peers import PEERS, HarmonicShell, PeerWarp
+from cagefield.benchmarking.methods import MAPS, METHODS, check_known, exact_map
+from cagefield.benchmarking.peers import PEERS, HarmonicShell
 from cagefield.benchmarking.peers.harmonic import conjugate_gradients
 from cagefield.benchmarking.peers.mean_value import ClosedMesh, cube_surface
 from cagefield.cages import Cage
-from cagefield.edits import Edit
+from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.hexahedron import Array
+from cagefield.warps.device import DeviceStack
 from cagefield.warps.hexahedron import HexahedronMap
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -236,17 +237,40 @@ def test_conjugate_gradients_solve() -> None:
     np.testing.assert_allclose(A @ x, right, atol=1e-5)
 
 
-def test_peers_outside_the_shell_are_the_edit_itself() -> None:
+@pytest.mark.parametrize("name", PEERS)
+def test_an_edit_takes_a_peer_by_name(name: str) -> None:
+    """phi inside, the identity outside; and the kernel reads the same from a lattice of the peer's map."""
     p = np.random.default_rng(6).uniform(-1.2, 1.2, (3000, 3))
-    exact = TURNED.replace(allow_folding=True).exact_warp.to_canonical(p)
-    for name in PEERS:
-        warp = exact_map(name, TURNED)
-        assert isinstance(warp, PeerWarp)
-        mapped = warp.to_canonical(p)
-        shell_ = OUTER.contains(p) & ~TURNED.deformed.contains(p)
-        np.testing.assert_array_equal(mapped.points[~shell_], exact.points[~shell_])
-        np.testing.assert_array_equal(mapped.jacobian[~shell_], exact.jacobian[~shell_])
-        assert np.abs(mapped.points[shell_] - exact.points[shell_]).max() > 0.01
+    exact = TURNED.exact_warp.to_canonical(p)
+    edit = TURNED.replace(shell=name)
+    mapped = edit.exact_warp.to_canonical(p)
+    in_shell = OUTER.contains(p) & ~TURNED.deformed.contains(p)
+    np.testing.assert_array_equal(mapped.points[~in_shell], exact.points[~in_shell])
+    np.testing.assert_array_equal(mapped.jacobian[~in_shell], exact.jacobian[~in_shell])
+    expected = shell(name, TURNED)(p[in_shell])
+    np.testing.assert_array_equal(mapped.points[in_shell], expected[0])
+    np.testing.assert_array_equal(mapped.jacobian[in_shell], expected[1])
+
+    coarse = EditStack([edit.replace(lattice=24)])
+    d = np.broadcast_to(np.float32([0.6, 0.0, 0.8]), p.shape)
+    got = DeviceStack.from_stack(coarse).to_canonical(p.astype(np.float32), d)
+    reference = coarse.to_canonical(p.astype(np.float32), d)
+    near = np.abs(got[0] - reference.points).max(axis=1) < 1e-5  # float32
+    assert near.mean() > 0.999  # all but points within float32's rounding of a cage's face
+    with pytest.raises(EditError, match="Shell has no kernel; set a lattice"):
+        DeviceStack.from_stack(EditStack([edit]))
+    with pytest.raises(EditError, match="has no map to deformed space, for 3000 points; use shell"):
+        edit.exact_warp.to_deformed(p)
+
+
+def test_methods_change_shells_alone() -> None:
+    stack = EditStack([Edit.delete(INNER), TURNED.replace(width=0.5)])
+    for name, method in METHODS.items():
+        first, second = method.of_all(stack)
+        assert first == stack[0]
+        assert (second.shell, second.lattice) == (method.shell, method.lattice), name
+        assert second.operations == TURNED.operations
+        assert second.width == (0.5 if method.shell == "flow" else 1.0)
 
 
 # -- folding and distortion --------------------------------------------------------------------------------
@@ -254,6 +278,8 @@ def test_peers_outside_the_shell_are_the_edit_itself() -> None:
 
 def test_peers_fold_under_large_turns_and_not_under_small_ones() -> None:
     for name in PEERS:
+        least = EDIT.rotate((0, 0, np.pi / 2)).replace(shell=name).exact_warp.shell.least_ratio()  # type: ignore
+        assert least < 0.0
         small, large = (EDIT.rotate((0, 0, np.radians(deg))) for deg in (15, 90))
         assert not distortion(exact_map(name, small), small, samples=4000).folds
         measured = distortion(exact_map(name, large), large, samples=4000)
@@ -267,6 +293,12 @@ def test_a_folded_trilinear_shell_is_seen_to_fold() -> None:
     small = EDIT.rotate((0, 0, np.radians(15)))
     measured = distortion(exact_map("trilinear", small), small, samples=4000)
     assert not measured.folds and measured.folded == 0.0
+
+
+def test_a_flow_does_not_fold() -> None:
+    edit = EDIT.rotate((0, 0, np.radians(120)))
+    measured = distortion(exact_map("flow", edit), edit, samples=2000)
+    assert 0.1 < measured.least_det < 1.0 and measured.folded == 0.0
 
 
 def test_distortion_in_closed_form() -> None:
@@ -295,7 +327,9 @@ def test_points_of_the_shell() -> None:
 
 
 def test_methods_that_cannot_be() -> None:
-    assert {"trilinear", "mean value", "harmonic"} <= set(MAPS)
+    assert set(MAPS) == {"flow", "trilinear", "mean value", "harmonic"}
+    with pytest.raises(CagefieldError, match="there is no method 'trilinear 7'; choose from flow, "):
+        check_known(("flow", "trilinear 7"))
     with pytest.raises(CagefieldError, match="there is no method 'green'; choose from"):
         exact_map("green", EDIT)
     with pytest.raises(CagefieldError, match='edit "x" is discrete and has no shell'):

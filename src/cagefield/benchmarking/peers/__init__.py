@@ -2,7 +2,7 @@
 
 Each is a backward shell map: from the shell between the deformed inner cage and the outer cage to canonical
 space, equal to phi on the inner cage and to the identity on the outer one, as `warps.maps.Shell` asks. They
-have no inverse in closed form and are no choice for an edit; they are here to be compared with.
+have no inverse in closed form, and may fold; they are here to be compared with.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ import numpy as np
 from cagefield.benchmarking.peers.harmonic import HarmonicShell
 from cagefield.benchmarking.peers.mean_value import MeanValueShell
 from cagefield.cages import Cage
+from cagefield.errors import EditError
 from cagefield.hexahedron import Array
-from cagefield.warps.hexahedron import HexahedronMap
-from cagefield.warps.maps import Mapped
 
 
 class BackwardShell(Protocol):
@@ -36,23 +35,32 @@ PEERS: dict[str, Callable[[Cage, Cage, Cage], BackwardShell]] = {
 
 
 @dataclass(frozen=True)
-class PeerWarp:
-    """phi in V, a peer's map in V^o minus V, the identity outside V^o; to canonical space."""
+class PeerShell:
+    """A peer's map as the shell of an edit; folded or not, it is evaluated."""
 
-    inner: HexahedronMap
+    backward: BackwardShell
+    deformed: Cage
     outer: Cage
-    shell: BackwardShell
 
-    def to_canonical(self, points: Array) -> Mapped:
-        """Deformed points [N,3] to canonical space."""
-        mapped = Mapped.identity(points)
-        rows = np.flatnonzero(self.outer.contains(points))
-        inside, canonical, J = self.inner(points[rows])
-        mapped.put(rows[inside], canonical, J)
-        shell = rows[~inside]
-        if len(shell):
-            mapped.put(shell, *self.shell.to_canonical(points[shell]))
-        return mapped
+    def to_canonical(self, points: Array) -> tuple[Array, Array]:
+        """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3] in the shell."""
+        return self.backward.to_canonical(points)
+
+    def to_deformed(self, points: Array) -> tuple[Array, Array]:
+        """Raises EditError: the map back is all there is."""
+        name, count = type(self.backward).__name__, len(points)
+        raise EditError(f'a {name} has no map to deformed space, for {count} points; use shell="flow"')
+
+    def least_ratio(self) -> float:
+        """Least det J of the map's inverse over 20,000 points of the shell; <= 0 where the map folds."""
+        points = self.outer.frame[0] + np.random.default_rng(0).random((20_000, 3)) @ self.outer.frame[1].T
+        points = points[self.outer.contains(points)]
+        det = np.linalg.det(self.to_canonical(points[~self.deformed.contains(points)])[1])
+        return float(det.min() if det.min() <= 0.0 else 1.0 / det.max())
+
+    def problem(self) -> str | None:
+        """None: whether a peer's map folds is what is measured."""
+        return None
 
 
-__all__ = ["PEERS", "BackwardShell", "HarmonicShell", "MeanValueShell", "PeerWarp"]
+__all__ = ["PEERS", "BackwardShell", "HarmonicShell", "MeanValueShell", "PeerShell"]
