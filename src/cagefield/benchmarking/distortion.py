@@ -22,7 +22,8 @@ class Distortion:
     """Measures of J, d(canonical)/d(deformed), over points spread evenly over the deformed shell.
 
     least_det  least of det J and 1/det J; <= 0 where the map folds
-    stretch    largest factor by which a length grows or shrinks: the greatest singular value of J or J^-1
+    stretch    largest factor by which a length grows or shrinks: the greatest singular value of J or J^-1;
+               infinite where the map folds
     rigidity   mean Frobenius norm of J - R, R the rotation nearest to J: 0 for a rigid motion
     folded     share of the shell that the map turns inside out
     """
@@ -58,9 +59,9 @@ def distortion(warp: BackwardMap, edit: Edit, *, samples: int = SAMPLES, seed: i
     U, s, Vt = np.linalg.svd(J)
     Vt[np.linalg.det(U @ Vt) < 0.0, 2] *= -1.0
     rigidity = np.linalg.norm(J - U @ Vt, axis=(1, 2)).mean()
-    with np.errstate(divide="ignore"):
-        stretch = float(np.maximum(s[:, 0], 1.0 / s[:, 2]).max())
-    return Distortion(min(least, bound), stretch, float(rigidity), folded)
+    least = min(least, bound)
+    stretch = np.inf if least <= 0.0 else float(np.maximum(s[:, 0], 1.0 / s[:, 2]).max())
+    return Distortion(least, stretch, float(rigidity), folded)
 
 
 def shell_points(edit: Edit, count: int, seed: int = 0) -> Array:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from cagefield.cli.bench_maps import BenchGrids
 from cagefield.cli.options import (
     Device,
     Flag,
@@ -283,6 +284,7 @@ class Bench:
     what: tyro.conf.OmitSubcommandPrefixes[
         tyro.conf.OmitArgPrefixes[
             Annotated[BenchEdits, tyro.conf.subcommand("edits")]
+            | Annotated[BenchGrids, tyro.conf.subcommand("grids")]
             | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
             | Annotated[BenchTraining, tyro.conf.subcommand("training")]
         ]
