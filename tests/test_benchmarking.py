@@ -14,7 +14,8 @@ import pytest
 
 from cagefield.benchmarking import speed, training
 from cagefield.benchmarking.cases import CASES, Case, chosen, relit
-from cagefield.benchmarking.edits import Score, measure, pictures_of, table, write_picture
+from cagefield.benchmarking.compare import seen
+from cagefield.benchmarking.edits import Score, measure, table, write_picture
 from cagefield.benchmarking.figures import compare, mean_psnr
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number
@@ -171,7 +172,7 @@ def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
     cameras = scene.cameras["test"]
     still = Edit(Cage.box((0, 0, 0), 1.0), Cage.box((0, 0, 0), 2.0))
     truth = bench.modelled("microphone", cameras)
-    shown, edited = (pictures_of(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
+    shown, edited = (seen(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
     figures = compare(shown, edited, truth, truth)
     assert figures.lost == 0.0 and figures.changed == 0.0
     assert np.isnan(figures.there_lost)
@@ -251,7 +252,7 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
 
     text = table(scores, TINY, ("Machine: a test",)).markdown()
     rows = [line for line in text.splitlines() if line.startswith("| microphone")]
-    assert len(rows) == 2 and rows[0].count("|") == 18
+    assert len(rows) == 2 and rows[0].count("|") == 21
     figures = scores[0].figures
     assert f"| {figures.unedited:.2f} | {figures.edited:.2f} | {number(figures.lost)} |" in rows[0]
     assert (

@@ -45,7 +45,7 @@ def test_folds_are_red_and_only_folds() -> None:
         red = is_red(lattice_picture(exact_map(name, large), large, 48, 10.0))
         assert 0.01 < red.mean() < 0.2
         # The picture looks the same from all four sides.
-        assert np.mean(red != np.rot90(red)) < 0.01
+        assert np.mean(red != np.rot90(red)) < 0.02
     flow = lattice_picture(exact_map("flow", large), large, 32, 0.1)
     assert not is_red(flow).any()
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 import cagefield
 from cagefield.benchmarking.cases import Case
+from cagefield.benchmarking.exact import exact
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
@@ -39,7 +40,10 @@ Move = Callable[[float, float, str], None]
 Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("datasets/procedural", "cameras.py")
-_MAPPED = ("edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py")
+_MAPPED = (
+    "edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py", "benchmarking/exact.py",
+    "benchmarking/peers", "benchmarking/methods.py",
+)  # fmt: skip
 
 SOFTNESS = 0.004
 """Softness of the surfaces of a scene that is rendered as a field, in world units: half a voxel or less."""
@@ -50,7 +54,8 @@ class Settings:
     """What is photographed, how the fields are trained, and how the exact maps are rendered.
 
     Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
-    the first `exact_views` test cameras, with `exact_samples` samples a ray.
+    the first `exact_views` test cameras, with `exact_samples` samples a ray; that of the methods that are
+    compared at compared_size x compared_size for the first `compared_views`.
 
     Raises:
         CagefieldError: sizes and numbers that are too small.
@@ -63,6 +68,8 @@ class Settings:
     exact_size: int = 128
     exact_views: int = 6
     exact_samples: int = 768
+    compared_size: int = 64
+    compared_views: int = 3
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -72,6 +79,8 @@ class Settings:
             ("exact_size", 16),
             ("exact_views", 1),
             ("exact_samples", 1),
+            ("compared_size", 16),
+            ("compared_views", 1),
         ):
             value = getattr(self, name)
             if value < least:
@@ -168,12 +177,13 @@ class Workbench:
         field_ = procedural_scene(name).field(SOFTNESS)
         stack = None if edits is None else EditStack(edit.replace(lattice=None) for edit in edits)
         text = "" if stack is None else dump_edits(stack)
+        points = None if stack is None else exact(stack)
         samples = self.settings.exact_samples
         key = digest([name, text, samples, SOFTNESS, _poses(cameras)], (*_MODELLED, *_MAPPED))
 
         def pictures() -> Iterator[UInt8]:
             for camera in cameras:
-                yield render_sampled(field_, camera, samples=samples, edits=stack).rgb8()
+                yield render_sampled(field_, camera, samples=samples, edits=points).rgb8()
 
         return self._kept(name, key, f"{name}: exact maps", pictures, len(cameras))
 
