@@ -129,7 +129,7 @@ def solids(scene: ProceduralScene, box: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def test_chosen_refuses_unknown_names() -> None:
-    assert [one.scene for one in chosen(["chair"])] == ["chair"] * 4
+    assert [one.scene for one in chosen(["chair"])] == ["chair"] * 6
     with pytest.raises(CagefieldError, match="no scene 'castle' to measure; choose from digger, chair"):
         chosen(["castle"])
     with pytest.raises(CagefieldError, match="no edit 'move_cone' to measure; choose from lower_wider"):
@@ -431,6 +431,8 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     new = ["edits", "-o", tmp_path / "new.md"]
     assert "move_cone.png exists already" in refused(capsys, *new, "--pictures", tmp_path)
     assert "no scene 'castle'" in refused(capsys, *new, "--scenes", "castle")
+    assert "no method 'green'" in refused(capsys, *new, "--methods", "green")
+    assert "compared_size is 4" in refused(capsys, *new, "--compared-size", 4)
     assert "minutes is 0.0" in refused(capsys, *new, "--minutes", 0)
     assert "size is 4; it must be at least 16" in refused(capsys, *new, "--size", 4)
     assert "--picture-size is 0" in refused(capsys, *new, "--picture-size", 0)
