@@ -186,6 +186,11 @@ def _row(score: Score, perceived: bool) -> tuple[str, ...]:
     )
 
 
+def eye(scene: str, size: int) -> Camera:
+    """The camera of a scene's pictures, size x size pixels."""
+    return Camera.look_at(_EYES[scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
+
+
 def picture_path(folder: Path, case: Case) -> Path:
     """Where the picture of a case goes."""
     return folder / f"{case.scene}_{case.name}.png"
@@ -193,7 +198,7 @@ def picture_path(folder: Path, case: Case) -> Path:
 
 def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, error: bool = False) -> Path:
     """Writes before, edited and truth (and their difference, dark, three times as strong) side by side."""
-    camera = Camera.look_at(_EYES[case.scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
+    camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
     before = cast(Pictures, scene.render(camera, background="white").rgb8())
     after = scene.with_edits(case.edits).render(camera, background="white").rgb8()

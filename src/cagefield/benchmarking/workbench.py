@@ -123,13 +123,26 @@ class Workbench:
     def scene(self, name: str) -> Scene:
         """The scene trained on the photos of a built-in scene."""
         if name not in self._open:
-            self._open[name] = self._trained(name)
+            self._open[name] = self._trained(name, self.photos(name))
         return self._open[name]
 
-    def _trained(self, name: str) -> Scene:
+    def one_sided(self, name: str, front: Camera, degrees: float) -> Scene:
+        """The scene trained on those photos alone that were taken from within `degrees` of a camera.
+
+        Seen from above the origin: at any height. Raises CagefieldError where there are none.
+        """
         dataset = self.photos(name)
+        train = tuple(view for view in dataset.train if beside(view.camera, front, degrees))
+        if not train:
+            raise CagefieldError(f"no photo of {name} is from within {degrees:g} degrees; take more views")
+        one_side = dataclasses.replace(dataset, train=train)
+        return self._trained(name, one_side, [view.name for view in train])
+
+    def _trained(self, name: str, dataset: Dataset, part: Sequence[object] = ()) -> Scene:
+        """The scene trained on the photos of a data set, of which `part` says what was chosen."""
         config = self.settings.config
-        path = dataset.path.with_name(f"field-{digest([dataset.path.name, dataclasses.asdict(config)])}")
+        key = digest([dataset.path.name, dataclasses.asdict(config), *part])
+        path = dataset.path.with_name(f"field-{key}")
         if path.is_dir() and not self.retrain:
             return Scene.open(path)
         with self.bar(f"{name}: training") as move:
@@ -206,6 +219,12 @@ class Workbench:
         with replaced_whole(path) as temporary:
             np.savez_compressed(temporary, pictures=np.stack(made))
         return np.stack(made)
+
+
+def beside(camera: Camera, other: Camera, degrees: float) -> bool:
+    """True where a camera stands within so many degrees of another, seen from above the origin."""
+    a, b = (np.arctan2(which.origin[1], which.origin[0]) for which in (camera, other))
+    return bool(abs((a - b + np.pi) % (2 * np.pi) - np.pi) <= np.radians(degrees))
 
 
 def digest(content: object, sources: Sequence[str] = ()) -> str:

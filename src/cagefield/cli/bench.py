@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from cagefield.cli.bench_maps import BenchGrids
+from cagefield.cli.bench_maps import BenchAblation, BenchGrids
 from cagefield.cli.options import (
     Device,
     Flag,
@@ -113,7 +113,7 @@ class BenchEdits:
             self.views,
             self.size,
             self.test_views,
-            _config(self.minutes, self.steps, self.resolution),
+            voxel_config(self.minutes, self.steps, self.resolution),
             self.exact_size,
             self.exact_views,
             self.exact_samples,
@@ -284,7 +284,9 @@ class BenchTraining:
             check_file(path, self.overwrite)
         if self.scene_out is not None:
             check_destination(self.scene_out, self.overwrite)
-        config = _config(self.minutes, self.steps, self.resolution, sh_degree=self.sh_degree, seed=self.seed)
+        config = voxel_config(
+            self.minutes, self.steps, self.resolution, sh_degree=self.sh_degree, seed=self.seed
+        )
         dataset = load_dataset(self.data, downscale=self.downscale, holdout=self.holdout)
         devices.start(self.device)
 
@@ -327,6 +329,7 @@ class Bench:
         tyro.conf.OmitArgPrefixes[
             Annotated[BenchEdits, tyro.conf.subcommand("edits")]
             | Annotated[BenchGrids, tyro.conf.subcommand("grids")]
+            | Annotated[BenchAblation, tyro.conf.subcommand("ablation")]
             | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
             | Annotated[BenchTraining, tyro.conf.subcommand("training")]
         ]
@@ -355,7 +358,8 @@ def command_line(name: str, options: Any, silent: Collection[str] = _SILENT) -> 
     return shlex.join(words)
 
 
-def _config(minutes: float, steps: int | None, resolution: int, **more: Any) -> VoxelConfig:
+def voxel_config(minutes: float, steps: int | None, resolution: int, **more: Any) -> VoxelConfig:
+    """The configuration of a training of so many minutes, or of so many steps where those are given."""
     from cagefield.training.voxel import VoxelConfig
 
     timed = {"minutes": minutes} if steps is None else {"steps": steps}
