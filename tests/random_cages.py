@@ -47,7 +47,7 @@ def cages(draw: st.DrawFn) -> Cage:
 
 
 @st.composite
-def edits(draw: st.DrawFn, fold_free: float = 0.95) -> Edit:
+def edits(draw: st.DrawFn, fold_free: float = 0.95, shell: str = "trilinear") -> Edit:
     """Continuous edits whose operations go to at most a share `fold_free` of what is safe."""
     rng = np.random.default_rng(draw(seeds))
     bend = draw(st.sampled_from([0.0, 0.3]))
@@ -56,7 +56,7 @@ def edits(draw: st.DrawFn, fold_free: float = 0.95) -> Edit:
     inner = Cage(b + (0.5 + (np.asarray(Cage.box(0.0 * b, 1.0).corners)) * rng.uniform(0.2, 0.6, 3)) @ A.T)
     inner = dragged(inner, rng.uniform(-1.0, 1.0, (8, 3)) @ inner.affine[0].T, bend)
     outer = dragged(outer, rng.uniform(-0.3, 0.3, (8, 3)) @ A.T, bend)
-    edit = Edit(inner, outer)
+    edit = Edit(inner, outer, shell=shell)
     assume(can_be_evaluated(edit))
     gap = np.linalg.norm(A, axis=0).min() * 0.25
     for kind in draw(st.lists(st.integers(0, 6), min_size=1, max_size=3)):

@@ -62,7 +62,7 @@ def _details(edit: Edit, positions: Array) -> Iterable[str]:
         f"its volume becomes {_volume(edit.deformed) / _volume(edit.inner):.3g} times what it was"
     )
     try:
-        warp = edit.warp
+        warp = edit.exact_warp
     except EditError as error:
         yield f"cannot be evaluated: {error}"
         return

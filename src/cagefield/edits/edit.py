@@ -35,8 +35,8 @@ class Edit:
     - outer: the outer cage V^o, which confines a continuous edit; ignored by a discrete one.
     - adjustment: "continuous" (the shell between the cages is interpolated and the field stays connected) or
       "discrete" (only the inner region changes: moved, with `keep_source` copied, with `deleted` removed).
-    - shell: the continuous map between the cages, a name in `warps.SHELLS`: "flow" cannot fold, "trilinear" is
-      the paper's.
+    - shell: the continuous map between the cages, a name in `warps.SHELLS`: "flow" cannot fold, "trilinear"
+      is the paper's.
     - operations: what moved the inner cage, in order; `deformed` is the result.
     - lattice: None evaluates the shell exactly at every sample; an integer R interpolates it from R^3 nodes
       (64, 128 or 256 in the paper). The inner region is exact either way.

@@ -13,6 +13,7 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol, TypeAlias
 from weakref import WeakKeyDictionary
 
@@ -23,8 +24,8 @@ from numpy.typing import NDArray
 from cagefield import devices, hexahedron
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
+from cagefield.warps import flow_device, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
-from cagefield.warps import flow_device
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_device import flow_point, flow_sample
 from cagefield.warps.flow_shell import FlowShell
@@ -87,8 +88,8 @@ class DeviceStack:
     """An edit stack packed for kernels.
 
     params [max(E,1), WIDTH] float32; lattice [M,3] float32, all edits' nodes one after the other (x fastest),
-    displacements in world units, and the tables of exact flow shells (see `flow_device`); n_edits E; boxes [B,2,3] float32 (min, max), one or two for each edit,
-    outside all of which a sample is canonical as it is.
+    displacements in world units, and the tables of exact flow shells (see `flow_device`); n_edits E; boxes
+    [B,2,3] float32 (min, max), one or two for each edit, outside all of which a sample is canonical as it is.
     """
 
     params: NDArray[np.float32]
@@ -116,7 +117,7 @@ class DeviceStack:
                 row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
                 row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
             elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
-                nodes = _kept(_tables, edit, lambda shell=warp.shell: flow_device.table(shell))
+                nodes = _kept(_tables, edit, partial(flow_device.table, warp.shell))
                 row[FLOW] = 1.0
             else:
                 continue
@@ -438,7 +439,6 @@ def _sample_flow_lattice(
     origin: vec3,
     frame: mat3,
     resolution: qd.i32,
-    bent: qd.template(),
 ):
     for n in range(nodes.shape[0]):
         i = n % resolution
@@ -450,7 +450,7 @@ def _sample_flow_lattice(
             q, _v = image(xi, vec3(1.0, 0.0, 0.0), params, 0, RECORDS)
             nodes[n] = q - p
         else:
-            nodes[n] = flow_point(p, table, 0, bent) - p
+            nodes[n] = flow_point(p, table, 0) - p
 
 
 _Kept: TypeAlias = "WeakKeyDictionary[Any, NDArray[np.float32]]"
@@ -484,8 +484,9 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     params = np.ascontiguousarray(row[None])
     if isinstance(warp.shell, FlowShell):
         shell = replace(warp.shell, strain=LATTICE_STRAIN * (32.0 / resolution) ** 0.5)
-        bent = not (shell.motion.is_affine and warp.outer.is_affine)
-        _sample_flow_lattice(nodes, params, flow_device.table(shell), *place, bent)
+        if shell.motion.is_affine and warp.outer.is_affine:
+            return flow_lattice.sample(shell, resolution)
+        _sample_flow_lattice(nodes, params, flow_device.table(shell), *place)
     elif not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
         nodes[:] = lattice.displacement.reshape(-1, 3)

@@ -1,8 +1,8 @@
 """The flow shell for one sample, inside Quadrants kernels, in float32, from a table of the cage's motion.
 
-Everything is done in Z = W_o (p - c_o), the affine coordinates of the outer cage, and the table holds, for the
-times of the Runge-Kutta steps from t = 1 to 0, the affine maps from Z to the inner cage's coordinates and to
-the velocity. It is a list of vec3, appended to the lattices' nodes:
+Everything is done in Z = W_o (p - c_o), the affine coordinates of the outer cage, and the table holds, for
+the times of the Runge-Kutta steps from t = 1 to 0, the affine maps from Z to the inner cage's coordinates and
+to the velocity. It is a list of vec3, appended to the lattices' nodes:
 
     0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
     7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
@@ -43,7 +43,12 @@ def table(shell: FlowShell) -> NDArray[np.float32]:
     unit = outer.heights.max()  # float32 has no room for the powers of any unit of length
     bend_rate = motion.end.bend - motion.start.bend
     head = np.zeros((HEADER, 3))
-    head[0:3], head[3], head[4:7], head[7] = outer.inverse, outer.centre, outer.frame, 0.5 * outer.heights / unit
+    head[0:3], head[3], head[4:7], head[7] = (
+        outer.inverse,
+        outer.centre,
+        outer.frame,
+        0.5 * outer.heights / unit,
+    )
     head[8] = steps, motion.is_affine, 1.0 / shell.falloff.width
     head[9, :2] = shell.falloff.profile == "linear", outer.is_affine
     head[10:14], head[14:18] = outer.bend, bend_rate
@@ -63,27 +68,24 @@ def table(shell: FlowShell) -> NDArray[np.float32]:
 @qd.func
 def flow_sample(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32):
     """(canonical point, J d) of a deformed point p in the shell; J is that of the discrete scheme."""
-    return flow(p, d, lattice, base, True, True)
+    return flow(p, d, lattice, base, True)
 
 
 @qd.func
-def flow_point(p: vec3, lattice: qd.template(), base: qd.i32, bent: qd.template()):
-    """The canonical point of a deformed point p; bent is False where both cages are parallelepipeds."""
-    q, _v = flow(p, vec3(0.0, 0.0, 0.0), lattice, base, False, bent)
+def flow_point(p: vec3, lattice: qd.template(), base: qd.i32):
+    """The canonical point of a deformed point p."""
+    q, _v = flow(p, vec3(0.0, 0.0, 0.0), lattice, base, False)
     return q
 
 
 @qd.func
-def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.template(), bent: qd.template()):
+def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.template()):
     """(canonical point, J d); d is not looked at, and returned, where there is no tangent."""
     Z = rows_times(lattice, base, p - lattice[base + 3])
     D = rows_times(lattice, base, d)
     steps = qd.cast(lattice[base + 8].x, qd.i32)
     z = qd.max(qd.min(Z, 1.0), -1.0)
     xi = rows_times(lattice, base + HEADER, Z) + lattice[base + HEADER + 3]
-    if qd.static(not bent):
-        if qd.abs(Z).max() >= 1.0:
-            steps = 0
     # The stages are a loop, not four copies: compilers take minutes for those.
     for n in range(steps):
         at = base + HEADER + 2 * MOMENT * n
@@ -91,7 +93,7 @@ def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.tem
         sum_Z = vec3(0.0, 0.0, 0.0)
         sum_D = vec3(0.0, 0.0, 0.0)
         k = vec3(0.0, 0.0, 0.0)
-        l = vec3(0.0, 0.0, 0.0)
+        m = vec3(0.0, 0.0, 0.0)
         share = 0.0
         for stage in range(4):
             middle = stage == 1 or stage == 2
@@ -99,13 +101,13 @@ def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.tem
                 share = 0.5 * h
             elif stage == 3:
                 share = h
-            k, l, z, xi = velocity(
-                Z + share * k, D + share * l, z, xi, lattice, base, at + ((stage + 1) // 2) * MOMENT, tangent, bent
+            k, m, z, xi = velocity(
+                Z + share * k, D + share * m, z, xi, lattice, base, at + ((stage + 1) // 2) * MOMENT, tangent
             )
             weight = 2.0 if middle else 1.0
             sum_Z += weight * k
             if qd.static(tangent):
-                sum_D += weight * l
+                sum_D += weight * m
         Z += (h / 6.0) * sum_Z
         if qd.static(tangent):
             D += (h / 6.0) * sum_D
@@ -128,16 +130,14 @@ def velocity(
     base: qd.i32,
     moment: qd.i32,
     tangent: qd.template(),
-    bent: qd.template(),
 ):
     """(dZ/dt, its change along D, z, xi) at Z; the guesses are z and xi of the last call."""
     z = Z
     dz = D
-    if qd.static(bent):
-        if lattice[base + 9].y < 0.5:
-            z = straighten(Z, z_guess, lattice, base + 10)
-            if qd.static(tangent):
-                dz = straighten_slope(z, D, lattice, base + 10)
+    if lattice[base + 9].y < 0.5:
+        z = straighten(Z, z_guess, lattice, base + 10, tangent)
+        if qd.static(tangent):
+            dz = straighten_slope(z, D, lattice, base + 10)
     y = rows_times(lattice, moment, Z) + lattice[moment + 3]
     v = rows_times(lattice, moment + 4, Z) + lattice[moment + 7]
     xi = y
@@ -146,27 +146,27 @@ def velocity(
     if qd.static(tangent):
         dxi = rows_times(lattice, moment, D)
         dv = rows_times(lattice, moment + 4, D)
-    if qd.static(bent):
-        if lattice[base + 8].y < 0.5:
-            xi = straighten(y, xi_guess, lattice, moment + 10)
-            held = qd.max(qd.min(xi, 1.0), -1.0)
-            v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
-            if qd.static(tangent):
-                dxi = straighten_slope(xi, dxi, lattice, moment + 10)
-                dv += rows_times(lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14))
+    if lattice[base + 8].y < 0.5:
+        xi = straighten(y, xi_guess, lattice, moment + 10, tangent)
+        held = qd.max(qd.min(xi, 1.0), -1.0)
+        v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
+        if qd.static(tangent):
+            dxi = straighten_slope(xi, dxi, lattice, moment + 10)
+            dv += rows_times(lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14))
     # Outside the outer cage everything is at rest, also after a stage's rounding.
-    still = qd.max(1.0 - z * z, 0.0)
-    far = lattice[base + 7] * still
+    far = lattice[base + 7] * (1.0 - z * z)
     g = 0.0
     out = vec3(0.0, 0.0, 0.0)
     dout = vec3(0.0, 0.0, 0.0)
-    if far.min() > 0.0:
+    if far.min() > 1e-6:
         height = lattice[moment + 8]
         e = height * qd.max(qd.abs(xi) - 1.0, 0.0)
-        E = e.dot(e)
         inverse = 1.0 / far
-        F = inverse.dot(inverse)
-        q = qd.sqrt(E * F)
+        ee = e * e
+        ff = inverse * inverse
+        E = ee.dot(ee)
+        F = ff.dot(ff)
+        q = qd.sqrt(qd.sqrt(E * F))
         r = 1.0 / (1.0 + q)
         per_width = lattice[base + 8].z
         g = qd.max((r - 1.0) * per_width + 1.0, 0.0)
@@ -177,14 +177,14 @@ def velocity(
         out = w * v
         if qd.static(tangent):
             dw = 0.0
-            if q > 1e-12 and g > 0.0:
+            if q > 1e-6 and g > 0.0:
                 sign = vec3(1.0, 1.0, 1.0)
                 for a in qd.static(range(3)):
                     if xi[a] < 0.0:
                         sign[a] = -1.0
-                dE = (e * height * sign).dot(dxi)
-                dF = 2.0 * (inverse * inverse * inverse * lattice[base + 7] * z).dot(dz)
-                dw = -r * r * per_width * (F * dE + E * dF) / q
+                dE = (ee * e * height * sign).dot(dxi)
+                dF = 2.0 * (ff * ff * inverse * lattice[base + 7] * z).dot(dz)
+                dw = -r * r * per_width * q * (dE / E + dF / F)
                 if not linear:
                     dw *= 6.0 * g * (1.0 - g)
             dout = w * dv + dw * v
@@ -192,10 +192,13 @@ def velocity(
 
 
 @qd.func
-def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32):
-    """xi with xi + B(clamp(xi)) = y for the bend at a row of the table: Newton's method, halved where it fails."""
+def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise: qd.template()):
+    """xi with xi + B(clamp(xi)) = y for the bend at a row of the table, to rounding or (not precise) to 1e-5.
+
+    Newton's method, its steps halved where they fail.
+    """
     xi = start
-    enough = 3e-7 * (1.0 + qd.abs(y).max())
+    enough = qd.static(3e-7 if precise else 1e-5) * (1.0 + qd.abs(y).max())
     size = 1e30
     best = start
     step = vec3(0.0, 0.0, 0.0)

@@ -1,17 +1,17 @@
 """How the inner cage moves from its canonical to its deformed place, for the flow shell.
 
-Notation: xi in [-1,1]^3 are the cage's trilinear coordinates, clamp(xi) their clamping to that cube, t in [0,1]
-the time. The cage at time t, and all of space with it, is
+Notation: xi in [-1,1]^3 are the cage's trilinear coordinates, clamp(xi) their clamping to that cube, t in
+[0,1] the time. The cage at time t, and all of space with it, is
 
     x(xi, t) = c(t) + F(t) (xi + B_t(clamp(xi))),
     B_t(xi) = K_0 xi eta + K_1 xi zeta + K_2 eta zeta + K_3 xi eta zeta,
 
 so inside the cage x is the trilinear map of its corners, and outside it goes on along the columns of F. With
 F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its polar
-decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180 degrees
-at most), the stretch is log-linear, the bend K goes linearly from the one cage's to the other's, and k >= 0
-shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight line, in
-the outer cage's coordinates where a straight one in space would leave it.
+decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
+degrees at most), the stretch is log-linear, the bend K goes linearly from the one cage's to the other's,
+and k >= 0 shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight
+line, in the outer cage's coordinates where a straight one in space would leave it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ KEPT_GAP = 0.6
 """The cage keeps this share of the smaller of the gaps that it has at its two ends."""
 
 _grid = np.linspace(0.0, 1.0, 41)
-TIMES: Array = np.unique(np.concatenate([_grid, [0.002, 0.006, 0.0125], 1.0 - np.array([0.002, 0.006, 0.0125])]))
+TIMES: Array = np.unique(
+    np.concatenate([_grid, [0.002, 0.006, 0.0125], 1.0 - np.array([0.002, 0.006, 0.0125])])
+)
 """Times at which the way is looked at: denser at its ends, where a cage with a small gap must shrink fast."""
 
 
@@ -199,7 +201,7 @@ class Motion:
         grown = np.exp(t[:, None] * stretch) * np.exp(-k * np.sin(np.pi * t))[:, None]
         F = R @ (V * grown[:, None, :]) @ V.T @ self.start.frame
         rate = stretch - (k * np.pi * np.cos(np.pi * t))[:, None]
-        omega = np.cross(np.eye(3), -turn)
+        omega = np.cross(np.eye(3), turn)  # omega v = turn x v
         dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ V.T @ self.start.frame
         c, dc = self._centre(t)
         return c, F, dc, dF

@@ -14,7 +14,7 @@ from cagefield.warps.flow_motion import Extended, Motion, bend, bend_slope
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
 
-POWER = 2
+POWER = 4
 """Exponent p of the distances' norm."""
 
 LEAST_GAP = 2e-3
@@ -31,8 +31,8 @@ _CHUNK = 8192
 class Falloff:
     """How the motion fades from the inner cage (all of it) to the outer (none).
 
-    profile "smooth" (w = g^2 (3 - 2 g)) or "linear" (w = g), with g = (r - 1 + width) / width cut to [0,1] and
-    r = d_o / (d_i + d_o); width in (0,1] from "only near the inner cage" to "the whole shell".
+    profile "smooth" (w = g^2 (3 - 2 g)) or "linear" (w = g), with g = (r - 1 + width) / width cut to [0,1]
+    and r = d_o / (d_i + d_o); width in (0,1] from "only near the inner cage" to "the whole shell".
     """
 
     profile: str = "smooth"
@@ -54,7 +54,7 @@ SMOOTH = Falloff()
 
 @dataclass(frozen=True)
 class FlowShell:
-    """phi' by the flow of a velocity field: v(x, t) = w(x, t) V(x, t), from t = 0 (canonical) to 1 (deformed).
+    """phi' by the flow of a velocity field: v(x, t) = w(x, t) V(x, t), t from 0 (canonical) to 1 (deformed).
 
     V is the velocity of the inner cage's motion (see `flow_motion`), with which all of space would go along:
     an affine map of x for a parallelepiped. w is 1 in the cage and 0 outside the outer cage, so a point on
@@ -70,11 +70,12 @@ class FlowShell:
     backwards through the same times, its Jacobian is that of the discrete scheme, and `to_deformed` is the
     inverse of `to_canonical` as computed.
 
-    Chosen by measurement (`benchmarks/flow_profiles.py`, 16 edits), geometric means of the least det J and
-    the largest stretch: p = 2 smooth 0.23 and 6.4; p = 4 0.20 and 7.2; p = 8 0.19 and 7.9; p = 8 with the
-    distances of all six planes in d_o 0.16 and 9.4; p = 2 linear 0.15 and 10.6.
+    Chosen by measurement (`benchmarks/flow_profiles.py`, 14 edits), geometric means of the least det J and
+    the largest stretch, smooth: p = 2 0.192 and 9.6; p = 4 0.190 and 8.6; p = 8 0.187 and 8.9; linear: p = 2
+    0.139 and 13.6, p = 8 0.130 and 12.4 (better for translations alone); w = 1 / (1 + (d_i / d_o)^2), p = 2:
+    0.141 and 12.3.
 
-    Parameters: the canonical and the deformed inner cage, the outer cage, the falloff, and the strain of a step.
+    Parameters: the canonical and the deformed inner cage, the outer cage, the falloff, the strain of a step.
     """
 
     inner: Cage
@@ -123,7 +124,12 @@ class FlowShell:
             if not better.any():
                 break
             rows = rows[better]
-            x[rows], back[rows], J[rows], error[rows] = trial[better], new[better], slope[better], size[better]
+            x[rows], back[rows], J[rows], error[rows] = (
+                trial[better],
+                new[better],
+                slope[better],
+                size[better],
+            )
         return x, hexahedron.invert(J)
 
     def least_ratio(self) -> float:
@@ -146,11 +152,13 @@ class FlowShell:
         motion = self.motion
         for gap, when in zip(motion.gaps, (" before any operation", ""), strict=True):
             if gap < 0.0:
-                return f"is left by the inner cage{when}: it bulges through the outer cage between its corners"
+                return (
+                    f"is left by the inner cage{when}: it bulges through the outer cage between its corners"
+                )
             if gap < LEAST_GAP:
                 return (
-                    f"has no room{when}: the gap between the cages is {gap:.2g} of the outer cage's half-width"
-                    f" and must be at least {LEAST_GAP:g} on every side"
+                    f"has no room{when}: the gap between the cages is {gap:.2g} of the outer cage's"
+                    f" half-width and must be at least {LEAST_GAP:g} on every side"
                 )
         if not motion.start.is_one_to_one:
             return "cannot surround the inner cage: it is bent too far before any operation"
@@ -171,9 +179,7 @@ class FlowShell:
             x[part], J[part] = self._runge_kutta(x[part], J[part], knots, moments)
         return x, J
 
-    def _runge_kutta(
-        self, x: Array, J: Array, knots: Array, moments: list[_Moment]
-    ) -> tuple[Array, Array]:
+    def _runge_kutta(self, x: Array, J: Array, knots: Array, moments: list[_Moment]) -> tuple[Array, Array]:
         at = _Coordinates(self._in_outer(x), None)
         for n, h in enumerate(np.diff(knots)):
             dx, dJ = np.zeros_like(x), np.zeros_like(J)
@@ -197,11 +203,12 @@ class FlowShell:
         c, F, dc, dF = self.motion.frames(times)
         rate = self.motion.end.bend - self.motion.start.bend
         return [
-            _Moment(Extended(c[n], F[n], self.motion.bend(t)), dc[n], dF[n], rate) for n, t in enumerate(times)
+            _Moment(Extended(c[n], F[n], self.motion.bend(t)), dc[n], dF[n], rate)
+            for n, t in enumerate(times)
         ]
 
     def _velocity(self, x: Array, cage: _Moment, at: _Coordinates) -> tuple[Array, Array]:
-        """(v [N,3], dv/dx [N,3,3]) at points x; `at` holds their coordinates of the last call and this one."""
+        """(v [N,3], dv/dx [N,3,3]) at points x; `at` holds their coordinates of the last call, then these."""
         confines = self.motion.confines
         at.outer, at.inner = confines.coordinates(x, at.outer), cage.place.coordinates(x, at.inner)
         v, G = np.zeros_like(x), np.zeros((len(x), 3, 3))

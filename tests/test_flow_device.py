@@ -1,0 +1,99 @@
+"""The flow shell's kernels in float32 against the float64 reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from cagefield import devices
+from cagefield.edits import Edit, EditStack
+from cagefield.warps.continuous import ContinuousWarp
+from random_cages import examples, unit_vectors
+from test_flow_shell import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points
+
+EPS = float(np.finfo(np.float32).eps)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def device() -> None:
+    devices.start("cpu")
+
+
+def compare(edits: list[Edit], n: int) -> None:
+    from cagefield.warps.device import DeviceStack
+
+    stack = EditStack(edits)
+    rng = np.random.default_rng(0)
+    low, high = stack.bounds
+    p = (low + rng.uniform(-0.05, 1.05, (n, 3)) * (high - low)).astype(np.float32)
+    d = unit_vectors(rng, n).astype(np.float32)
+    expected = stack.to_canonical(p, d)
+    assert expected.viewdirs is not None and expected.stretch is not None
+    points, viewdirs, stretch, emptied = DeviceStack.from_stack(stack).to_canonical(p, d)
+    assert not emptied.any()
+    # Some hundred stages each round once, and what they leave grows with the stretch of the rest of the way.
+    size = np.abs(p).max()
+    J = np.linalg.norm(expected.jacobian, axis=(1, 2))
+    gain = J * np.linalg.norm(np.linalg.inv(expected.jacobian), axis=(1, 2))
+    error = np.abs(points - expected.points).max(axis=1) / (size * (1.0 + J))
+    assert error.max() < 100 * EPS
+    # J jumps at the cages' faces and has kinks: all but a few samples.
+    turned = np.abs(viewdirs - expected.viewdirs).max(axis=1) / (gain * (1.0 + J))
+    assert np.quantile(turned, 0.98) < 100 * EPS
+    stretched = np.abs(stretch / expected.stretch - 1.0) / (gain * (1.0 + J))
+    assert np.quantile(stretched, 0.98) < 100 * EPS
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_named_edits_against_the_reference(name: str) -> None:
+    compare([EDITS[name]], 400)
+
+
+def test_chain_against_the_reference() -> None:
+    shell = Edit(INNER, OUTER, shell="trilinear").rotate((0, 0.1, 0.2))
+    compare([EDITS["turn of 90"], shell, EDITS["corner after rotation"]], 400)
+
+
+@examples(5)
+@given(flow_edits())
+def test_random_edits_against_the_reference(edit: Edit) -> None:
+    compare([edit], 100)
+
+
+@pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
+def test_lattice_error_falls_with_its_order(name: str) -> None:
+    from cagefield.warps.device import DeviceStack
+
+    edit = EDITS[name]
+    p = shell_points(shell_of(edit), 400).astype(np.float32)
+    d = unit_vectors(np.random.default_rng(0), len(p)).astype(np.float32)
+    exact = EditStack([edit]).to_canonical(p).points
+    moved = np.abs(exact - p).max(axis=1) > 1e-3
+    errors = []
+    for nodes in (17, 33, 65):
+        points, *_ = DeviceStack.from_stack(EditStack([edit.replace(lattice=nodes)])).to_canonical(p, d)
+        errors.append(np.median(np.linalg.norm(points - exact, axis=1)[moved]))
+    # R^-2 where the map is smooth, less for the cells that the inner cage's faces cut.
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (orders > 1.3).all() and (orders < 2.6).all()
+
+
+@pytest.mark.parametrize("name", ["turn of 90", "corner after rotation"])
+def test_lattice_nodes_are_the_maps_values(name: str) -> None:
+    from cagefield.warps.device import DeviceStack
+
+    edit = EDITS[name].replace(lattice=9)
+    nodes = DeviceStack.from_stack(EditStack([edit])).lattice
+    warp = edit.exact_warp
+    assert isinstance(warp, ContinuousWarp)
+    origin, frame = warp.outer.frame
+    g = np.linspace(0.0, 1.0, 9)
+    z, y, x = np.meshgrid(g, g, g, indexing="ij")
+    p = origin + np.stack([x, y, z], axis=-1).reshape(-1, 3) @ frame.T
+    expected = warp.to_canonical(p).points - p
+    # The lattice's steps are four times as long as the reference's: the error of the integration.
+    np.testing.assert_allclose(nodes, expected, atol=5e-3)
+    assert np.median(np.abs(nodes - expected)) < 1e-4
+    on_faces = np.abs(p).max(axis=1) > 0.8 - 1e-9
+    assert np.abs(nodes[on_faces]).max() < 1e-6

@@ -1,0 +1,302 @@
+"""The flow shell's float64 reference: exact at both cages, one to one between them, for all cages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import CageError, EditError
+from cagefield.hexahedron import Array
+from cagefield.warps import Falloff, FlowShell
+from cagefield.warps.flow_motion import TIMES, Extended
+from random_cages import can_be_evaluated, dragged, examples, random_operation, seeds
+
+INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
+BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.15, 0.15, -0.1))
+BENT_OUTER = OUTER.move_corner(3, (0.3, 0.2, -0.1)).move_corner(4, (-0.2, 0.1, -0.3))
+ROD, SLOT = Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8, 0.8))
+
+EDITS = {
+    "turn of 90": Edit(INNER, OUTER).rotate((0, 0, np.pi / 2)),
+    "turn of 180": Edit(INNER, OUTER).rotate((0, 0, np.pi)),
+    "translation by 90% of the gap": Edit(INNER, OUTER).translate((0.45, 0, 0)),
+    "scale 0.3": Edit(INNER, OUTER).scale(0.3),
+    "scale 2.4": Edit(INNER, OUTER).scale(2.4),
+    "shear": Edit(INNER, OUTER).shear(xy=0.6, zx=-0.4),
+    "corner after rotation": Edit(INNER, OUTER).rotate((0.5, 0.2, 1.5)).move_corner(7, (0.1, -0.2, 0.1)),
+    "scale of a turned cage": Edit(INNER, OUTER).rotate((0.5, 0.2, 0.5)).scale((0.6, 1.5, 1.1)),
+    "bent cages": Edit(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
+    "turn in a slot": Edit(ROD, SLOT).rotate((0, 0, np.pi)),
+    "linear, half": Edit(INNER, OUTER, falloff="linear", width=0.5).rotate((0, 0, 1)).translate((0.1, 0, 0)),
+}
+
+
+def shell_of(edit: Edit, strain: float = 0.125) -> FlowShell:
+    assert edit.outer is not None
+    return FlowShell(edit.inner, edit.deformed, edit.outer, Falloff(edit.falloff, edit.width), strain)
+
+
+def shell_points(shell: FlowShell, n: int, seed: int = 0) -> Array:
+    """Random deformed points between the cages, a third of them close to the inner one."""
+    rng = np.random.default_rng(seed)
+    origin, frame = shell.outer.frame
+    near = rng.uniform(-1.0, 1.0, (n // 3, 3))
+    near *= rng.uniform(1.0, 1.2, (n // 3, 1)) / np.abs(near).max(axis=1, keepdims=True)
+    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, Extended.of(shell.deformed).points(near)])
+    p = p[shell.outer.contains(p)]
+    return p[~shell.deformed.contains(p)]
+
+
+def face_points(cage: Cage, n: int, seed: int = 0) -> tuple[Array, Array]:
+    """(points on the cage's faces, their xi)."""
+    rng = np.random.default_rng(seed)
+    xi = rng.uniform(-1.0, 1.0, (n, 3))
+    xi[np.arange(n), rng.integers(3, size=n)] = rng.choice([-1.0, 1.0], n)
+    return Extended.of(cage).points(xi), xi
+
+
+@st.composite
+def flow_edits(draw: st.DrawFn) -> Edit:
+    """Edits by one to ten operations in deformed cages, rotations up to 180 degrees, scales from .3."""
+    rng = np.random.default_rng(draw(seeds))
+    bent = draw(st.sampled_from([0.0, 0.4]))
+    outer = Cage.box(rng.uniform(-1, 1, 3), rng.uniform(1, 3, 3), rng.uniform(-3, 3, 3))
+    A, b = outer.affine
+    inner = Cage.box(b + A @ rng.uniform(0.35, 0.65, 3), rng.uniform(0.2, 0.8, 3), rng.uniform(-3, 3, 3))
+    inner = dragged(inner, rng.uniform(-1, 1, (8, 3)) @ inner.affine[0].T, bent)
+    outer = dragged(outer, rng.uniform(-0.3, 0.3, (8, 3)) @ A.T, bent)
+    edit = Edit(inner, outer)
+    assume(can_be_evaluated(edit))
+    for _ in range(draw(st.sampled_from([1, 2, 3, 10]))):
+        kind = draw(st.integers(0, 8))
+        try:
+            if kind == 7:
+                axis = rng.normal(size=3)
+                edit = edit.rotate(np.pi * axis / np.linalg.norm(axis))
+            elif kind == 8:
+                edit = edit.scale(draw(st.sampled_from([0.3, 2.0])))
+            else:
+                edit = edit.then(random_operation(rng, kind, 0.4))
+        except (CageError, EditError):
+            assume(False)
+        edit = edit.replace(
+            operations=(*edit.operations[:-1], edit.operations[-1].part(0.98 * edit.safe_fraction()))
+        )
+    assume(can_be_evaluated(edit))
+    return edit
+
+
+def check_map(edit: Edit, n: int = 80) -> None:
+    """Every promise of the shell, at random points."""
+    shell = shell_of(edit)
+    scene = np.ptp(shell.outer.corners, axis=0).max()
+    p = shell_points(shell, n)
+    q, J = shell.to_canonical(p)
+    det = np.linalg.det(J)
+    assert det.min() > 0.0 and np.isfinite(det).all()
+    # The round trip closes to rounding, times the stretch on the way (up to some thousands in a small gap).
+    back, inverse = shell.to_deformed(q)
+    assert np.abs(back - p).max() < 1e-7 * scene
+    np.testing.assert_allclose(inverse @ J, np.broadcast_to(np.eye(3), J.shape), atol=1e-5)
+    # On the inner cage's faces it is phi, up to the integration's error: the aim is 1e-4 of the scene.
+    on_inner, xi = face_points(shell.deformed, 60)
+    expected = Extended.of(shell.inner).points(xi)
+    # The linear profile has a kink on the faces, which costs it two orders.
+    tolerance = 2e-5 if edit.falloff == "smooth" else 2e-4
+    assert np.abs(shell.to_canonical(on_inner)[0] - expected).max() < tolerance * scene
+    # On the outer cage's it is the identity, up to the rounding of where the face is.
+    on_outer, _ = face_points(shell.outer, 60)
+    assert np.abs(shell.to_canonical(on_outer)[0] - on_outer).max() < 1e-12 * scene
+    # It maps the shell into the shell.
+    assert shell.outer.grown(1e-9 * scene).contains(q).all()
+    assert not Cage(shell.inner.center + 0.999 * (shell.inner.corners - shell.inner.center)).contains(q).any()
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_map_of_named_edits(name: str) -> None:
+    EDITS[name].check()
+    check_map(EDITS[name])
+
+
+@examples(10)
+@given(flow_edits())
+def test_map_of_random_edits(edit: Edit) -> None:
+    check_map(edit, 20)
+
+
+@pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
+def test_jacobian_is_that_of_the_scheme(name: str) -> None:
+    shell = shell_of(EDITS[name])
+    p = shell_points(shell, 60)
+    h = 1e-6
+    slopes = [
+        (shell.to_canonical(p + h * e)[0] - shell.to_canonical(p - h * e)[0]) / (2 * h) for e in np.eye(3)
+    ]
+    J = shell.to_canonical(p)[1]
+    error = np.abs(np.stack(slopes, axis=2) - J).max(axis=(1, 2))
+    # Central differences are good to h^2; the few points whose way runs along a kink see h times its jump.
+    assert np.quantile(error, 0.95) < 1e-7 and error.max() < 1e-3
+
+
+def test_map_against_another_integrator() -> None:
+    # The velocity written out for a turn by 1 about z, and scipy's eighth-order method.
+    a, half, big = 1.0, 0.3, 0.8
+
+    def velocity(t: float, x: Array) -> Array:
+        c, s = np.cos(a * t), np.sin(a * t)
+        y = np.array([c * x[0] + s * x[1], c * x[1] - s * x[0], x[2]])
+        d_i = np.linalg.norm(np.maximum(np.abs(y) - half, 0.0), 4)
+        d_o = 1.0 / np.linalg.norm(2.0 * big / (big**2 - x * x), 4)
+        r = d_o / (d_i + d_o)
+        return a * r * r * (3 - 2 * r) * np.array([-x[1], x[0], 0.0])
+
+    shell = shell_of(Edit(INNER, OUTER).rotate((0, 0, a)), strain=0.01)
+    p = shell_points(shell, 12)
+    q, _ = shell.to_canonical(p)
+    for x, expected in zip(p, q, strict=True):
+        found = solve_ivp(velocity, (1.0, 0.0), x, method="DOP853", rtol=1e-10, atol=1e-12, max_step=0.01)
+        np.testing.assert_allclose(found.y[:, -1], expected, atol=1e-7)
+
+
+def test_order_of_convergence() -> None:
+    # A translation along the diagonal: no point's way crosses a kink of the distances more than once.
+    edit = Edit(INNER, OUTER).translate((0.3, 0.25, 0.2)).scale(1.2)
+    p = shell_points(shell_of(edit), 400)
+    maps = [shell_of(edit, strain=s).to_canonical(p)[0] for s in (0.4, 0.2, 0.1, 0.0125)]
+    errors = [np.median(np.linalg.norm(m - maps[-1], axis=1)) for m in maps[:-1]]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    # The number of steps is a whole one, so halving the strain is not quite halving the steps.
+    assert (orders > 3.4).all() and (orders < 4.8).all()
+
+
+@pytest.mark.parametrize("name", ["turn of 90", "bent cages"])
+def test_continuous_across_both_cages(name: str) -> None:
+    edit = EDITS[name]
+    shell = shell_of(edit)
+    warp = edit.warp
+    for cage, tolerance in ((shell.deformed, 1e-5), (shell.outer, 1e-6)):
+        _, xi = face_points(cage, 200)
+        place = Extended.of(cage)
+        inside, outside = place.points(xi * (1 - 1e-7)), place.points(xi * (1 + 1e-7))
+        jump = np.abs(warp.to_canonical(inside).points - warp.to_canonical(outside).points)
+        # 1e-7 of a distance times the stretch, and at the inner cage the integration's error.
+        assert jump.max() < tolerance
+    outside = 2.0 * shell_points(shell, 300)
+    outside = outside[~shell.outer.contains(outside)]
+    assert np.array_equal(warp.to_canonical(outside).points, outside)
+
+
+@pytest.mark.parametrize("edit", [EDITS["turn in a slot"], EDITS["bent cages"], EDITS["turn of 180"]])
+def test_cage_stays_inside_the_outer_cage_all_the_way(edit: Edit) -> None:
+    motion = shell_of(edit).motion
+    times = np.linspace(0.0, 1.0, 301)
+    c, F, *_ = motion.frames(times)
+    _, xi = face_points(edit.deformed, 40)
+    for n, t in enumerate(times):
+        assert motion.outer.contains(Extended(c[n], F[n], motion.bend(t)).points(xi)).all()
+    first, last = Extended(c[0], F[0], motion.bend(0)), Extended(c[-1], F[-1], motion.bend(1))
+    np.testing.assert_allclose(first.points(xi), Extended.of(edit.inner).points(xi), atol=1e-12)
+    np.testing.assert_allclose(last.points(xi), Extended.of(edit.deformed).points(xi), atol=1e-12)
+
+
+def test_a_rod_in_a_slot_turns_by_shrinking_just_enough() -> None:
+    motion = shell_of(EDITS["turn in a slot"]).motion
+    assert motion.shrink > 0.3
+    assert motion._gap(TIMES, 0.0).min() < 0.0 < motion._gap(TIMES, motion.shrink).min()
+    assert shell_of(EDITS["turn of 180"]).motion.shrink == 0.0
+
+
+def test_rates_are_the_derivatives_of_the_motion() -> None:
+    for edit in (EDITS["turn in a slot"], EDITS["bent cages"], EDITS["corner after rotation"]):
+        motion = shell_of(edit).motion
+        t, h = np.array([0.2, 0.7]), 1e-6
+        before, after, here = motion.frames(t - h), motion.frames(t + h), motion.frames(t)
+        np.testing.assert_allclose((after[0] - before[0]) / (2 * h), here[2], atol=1e-8)
+        np.testing.assert_allclose((after[1] - before[1]) / (2 * h), here[3], atol=1e-7)
+        _, dz = motion.surface(t)
+        np.testing.assert_allclose(
+            (motion.surface(t + h)[0] - motion.surface(t - h)[0]) / (2 * h), dz, atol=1e-7
+        )
+
+
+def test_translation_and_scale_keep_less_than_a_folding_share() -> None:
+    # Figures of benchmarks/flow_profiles.py: a change of the weight that squeezes more shows here.
+    for name, least in (("turn of 90", 0.27), ("turn of 180", 0.12), ("scale 2.4", 0.08), ("shear", 0.4)):
+        assert shell_of(EDITS[name]).least_ratio() > least
+
+
+def test_width_one_moves_all_of_the_shell_and_less_moves_less() -> None:
+    p = shell_points(shell_of(EDITS["turn of 90"]), 600)
+    moved = []
+    for width in (1.0, 0.5, 0.1):
+        edit = Edit(INNER, OUTER, width=width).rotate((0, 0, 0.3))
+        q = shell_of(edit).to_canonical(p)[0]
+        moved.append((np.abs(q - p).max(axis=1) > 0.0).mean())
+    assert moved[0] == 1.0 > moved[1] > 2.0 * moved[2] > 0.0
+
+
+def test_turns_beyond_180_degrees_are_their_shorter_turn() -> None:
+    p = shell_points(shell_of(EDITS["turn of 90"]), 50)
+    long = shell_of(Edit(INNER, OUTER).rotate((0, 0, 1.6 * np.pi))).to_canonical(p)[0]
+    short = shell_of(Edit(INNER, OUTER).rotate((0, 0, -0.4 * np.pi))).to_canonical(p)[0]
+    np.testing.assert_allclose(long, short, atol=1e-9)
+
+
+def test_stacks_go_both_ways() -> None:
+    small = Edit(Cage.box((0.5, 0.5, 0.5), 0.2), Cage.box((0.5, 0.5, 0.5), 0.7))  # in the other's outer cage
+    across = Edit(Cage.box((0.9, 0, 0), 0.5), Cage.box((0.9, 0, 0), 1.2))  # overlaps it
+    turned = EDITS["turn of 90"]
+    chain = [turned, small.rotate((0, 2, 0)), across.translate((0.2, 0.1, 0))]
+    chain += [EDITS["corner after rotation"].scale(0.9), small.translate((0, 0.1, -0.1)), EDITS["shear"]]
+    chain += [turned.scale(1.2), across.rotate((1, 0, 0)), small.scale(1.5), EDITS["bent cages"]]
+    stack = EditStack(chain)
+    p = np.random.default_rng(0).uniform(-1.2, 1.6, (200, 3))
+    there = stack.to_canonical(p)
+    back = stack.to_deformed(there.points)
+    # Steps of ten maps, each stretching by up to ten: rounding and the kept 1e-13 of each, multiplied.
+    assert np.abs(back.points - p).max() < 1e-6
+    np.testing.assert_allclose(back.jacobian @ there.jacobian, np.tile(np.eye(3), (200, 1, 1)), atol=1e-3)
+    assert np.linalg.det(there.jacobian).min() > 0.0
+
+
+PROBLEMS = [
+    (
+        Edit(INNER, INNER.grown(1e-4)),
+        "the flow shell has no room before any operation: the gap .* half-width",
+    ),
+    (
+        Edit(INNER, OUTER).translate((0.4999, 0, 0)),
+        r"the flow shell has no room: .* at least 0\.002 on every side; 0\.99 of this translation",
+    ),
+    (Edit(INNER, OUTER).translate((0.6, 0, 0)), "outer cage must contain the inner cage: inner corner 1"),
+    (
+        # The outer cage's top is a saddle; the turned cage's corners lie on its level lines, not its edges.
+        Edit(
+            Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)),
+            OUTER.move_corner(5, (0, 0, -0.6)).move_corner(6, (0, 0, -0.6)),
+        ).translate((0, 0, 0.19)),
+        "the flow shell is left by the inner cage: it bulges through the outer cage between its corners",
+    ),
+    (
+        Edit(INNER, OUTER.grown(1.0)).move_corner(7, (-0.31, -0.42, 0.36)),
+        "the flow shell cannot follow the inner cage: it is bent too far",
+    ),
+]
+
+
+@pytest.mark.parametrize(("edit", "message"), PROBLEMS)
+def test_problems_are_named(edit: Edit, message: str) -> None:
+    with pytest.raises(EditError, match=message):
+        edit.check()
+
+
+def test_safe_fraction_ends_at_the_outer_cage() -> None:
+    edit = Edit(INNER, OUTER).translate((1.0, 0, 0))
+    # The gap of 0.5 less the 0.002 * 0.8 that must stay.
+    assert edit.safe_fraction() == pytest.approx(0.5 - 0.002 * 0.8, abs=1.1e-3)
+    assert Edit(INNER, OUTER).rotate((0, 0, np.pi)).safe_fraction() == 1.0
