@@ -15,7 +15,8 @@ import pytest
 
 from cagefield.benchmarking import speed, training
 from cagefield.benchmarking.cases import CASES, Case, chosen, relit
-from cagefield.benchmarking.edits import Score, measure, pictures_of, table, write_picture
+from cagefield.benchmarking.compare import seen
+from cagefield.benchmarking.edits import Score, measure, table, write_picture
 from cagefield.benchmarking.figures import compare, mean_psnr
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number
@@ -131,7 +132,7 @@ def solids(scene: ProceduralScene, box: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def test_chosen_refuses_unknown_names() -> None:
-    assert [one.scene for one in chosen(["chair"])] == ["chair"] * 4
+    assert [one.scene for one in chosen(["chair"])] == ["chair"] * 6
     with pytest.raises(CagefieldError, match="no scene 'castle' to measure; choose from digger, chair"):
         chosen(["castle"])
     with pytest.raises(CagefieldError, match="no edit 'move_cone' to measure; choose from lower_wider"):
@@ -174,7 +175,7 @@ def test_an_edit_of_nothing_loses_nothing(bench: Workbench) -> None:
     cameras = scene.cameras["test"]
     still = Edit(Cage.box((0, 0, 0), 1.0), Cage.box((0, 0, 0), 2.0))
     truth = bench.modelled("microphone", cameras)
-    shown, edited = (pictures_of(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
+    shown, edited = (seen(scene.with_edits(EditStack(e)), cameras) for e in ([], [still]))
     figures = compare(shown, edited, truth, truth)
     assert figures.lost == 0.0 and figures.changed == 0.0
     assert np.isnan(figures.there_lost)
@@ -254,7 +255,7 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
 
     text = table(scores, TINY, ("Machine: a test",)).markdown()
     rows = [line for line in text.splitlines() if line.startswith("| microphone")]
-    assert len(rows) == 2 and rows[0].count("|") == 18
+    assert len(rows) == 2 and rows[0].count("|") == 21
     figures = scores[0].figures
     assert f"| {figures.unedited:.2f} | {figures.edited:.2f} | {number(figures.lost)} |" in rows[0]
     assert (
@@ -427,6 +428,8 @@ def test_bench_edits_refuses_before_it_works(capsys: pytest.CaptureFixture[str],
     new = ["bench", "edits", "-o", tmp_path / "new.md"]
     assert "move_cone.png exists already" in refused(capsys, *new, "--pictures", tmp_path)
     assert "no scene 'castle'" in refused(capsys, *new, "--scenes", "castle")
+    assert "no method 'green'" in refused(capsys, *new, "--methods", "green")
+    assert "compared_size is 4" in refused(capsys, *new, "--compared-size", 4)
     assert "minutes is 0.0" in refused(capsys, *new, "--minutes", 0)
     assert "size is 4; it must be at least 16" in refused(capsys, *new, "--size", 4)
     assert "--picture-size is 0" in refused(capsys, *new, "--picture-size", 0)

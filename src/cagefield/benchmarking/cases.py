@@ -57,14 +57,18 @@ class Case:
 
 CASES = (
     Case("digger", "raise_arm", named_file="digger.yaml"),
+    Case("digger", "turn_cabin"),
     Case("digger", "move_cone", lambda s: s.move("cone", translate=(0, -0.97, 0))),
     Case("digger", "copy_cone", lambda s: s.duplicate("cone", translate=(-1.42, -1.03, 0))),
     Case("digger", "delete_bucket", lambda s: s.remove("bucket")),
     Case("chair", "lower_wider"),
+    Case("chair", "lean_back"),
+    Case("chair", "higher_crest"),
     Case("chair", "move_arm_rest", lambda s: s.move("arm rest left", translate=(0, 0.3, 0))),
     Case("chair", "copy_cushion", lambda s: s.duplicate("cushion", translate=(0, 0, 0.156))),
     Case("chair", "delete_back", lambda s: s.remove("back")),
     Case("microphone", "bigger_head"),
+    Case("microphone", "push_head"),
     Case("microphone", "move_weight", lambda s: s.move("weight", translate=(-0.1782, 0, -0.0908))),
     Case(
         "microphone",
@@ -73,6 +77,7 @@ CASES = (
     ),
     Case("microphone", "delete_base", lambda s: s.remove("base")),
     Case("plant", "taller"),
+    Case("plant", "lopsided"),
     Case(
         "plant",
         "move_pinecone",

@@ -10,8 +10,11 @@ from typing import cast
 import numpy as np
 
 from cagefield.benchmarking.cases import Case, relit
-from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, pooled_psnr, stacked
+from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen
+from cagefield.benchmarking.distortion import Distortion, distortion
+from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, pooled_psnr
 from cagefield.benchmarking.figures import changed_pixels as changed
+from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Settings, Workbench
@@ -35,8 +38,9 @@ _EYES = {
 _COLUMNS = (
     "scene", "edit", "kind", "truth", "views", "PSNR unedited", "PSNR edited", "PSNR lost", "SSIM unedited",
     "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
-    "there carried", "frame time",
+    "there carried", "frame time", "min det J", "max stretch", "map time",
 )  # fmt: skip
+_LPIPS = ("LPIPS unedited", "LPIPS edited")
 _SHOWN = (
     "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there unedited", "there edited",
     "there lost", "frame time",
@@ -47,7 +51,8 @@ _SHOWN = (
 class Score:
     """The figures of one case; `there_carried` is the PSNR on the changed pixels where light is carried.
 
-    `frame_ratio` is the time of an edited frame over that of an unedited one.
+    `frame_ratio` is the time of an edited frame over that of an unedited one. Only a continuous edit has a
+    distortion and a time of its map; `lpips` is that of the unedited and the edited pictures, where measured.
     """
 
     case: Case
@@ -57,11 +62,15 @@ class Score:
     figures: Figures
     there_carried: float
     frame_ratio: float
+    distortion: Distortion | None = None
+    time: MapTime | None = None
+    lpips: tuple[float, float] | None = None
 
 
 def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
     """The scores of the cases, in order; cases of one scene that follow each other share its pictures."""
     scene, name = None, ""
+    perceived, _ = lpips()
     unedited: dict[str, Pictures] = {}
     for case in cases:
         if scene is None or case.scene != name:
@@ -70,6 +79,10 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
         ratio = frame_ratio(scene, edited)
         cameras = scene.cameras["test"]
         carried = float("nan")
+        measured, taken = None, None
+        if case.kind == "continuous":
+            edit = continuous(case)
+            measured, taken = distortion(edit.exact_warp, edit), map_time(case.edits)
         if case.moved is None:
             size = bench.settings.exact_size
             cameras = tuple(camera.resized(size, size) for camera in cameras[: bench.settings.exact_views])
@@ -79,18 +92,16 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             truth, before = "photos", bench.modelled(name, cameras)
             after = bench.moved(case, cameras)
         if truth not in unedited:
-            unedited[truth] = pictures_of(scene, cameras)
-        shown = pictures_of(edited, cameras)
+            unedited[truth] = seen(scene, cameras)
+        shown = seen(edited, cameras)
         if case.moved is not None and relit(case.moved(procedural_scene(name))):
             there = changed(before, after)
             carried = pooled_psnr(shown, bench.moved(case, cameras, carried=True), there)
         figures = compare(unedited[truth], shown, before, after)
-        yield Score(case, truth, len(cameras), cameras[0].width, figures, carried, ratio)
-
-
-def pictures_of(scene: Scene, cameras: Sequence[Camera]) -> Pictures:
-    """Pictures [V,H,W,3] of a scene over white."""
-    return stacked([np.clip(scene.render(camera, background="white").rgb, 0.0, 1.0) for camera in cameras])
+        both = (perceived(unedited[truth], before), perceived(shown, after)) if perceived else None
+        yield Score(
+            case, truth, len(cameras), cameras[0].width, figures, carried, ratio, measured, taken, both
+        )
 
 
 def frame_ratio(scene: Scene, edited: Scene) -> float:
@@ -107,7 +118,6 @@ def frame_ratio(scene: Scene, edited: Scene) -> float:
 
 def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()) -> Table:
     """The scores as a table, with what its columns mean."""
-    rows = tuple(_row(score) for score in scores)
     config = settings.config
     length = f"{config.steps} steps" if config.minutes is None else f"{config.minutes:g} minutes"
     explained = [
@@ -123,7 +133,12 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "what the field without the edit would reach there; carried: against parts that keep the light they "
         "had, as an edited field does (where a part was turned).",
         "Frame time: edited over unedited, median of frames taken in turn.",
+        "Min det J: least volume ratio over the shell of a continuous edit, of its map or the inverse; max "
+        "stretch: largest factor by which a length grows or shrinks; map time: for a million points, in the "
+        "renderer's kernel.",
     ]
+    perceived = any(score.lpips is not None for score in scores)
+    explained += [] if perceived else [lpips()[1]]
     lost = [score.figures.lost for score in scores]
     there = [
         score.figures.there_lost for score in scores if score.figures.there_lost == score.figures.there_lost
@@ -135,16 +150,17 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         )
     return Table(
         "Edits against ground truth",
-        _COLUMNS,
-        rows,
+        _COLUMNS + (_LPIPS if perceived else ()),
+        tuple(_row(score, perceived) for score in scores),
         (*explained, *notes),
         names=4,
         shown=_SHOWN,
     )
 
 
-def _row(score: Score) -> tuple[str, ...]:
-    figures = score.figures
+def _row(score: Score, perceived: bool) -> tuple[str, ...]:
+    figures, measured, taken = score.figures, score.distortion, score.time
+    pair = score.lpips or (float("nan"), float("nan"))
     return (
         score.case.scene,
         score.case.name.replace("_", " "),
@@ -163,7 +179,16 @@ def _row(score: Score) -> tuple[str, ...]:
         number(figures.there_if_left),
         number(score.there_carried),
         f"x{score.frame_ratio:.2f}",
+        "-" if measured is None else number(measured.least_det),
+        "-" if measured is None else number(measured.stretch),
+        "-" if taken is None else f"{taken.per_million:.0f} ms",
+        *((number(value, 4) for value in pair) if perceived else ()),
     )
+
+
+def eye(scene: str, size: int) -> Camera:
+    """The camera of a scene's pictures, size x size pixels."""
+    return Camera.look_at(_EYES[scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
 
 
 def picture_path(folder: Path, case: Case) -> Path:
@@ -173,7 +198,7 @@ def picture_path(folder: Path, case: Case) -> Path:
 
 def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, error: bool = False) -> Path:
     """Writes before, edited and truth (and their difference, dark, three times as strong) side by side."""
-    camera = Camera.look_at(_EYES[case.scene], (0, 0, 0), width=size, height=size, fov_x=FOV_X)
+    camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
     before = cast(Pictures, scene.render(camera, background="white").rgb8())
     after = scene.with_edits(case.edits).render(camera, background="white").rgb8()

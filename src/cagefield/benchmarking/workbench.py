@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 import cagefield
 from cagefield.benchmarking.cases import Case
+from cagefield.benchmarking.exact import exact
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
@@ -39,7 +40,10 @@ Move = Callable[[float, float, str], None]
 Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("datasets/procedural", "cameras.py")
-_MAPPED = ("edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py")
+_MAPPED = (
+    "edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py", "benchmarking/exact.py",
+    "benchmarking/peers", "benchmarking/methods.py",
+)  # fmt: skip
 
 SOFTNESS = 0.004
 """Softness of the surfaces of a scene that is rendered as a field, in world units: half a voxel or less."""
@@ -50,7 +54,8 @@ class Settings:
     """What is photographed, how the fields are trained, and how the exact maps are rendered.
 
     Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
-    the first `exact_views` test cameras, with `exact_samples` samples a ray.
+    the first `exact_views` test cameras, with `exact_samples` samples a ray; that of the methods that are
+    compared at compared_size x compared_size for the first `compared_views`.
 
     Raises:
         CagefieldError: sizes and numbers that are too small.
@@ -63,6 +68,8 @@ class Settings:
     exact_size: int = 128
     exact_views: int = 6
     exact_samples: int = 768
+    compared_size: int = 64
+    compared_views: int = 3
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -72,6 +79,8 @@ class Settings:
             ("exact_size", 16),
             ("exact_views", 1),
             ("exact_samples", 1),
+            ("compared_size", 16),
+            ("compared_views", 1),
         ):
             value = getattr(self, name)
             if value < least:
@@ -114,13 +123,26 @@ class Workbench:
     def scene(self, name: str) -> Scene:
         """The scene trained on the photos of a built-in scene."""
         if name not in self._open:
-            self._open[name] = self._trained(name)
+            self._open[name] = self._trained(name, self.photos(name))
         return self._open[name]
 
-    def _trained(self, name: str) -> Scene:
+    def one_sided(self, name: str, front: Camera, degrees: float) -> Scene:
+        """The scene trained on those photos alone that were taken from within `degrees` of a camera.
+
+        Seen from above the origin: at any height. Raises CagefieldError where there are none.
+        """
         dataset = self.photos(name)
+        train = tuple(view for view in dataset.train if beside(view.camera, front, degrees))
+        if not train:
+            raise CagefieldError(f"no photo of {name} is from within {degrees:g} degrees; take more views")
+        one_side = dataclasses.replace(dataset, train=train)
+        return self._trained(name, one_side, [view.name for view in train])
+
+    def _trained(self, name: str, dataset: Dataset, part: Sequence[object] = ()) -> Scene:
+        """The scene trained on the photos of a data set, of which `part` says what was chosen."""
         config = self.settings.config
-        path = dataset.path.with_name(f"field-{digest([dataset.path.name, dataclasses.asdict(config)])}")
+        key = digest([dataset.path.name, dataclasses.asdict(config), *part])
+        path = dataset.path.with_name(f"field-{key}")
         if path.is_dir() and not self.retrain:
             return Scene.open(path)
         with self.bar(f"{name}: training") as move:
@@ -165,12 +187,13 @@ class Workbench:
         field_ = procedural_scene(name).field(SOFTNESS)
         stack = None if edits is None else EditStack(edit.replace(lattice=None) for edit in edits)
         text = "" if stack is None else dump_edits(stack)
+        points = None if stack is None else exact(stack)
         samples = self.settings.exact_samples
         key = digest([name, text, samples, SOFTNESS, _poses(cameras)], (*_MODELLED, *_MAPPED))
 
         def pictures() -> Iterator[UInt8]:
             for camera in cameras:
-                yield render_sampled(field_, camera, samples=samples, edits=stack).rgb8()
+                yield render_sampled(field_, camera, samples=samples, edits=points).rgb8()
 
         return self._kept(name, key, f"{name}: exact maps", pictures, len(cameras))
 
@@ -193,6 +216,12 @@ class Workbench:
         with replaced_whole(path) as temporary:
             np.savez_compressed(temporary, pictures=np.stack(made))
         return np.stack(made)
+
+
+def beside(camera: Camera, other: Camera, degrees: float) -> bool:
+    """True where a camera stands within so many degrees of another, seen from above the origin."""
+    a, b = (np.arctan2(which.origin[1], which.origin[0]) for which in (camera, other))
+    return bool(abs((a - b + np.pi) % (2 * np.pi) - np.pi) <= np.radians(degrees))
 
 
 def digest(content: object, sources: Sequence[str] = ()) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from cagefield.cli.bench_maps import BenchAblation, BenchGrids
 from cagefield.cli.options import (
     Device,
     Flag,
@@ -36,10 +37,10 @@ _SILENT = ("workdir", "out", "pictures", "picture_size", "error_panel", "overwri
 
 @dataclass(frozen=True)
 class BenchEdits:
-    """Edits of the built-in scenes against scenes whose parts are really moved; writes a Markdown table."""
+    """Edits of the built-in scenes against scenes whose parts are really moved; writes Markdown tables."""
 
     out: Output = Path("benchmarks/results/edits.md")
-    """Markdown file for the table."""
+    """Markdown file for the table; that of the methods goes beside it, its name ending _methods.md."""
     scenes: tuple[str, ...] = ()
     """Only these scenes: digger, chair, microphone, plant."""
     edits: tuple[str, ...] = ()
@@ -57,6 +58,15 @@ class BenchEdits:
     """Number of pictures of continuous edits."""
     exact_samples: int = 768
     """Samples a ray in the truth of continuous edits."""
+    methods: tuple[str, ...] = ()
+    """Compare only these ways to fill the shell: flow, "flow 64", trilinear, "trilinear 64", "trilinear 128",
+    "trilinear 256", "mean value", harmonic; left out, all."""
+    no_methods: Flag = False
+    """Compare no methods."""
+    compared_size: int = 64
+    """Width and height of the pictures of that comparison."""
+    compared_views: int = 3
+    """Number of its pictures for each edit and method."""
     workdir: Path | None = None
     """Folder that keeps photos, fields and truths, so that a second call only evaluates."""
     retrain: Flag = False
@@ -78,15 +88,19 @@ class BenchEdits:
         from cagefield import devices
         from cagefield.benchmarking.cases import chosen
         from cagefield.benchmarking.edits import picture_path
+        from cagefield.benchmarking.methods import check_known
         from cagefield.benchmarking.workbench import Settings, Workbench
 
         cases = chosen(self.scenes, self.edits)
+        check_known(self.methods)
         if self.only_pictures and self.pictures is None:
             raise CagefieldError("--only-pictures needs a folder for them; give --pictures FOLDER")
         if self.picture_size < 1:
             raise CagefieldError(f"--picture-size is {self.picture_size}; it must be at least 1")
         if not self.only_pictures:
             check_file(self.out, self.overwrite)
+            if not self.no_methods:
+                check_file(self._beside(), self.overwrite)
         if self.pictures is not None:
             for case in cases:
                 check_file(picture_path(self.pictures, case), self.overwrite)
@@ -98,12 +112,16 @@ class BenchEdits:
             self.exact_size,
             self.exact_views,
             self.exact_samples,
+            self.compared_size,
+            self.compared_views,
         )
         devices.start(self.device)
         with _work_folder(self.workdir) as folder:
             bench = Workbench(settings, folder, progress_bar, self.retrain)
             if not self.only_pictures:
                 self._measure(cases, bench)
+                if not self.no_methods:
+                    self._compare(cases, bench)
             if self.pictures is not None:
                 self._draw(cases, bench, self.pictures)
 
@@ -126,6 +144,31 @@ class BenchEdits:
         result.show()
         write_text(self.out, result.markdown())
         print(f"table written to {self.out}")
+
+    def _beside(self) -> Path:
+        return self.out.with_name(f"{self.out.stem}_methods{self.out.suffix}")
+
+    def _compare(self, cases: tuple[Case, ...], bench: Workbench) -> None:
+        from cagefield.benchmarking.compare import measure, table
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.methods import METHODS
+        from cagefield.benchmarking.tables import write_text
+
+        rows = []
+        for row in measure(cases, self.methods or tuple(METHODS), bench):
+            rows.append(row)
+            folds = "folds" if row.distortion.folds else f"min det J {row.distortion.least_det:.2f}"
+            print(
+                f"{row.case.scene}, {row.case.name}, {row.method}: {folds}, {row.figures.lost:.2f} dB lost",
+                flush=True,
+            )
+        if not rows:
+            return
+        notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench edits', self)}`")
+        result = table(rows, bench, notes)
+        result.show()
+        write_text(self._beside(), result.markdown())
+        print(f"table written to {self._beside()}")
 
     def _draw(self, cases: tuple[Case, ...], bench: Workbench, folder: Path) -> None:
         from cagefield.benchmarking.edits import write_picture
@@ -256,6 +299,8 @@ class Bench:
     what: tyro.conf.OmitSubcommandPrefixes[
         tyro.conf.OmitArgPrefixes[
             Annotated[BenchEdits, tyro.conf.subcommand("edits")]
+            | Annotated[BenchGrids, tyro.conf.subcommand("grids")]
+            | Annotated[BenchAblation, tyro.conf.subcommand("ablation")]
             | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
             | Annotated[BenchTraining, tyro.conf.subcommand("training")]
         ]

@@ -1,0 +1,240 @@
+"""The paper's ablations, on trained built-in scenes: each gives a table and a picture.
+
+Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", the ablation study.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.benchmarking.cases import Case
+from cagefield.benchmarking.compare import compared_cameras, continuous, seen
+from cagefield.benchmarking.distortion import distortion, shell_points
+from cagefield.benchmarking.edits import eye, frame_ratio
+from cagefield.benchmarking.figures import Figures, Pictures, compare
+from cagefield.benchmarking.strips import Panel, difference, strip
+from cagefield.benchmarking.tables import Table, number
+from cagefield.benchmarking.workbench import Workbench
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.rendering.metrics import psnr
+from cagefield.scene import Scene
+from cagefield.warps.device import DeviceStack
+
+RESOLUTIONS = (64, 128, 256)
+GAPS = (0.1, 0.25, 0.5, 1.0)
+"""Gaps between the cages, as shares of the inner cage's mean edge."""
+
+_STRONGER = 5.0
+_POINTS = 1 << 16
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """What one gives."""
+
+    table: Table
+    picture: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An edit of a trained scene, on a workbench; pictures are `size` pixels wide and high."""
+
+    case: Case
+    bench: Workbench
+    size: int
+
+    @property
+    def scene(self) -> Scene:
+        """The trained scene."""
+        return self.bench.scene(self.case.scene)
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras of the figures."""
+        return compared_cameras(self.scene, self.bench)
+
+    def picture(self, edits: EditStack) -> Pictures:
+        """The picture [H,W,3] of the scene under edits, from where the case's pictures are taken."""
+        return seen(self.scene.with_edits(edits), [eye(self.case.scene, self.size)])[0]
+
+    def figures(self, edits: EditStack) -> Figures:
+        """The field through edits against the scene's model through their exact map."""
+        name, cameras = self.case.scene, self.cameras
+        before, after = (self.bench.mapped(name, stack, cameras) for stack in (None, edits))
+        return compare(seen(self.scene, cameras), seen(self.scene.with_edits(edits), cameras), before, after)
+
+    def with_edit(self, change: Callable[[Edit], Edit]) -> EditStack:
+        """The case's edits, the continuous one changed."""
+        return EditStack(change(e) if e.adjustment == "continuous" else e for e in self.case.edits)
+
+
+def outer_size(subject: Subject, gaps: Sequence[float] = GAPS) -> Ablation:
+    """The same motion in outer cages of several sizes: how far the surroundings give way."""
+    edit = continuous(subject.case)
+    rows: list[tuple[str, ...]] = []
+    panels: list[Panel] = [("before", subject.picture(EditStack([])))]
+    for gap in gaps:
+        outer = around(edit, gap)
+        stack = subject.with_edit(lambda e, cage=outer: e.replace(outer=cage))  # type: ignore[misc]
+        changed = continuous_of(stack)
+        measured = distortion(changed.exact_warp, changed)
+        figures = subject.figures(stack)
+        panels.append((f"gap {gap:g}\nstretch {measured.stretch:.1f}", subject.picture(stack)))
+        rows.append(
+            (
+                f"{gap:g}", number(measured.least_det), number(measured.stretch),
+                number(measured.rigidity, 3), f"{100 * figures.changed:.1f}%", number(figures.edited),
+                number(figures.lost),
+            )
+        )  # fmt: skip
+    return Ablation(
+        Table(
+            f"Outer cage size: {title(subject.case)}",
+            ("gap", "min det J", "max stretch", "mean |J - R|", "changed pixels", "PSNR edited", "PSNR lost"),
+            tuple(rows),
+            (
+                "Gap: between the outer cage and a box around the inner cage before and after the edit, as a "
+                "share of the inner cage's mean edge.",
+                f"Shell: {edit.shell}. PSNR: of the field through the map against the scene's model through "
+                "the same map.",
+            ),
+        ),
+        strip([panels]),
+    )
+
+
+def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ablation:
+    """Both shells from lattices of several resolutions and exact: error of the map, and of pictures."""
+    rows: list[tuple[str, ...]] = []
+    pictures: list[list[Panel]] = []
+    voxel = float(min(subject.scene.field.voxel_size))
+    for shell in ("flow", "trilinear"):
+        exact = subject.with_edit(lambda e, s=shell: e.replace(shell=s, lattice=None))  # type: ignore[misc]
+        frames, large = seen(subject.scene.with_edits(exact), subject.cameras), subject.picture(exact)
+        line: list[Panel] = [(f"{shell}, exact", large)]
+        for nodes in (*resolutions, None):
+            stack = EditStack(e.replace(lattice=nodes) if e.adjustment == "continuous" else e for e in exact)
+            edited = subject.scene.with_edits(stack)
+            worst, mean = lattice_error(stack, exact) if nodes else (0.0, 0.0)
+            same = psnr(seen(edited, subject.cameras), frames)
+            figures = subject.figures(stack)
+            if nodes:
+                apart = difference(subject.picture(stack), large, _STRONGER)
+                line.append(
+                    (f"{nodes}: off by {mean / voxel:.2g}\n(at most {worst / voxel:.2g}) voxels", apart)
+                )
+            rows.append(
+                (
+                    shell, str(nodes) if nodes else "exact", number(worst / voxel, 3),
+                    number(mean / voxel, 4), number(same), number(figures.edited), number(figures.lost),
+                    f"x{frame_ratio(subject.scene, edited):.2f}",
+                )
+            )  # fmt: skip
+        pictures.append(line)
+    return Ablation(
+        Table(
+            f"Discretisation resolution: {title(subject.case)}",
+            (
+                "shell", "nodes an axis", "max error", "mean error", "PSNR to exact", "PSNR edited",
+                "PSNR lost", "frame time",
+            ),
+            tuple(rows),
+            (
+                f"Error: distance in voxels ({voxel:.4g} world units) between the canonical points from the "
+                f"lattice and exact ones, at {_POINTS} random points of the shell.",
+                "PSNR to exact: frames from the lattice against frames with the exact map; edited: against "
+                "the scene's model through the exact map. Frame time: over an unedited frame.",
+                f"Picture: the exact frame, and the difference to it, {_STRONGER:g} times as strong.",
+            ),
+            names=2,
+        ),
+        strip(pictures),
+    )  # fmt: skip
+
+
+def discrete_continuous(subject: Subject) -> Ablation:
+    """The same motion as a discrete move, a copy and a continuous edit."""
+    kinds: dict[str, Callable[[Edit], Edit]] = {
+        "continuous": lambda e: e,
+        "discrete": lambda e: e.replace(**_DISCRETE),
+        "discrete copy": lambda e: e.replace(**_DISCRETE, keep_source=True),
+    }
+    rows: list[tuple[str, ...]] = []
+    panels: list[Panel] = [("before", subject.picture(EditStack([])))]
+    for name, change in kinds.items():
+        stack = subject.with_edit(change)
+        figures = subject.figures(stack)
+        panels.append((name, subject.picture(stack)))
+        ratio = frame_ratio(subject.scene, subject.scene.with_edits(stack))
+        rows.append(
+            (
+                name, f"{100 * figures.changed:.1f}%", number(figures.edited), number(figures.lost),
+                number(figures.there_lost), f"x{ratio:.2f}",
+            )
+        )  # fmt: skip
+    return Ablation(
+        Table(
+            f"Discrete against continuous: {title(subject.case)}",
+            ("adjustment", "changed pixels", "PSNR edited", "PSNR lost", "there lost", "frame time"),
+            tuple(rows),
+            (
+                "PSNR: of the edited field against the scene's model through the same edit; there: on the "
+                "pixels that it changes. Frame time: over an unedited frame.",
+            ),
+        ),
+        strip([panels]),
+    )
+
+
+_DISCRETE: dict[str, Any] = {
+    "adjustment": "discrete", "outer": None, "shell": "flow", "lattice": None, "falloff": "smooth",
+    "width": 1.0,
+}  # fmt: skip
+
+
+def lattice_error(stack: EditStack, exact: EditStack) -> tuple[float, float]:
+    """(max, mean) distance, world units, of canonical points by two stacks' maps in the renderer's kernel."""
+    edit = continuous_of(stack)
+    points = shell_points(edit, _POINTS).astype(np.float32)
+    viewdirs = np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), points.shape)
+    first, second = (
+        DeviceStack.from_stack(EditStack([continuous_of(which)])).to_canonical(points, viewdirs)[0]
+        for which in (stack, exact)
+    )
+    apart = np.linalg.norm(first - second, axis=1)
+    return float(apart.max()), float(apart.mean())
+
+
+def continuous_of(stack: EditStack) -> Edit:
+    """The one continuous edit of a stack."""
+    (edit,) = (edit for edit in stack if edit.adjustment == "continuous")
+    return edit
+
+
+def around(edit: Edit, gap: float) -> Cage:
+    """The box along the inner cage that holds it before and after, and a gap in shares of its mean edge."""
+    A, b = edit.inner.affine
+    corners = np.concatenate([edit.inner.corners, edit.deformed.corners])
+    u = (corners - b) @ np.linalg.inv(A).T
+    low, high = u.min(axis=0), u.max(axis=0)
+    bits = Cage.box((0.5, 0.5, 0.5), 1.0).corners
+    box = Cage(b + (low + bits * (high - low)) @ A.T)
+    return box.grown(gap * float(np.linalg.norm(A, axis=0).mean()))
+
+
+def title(case: Case) -> str:
+    """A case in words."""
+    return f"{case.scene}, {case.name.replace('_', ' ')}"
+
+
+def with_notes(ablation: Ablation, notes: Sequence[str]) -> Ablation:
+    """The same with more notes below the table."""
+    return replace(ablation, table=replace(ablation.table, notes=(*ablation.table.notes, *notes)))

@@ -1,0 +1,56 @@
+"""The exact map of an edit stack for many samples: by the kernel where there is one, which is float32."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import EditStack
+from cagefield.hexahedron import Array
+from cagefield.rendering.sampled import PointMap
+from cagefield.warps.device import DeviceStack
+
+_WITH_KERNEL = ("flow", "trilinear")
+
+
+@dataclass(frozen=True)
+class KernelSamples:
+    """Samples in canonical space, as `CanonicalSamples` without the Jacobian."""
+
+    points: NDArray[np.float32]
+    viewdirs: NDArray[np.float32]
+    stretch: NDArray[np.float32]
+    emptied: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class KernelMap:
+    """The map of a stack without lattices, evaluated by the renderer's kernel."""
+
+    edits: EditStack
+
+    @property
+    def bounds(self) -> Array:
+        """The box [2,3] outside which nothing is changed."""
+        return self.edits.bounds
+
+    @cached_property
+    def _packed(self) -> DeviceStack:
+        return DeviceStack.from_stack(self.edits)
+
+    def to_canonical(self, points: NDArray[Any], viewdirs: NDArray[Any] | None = None) -> KernelSamples:
+        """Canonical samples of deformed points [N,3] and unit view directions [N,3] (+z where left out)."""
+        p = np.asarray(points, np.float32)
+        d = np.broadcast_to(np.array([0, 0, 1], np.float32), p.shape) if viewdirs is None else viewdirs
+        return KernelSamples(*self._packed.to_canonical(p, np.asarray(d, np.float32)))
+
+
+def exact(edits: EditStack) -> PointMap:
+    """The stack's map without its lattices, by the kernel where all its shells have one."""
+    stack = EditStack(edit.replace(lattice=None) for edit in edits)
+    shells = {edit.shell for edit in stack.active if edit.adjustment == "continuous"}
+    return KernelMap(stack) if shells <= set(_WITH_KERNEL) else stack

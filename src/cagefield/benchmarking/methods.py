@@ -1,0 +1,94 @@
+"""Ways to fill the shell of a continuous edit, by name: ours, the paper's, and stand-ins for the peers'.
+
+Importing this module adds the peers to `warps.SHELLS`, so that an edit takes them by name, is evaluated and
+rendered with them. Only benchmarks do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from cagefield.benchmarking.peers import PEERS, PeerShell
+from cagefield.cages import Cage
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import CagefieldError
+from cagefield.hexahedron import Array
+from cagefield.warps import SHELLS, Falloff, Shell
+from cagefield.warps.maps import Mapped
+
+
+def _as_shell(name: str) -> Callable[[Cage, Cage, Cage, Falloff], Shell]:
+    def build(inner: Cage, deformed: Cage, outer: Cage, _falloff: Falloff) -> Shell:
+        return PeerShell(PEERS[name](inner, deformed, outer), deformed, outer)
+
+    return build
+
+
+SHELLS.update({name: _as_shell(name) for name in PEERS})
+
+PEER_LATTICE = 96
+"""Nodes an axis of the lattice from which fields are rendered with a peer's map: it has no kernel."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A shell map, and the lattice that it is evaluated from when a field is rendered; None is exactly."""
+
+    shell: str
+    lattice: int | None = None
+
+    def of(self, edit: Edit) -> Edit:
+        """The edit with this method in its shell; a discrete edit stays as it is."""
+        if edit.adjustment == "discrete":
+            return edit
+        falloff = {} if self.shell == "flow" else {"falloff": "smooth", "width": 1.0}
+        return edit.replace(shell=self.shell, lattice=self.lattice, allow_folding=True, **falloff)
+
+    def of_all(self, edits: EditStack) -> EditStack:
+        """The stack with this method in all its shells."""
+        return EditStack(self.of(edit) for edit in edits)
+
+
+METHODS: dict[str, Method] = {
+    "flow": Method("flow"),
+    "flow 64": Method("flow", 64),
+    "trilinear": Method("trilinear"),
+    "trilinear 64": Method("trilinear", 64),
+    "trilinear 128": Method("trilinear", 128),
+    "trilinear 256": Method("trilinear", 256),
+    "mean value": Method("mean value", PEER_LATTICE),
+    "harmonic": Method("harmonic", PEER_LATTICE),
+}
+"""What is compared, ours first."""
+
+MAPS: tuple[str, ...] = tuple(dict.fromkeys(method.shell for method in METHODS.values()))
+"""The maps among them, each once."""
+
+
+class BackwardMap(Protocol):
+    """A map of all space from deformed to canonical."""
+
+    def to_canonical(self, points: Array) -> Mapped:
+        """Deformed points [N,3] to canonical space."""
+
+
+def exact_map(name: str, edit: Edit) -> BackwardMap:
+    """The map that one of `MAPS` makes of a continuous edit's cages, evaluated exactly; folded ones, too.
+
+    Raises:
+        CagefieldError: an unknown map, or an edit that is not continuous.
+        EditError: an inner cage that is not inside the outer one.
+    """
+    check_known((name,), MAPS)
+    if edit.adjustment != "continuous":
+        raise CagefieldError(f'edit "{edit.name}" is discrete and has no shell; choose a continuous edit')
+    return Method(name).of(edit).exact_warp
+
+
+def check_known(names: Sequence[str], known: Sequence[str] = tuple(METHODS)) -> None:
+    """Raises CagefieldError where a method is unknown."""
+    for name in names:
+        if name not in known:
+            raise CagefieldError(f"there is no method {name!r}; choose from {', '.join(known)}")

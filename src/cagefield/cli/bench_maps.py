@@ -1,0 +1,137 @@
+"""`cagefield bench grids` and `bench ablation`: pictures of shell maps, and what an edit's choices do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from cagefield.cli.options import Device, Flag, Output, Training, TrainingOptions, check_file, progress_bar
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.benchmarking.ablations import Ablation
+    from cagefield.benchmarking.cases import Case
+    from cagefield.benchmarking.workbench import Workbench
+
+
+@dataclass(frozen=True)
+class BenchGrids:
+    """What each shell map makes of a lattice when the inner cage is turned; writes a PNG."""
+
+    out: Output = Path("docs/grids.png")
+    """PNG file for the picture."""
+    methods: tuple[str, ...] = ()
+    """Only these maps: flow, trilinear, "mean value", harmonic."""
+    degrees: tuple[float, ...] = (15.0, 45.0, 90.0, 180.0)
+    """Angles by which the inner cage is turned, one row each."""
+    panel: int = 300
+    """Width and height of each panel in pixels."""
+    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Replace a file that is there."""
+
+    def run(self) -> None:
+        """Draws, says what was measured, writes the file."""
+        from cagefield.benchmarking.grids import Style, grids
+        from cagefield.benchmarking.methods import MAPS, check_known
+        from cagefield.rendering.images import write_png
+
+        check_known(self.methods, MAPS)
+        if self.out.suffix.lower() != ".png":
+            raise CagefieldError(f"{self.out} must end in .png")
+        check_file(self.out, self.overwrite)
+        style = Style(self.panel)
+        write_png(self.out, grids(self.methods or MAPS, self.degrees, style, print))
+        print(f"picture written to {self.out}")
+
+
+@dataclass(frozen=True)
+class BenchAblation:
+    """What one choice of an edit does, on a trained built-in scene; writes a picture and a Markdown table."""
+
+    what: tyro.conf.Positional[Literal["outer-size", "resolution", "discrete-continuous", "limits"]]
+    """The size of the outer cage; nodes of the lattice; discrete or continuous; what editing cannot do."""
+    out: Output = Path("docs/ablations")
+    """Folder for both, named after the ablation."""
+    scene: str = ""
+    """Scene of the edit; left out: microphone, for the limits plant."""
+    edit: str = ""
+    """Edit of that scene, discrete for the limits; left out: push_head, for the limits move_pinecone."""
+    workdir: Path = Path("runs/bench")
+    """Folder with the photos and fields of `bench edits` with the same options; what is missing is made."""
+    views: int = 100
+    """Number of training photos of the scene."""
+    size: int = 400
+    """Width and height of the photos in pixels."""
+    test_views: int = 20
+    """Number of test photos."""
+    training: Training = field(default_factory=TrainingOptions)
+    compared_size: int = 128
+    """Width and height of the pictures that figures are taken from, whose truth is slow to render."""
+    compared_views: int = 3
+    """Number of them."""
+    exact_samples: int = 768
+    """Samples a ray in the truth."""
+    picture_size: int = 320
+    """Width and height of each panel of the picture in pixels."""
+    device: Device = "auto"
+    """Where kernels run."""
+    overwrite: Flag = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Trains what is missing, measures, writes both files."""
+        from cagefield import devices
+        from cagefield.benchmarking.ablations import with_notes
+        from cagefield.benchmarking.cases import chosen
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.tables import write_text
+        from cagefield.benchmarking.workbench import Settings, Workbench
+        from cagefield.cli.bench import command_line
+        from cagefield.rendering.images import write_png
+
+        usual = ("plant", "move_pinecone") if self.what == "limits" else ("microphone", "push_head")
+        if bool(self.scene) != bool(self.edit):
+            raise CagefieldError("--scene and --edit go together; give both or none")
+        scene, edit = (self.scene, self.edit) if self.scene else usual
+        (case,) = chosen([scene], [edit])
+        if (case.kind == "continuous") == (self.what == "limits"):
+            kind = "discrete" if self.what == "limits" else "continuous"
+            raise CagefieldError(f"{scene} {edit} is a {case.kind} edit; {self.what} needs a {kind} one")
+        picture, text = (self.out / f"{self.what}{end}" for end in (".png", ".md"))
+        for path in (picture, text):
+            check_file(path, self.overwrite)
+        if self.picture_size < 16:
+            raise CagefieldError(f"--picture-size is {self.picture_size}; it must be at least 16")
+        settings = Settings(
+            self.views,
+            self.size,
+            self.test_views,
+            self.training.config(),
+            exact_samples=self.exact_samples,
+            compared_size=self.compared_size,
+            compared_views=self.compared_views,
+        )
+        devices.start(self.device)
+        result = self._measure(case, Workbench(settings, self.workdir.resolve(), progress_bar))
+        notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench ablation', self)}`")
+        result = with_notes(result, notes)
+        result.table.show()
+        write_png(picture, result.picture)
+        write_text(text, result.table.markdown())
+        print(f"written to {picture} and {text}")
+
+    def _measure(self, case: Case, bench: Workbench) -> Ablation:
+        from cagefield.benchmarking import ablations
+        from cagefield.benchmarking.limits import limits
+
+        if self.what == "limits":
+            return limits(case, bench, self.picture_size)
+        measures = {
+            "outer-size": ablations.outer_size,
+            "resolution": ablations.resolution,
+            "discrete-continuous": ablations.discrete_continuous,
+        }
+        return measures[self.what](ablations.Subject(case, bench, self.picture_size))
