@@ -53,13 +53,13 @@ def _seat() -> Part:
 
 def _cushion() -> Part:
     corners = ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    piping = [(0.05 + 0.358 * x, 0.383 * y, SEAT_Z + 0.16) for x, y in (*corners, corners[0])]
+    piping = [(0.05 + 0.358 * x, 0.358 * y, SEAT_Z + 0.16) for x, y in (*corners, corners[0])]
     buttons = [
         place((0.05 + 0.18 * x, 0.18 * y, SEAT_Z + 0.228), scale=(0.025, 0.025, 0.012)) for x, y in corners
     ]
     return part(
         "cushion",
-        at(Box((0.36, 0.385, 0.07), 0.065), FABRIC, (0.05, 0, SEAT_Z + 0.16), gloss=MATTE),
+        at(Box((0.36, 0.36, 0.07), 0.065), FABRIC, (0.05, 0, SEAT_Z + 0.16), gloss=MATTE),
         tube(piping, 0.016, Plain(GOLD), gloss=MATTE),
         posed(Sphere(), Plain(GOLD), buttons),
     )
@@ -117,7 +117,7 @@ def _leg(name: str, x: float, y: float) -> Part:
 def _arm(name: str, side: float) -> Part:
     """The arm rest at +y (side 1) or -y (side -1), on a post that leans outwards from the seat."""
     top, foot, y = SEAT_Z + 0.42, SEAT_Z + 0.115, 0.49 * side
-    path = smooth([(-0.4, 0.0), (-0.25, 0.03), (0.1, 0.02), (0.36, -0.01), (0.43, -0.06)], 3)
+    path = smooth([(-0.32, 0.0), (-0.2, 0.03), (0.1, 0.02), (0.36, -0.01), (0.43, -0.06)], 3)
     post = smooth([(0.33, top - 0.03), (0.37, top - 0.14), (0.4, foot + 0.06), (0.435, foot)], 3)
     lean = np.linspace(y, 0.443 * side, len(post))
     return part(
