@@ -277,5 +277,5 @@ def test_falloff_and_width_are_written_and_read() -> None:
     stack = parse_edits(text)
     assert (stack[0].shell, stack[0].falloff, stack[0].width) == ("flow", "linear", 0.25)
     assert parse_edits(dump_edits(stack)) == stack
-    with pytest.raises(EditFileError, match=r"edits, line 1: edits\[0\]: edit: width must be above 0"):
+    with pytest.raises(EditFileError, match=r"edits, line 1: \[0\]: edit: width must be above 0"):
         parse_edits(text.replace("0.25", "1.5"))
