@@ -31,7 +31,7 @@ RESOLUTIONS = (64, 128, 256)
 GAPS = (0.1, 0.25, 0.5, 1.0)
 """Gaps between the cages, as shares of the inner cage's mean edge."""
 
-_STRONGER = 5.0
+_STRONGER = 20.0
 _POINTS = 1 << 16
 
 

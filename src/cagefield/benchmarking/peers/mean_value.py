@@ -153,8 +153,8 @@ class MeanValueShell:
     surface at which the map could become the identity; the inner region moves by phi, as with every other
     method here. The map is evaluated backwards, as rendering needs it: coordinates with respect to the
     deformed surface, applied to the canonical one. No tetrahedra are made (NeRFshop deforms those of a mesh
-    forwards and inverts them one by one). Faces are split into pairs of triangles, `splits` of the inner and of
-    the outer cage to a side.
+    forwards and inverts them one by one). Faces are split into pairs of triangles, `splits` to a side, of the
+    inner cage and of the outer one.
     """
 
     inner: HexahedronMap
