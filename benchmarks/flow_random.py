@@ -2,8 +2,8 @@
 
     python benchmarks/flow_random.py --edits 10000
 
-Both cages are deformed in half of the edits; each has one to three operations: turns to 180 degrees, scales
-from 0.3 to what fits, shears, moves, and drags of corners, edges and faces, each to at most 98% of what is safe.
+Both cages are deformed in half of the edits; each has one to three operations: turns to 180 degrees,
+scales from 0.3 to what fits, shears, moves, drags of corners, edges and faces, to 98% of what is safe.
 Points of the shell are random, a third of them close to the inner cage. Errors are shares of the outer cage's
 size. An edit whose first cages, or operations, are impossible is drawn again, and counted.
 """

@@ -148,7 +148,7 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
         "colour SH degree 0",
         "train: 3 24x16",
         "test: 2 24x16",
-        '1. "lift": continuous, trilinear shell, exact',
+        '1. "lift": continuous, flow shell, exact',
         "translation by (0, 0, 0.2)",
         "100.0% of the field's voxels follow the cage, whose corners move by up to 0.2",
         "does not fold",

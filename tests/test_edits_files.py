@@ -93,7 +93,7 @@ def test_files_are_what_a_person_would_write() -> None:
         "  - translate: [0.1, 0.0, 0.0]\n"
         "  - rotate_deg: [0.0, 0.0, 12.5]\n"
         "  adjustment: continuous\n"
-        "  shell: trilinear\n"
+        "  shell: flow\n"
     )
 
 
@@ -122,7 +122,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Path) -> None:
-    stack = EditStack([Edit(INNER, OUTER, name="arm").rotate((0, 0, 1))])
+    stack = EditStack([Edit(INNER, OUTER, name="arm", shell="trilinear").rotate((0, 0, 1))])
     path = tmp_path / "edits.yaml"
     save_edits(stack, path)
     with pytest.raises(
@@ -175,7 +175,7 @@ def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Pa
             ("name: arm", "adjustment: discreet"),
             'adjustment: must be continuous or discrete, got "discreet"; did you',
         ),
-        (("name: arm", "shell: cubic"), 'shell must be one of trilinear, got "cubic"'),
+        (("name: arm", "shell: cubic"), 'shell must be one of flow, trilinear, got "cubic"'),
         (("name: arm", "keep_source: yes"), 'keep_source needs adjustment="discrete"'),
         (("name: arm", "inner: 1\n    name: arm"), 'line 4: edits.0..inner: key "inner" is given twice'),
         (
@@ -270,3 +270,12 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         load_edits(tmp_path / "latin.yaml")
     with pytest.raises(EditFileError, match="cannot be written"):
         save_edits(EditStack(), tmp_path / "none" / "edits.yaml")
+
+
+def test_falloff_and_width_are_written_and_read() -> None:
+    text = "- inner: {center: [0, 0, 0], size: 1}\n  outer: {margin: 1}\n  falloff: linear\n  width: 0.25\n"
+    stack = parse_edits(text)
+    assert (stack[0].shell, stack[0].falloff, stack[0].width) == ("flow", "linear", 0.25)
+    assert parse_edits(dump_edits(stack)) == stack
+    with pytest.raises(EditFileError, match=r"edits, line 1: \[0\]: edit: width must be above 0"):
+        parse_edits(text.replace("0.25", "1.5"))

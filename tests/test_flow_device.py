@@ -97,3 +97,16 @@ def test_lattice_nodes_are_the_maps_values(name: str) -> None:
     assert np.median(np.abs(nodes - expected)) < 1e-4
     on_faces = np.abs(p).max(axis=1) > 0.8 - 1e-9
     assert np.abs(nodes[on_faces]).max() < 1e-6
+
+
+def test_lattice_error_of_an_edit() -> None:
+    edit = EDITS["turn of 90"]
+    worst, mean = edit.lattice_error(9, samples=2000)
+    warp = edit.replace(lattice=9).warp
+    exact = edit.exact_warp
+    assert isinstance(exact, ContinuousWarp)
+    p = exact.shell_points(400, seed=1)
+    distance = np.linalg.norm(warp.to_canonical(p).points - exact.to_canonical(p).points, axis=1)
+    # Other points, and a mean of some hundreds of them.
+    assert mean == pytest.approx(distance.mean(), rel=0.2) and worst >= 0.8 * distance.max()
+    assert edit.lattice_error() == (0.0, 0.0)

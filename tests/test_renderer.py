@@ -91,8 +91,10 @@ def test_skipping_empty_space_changes_nothing(contracted, monkeypatch):
 INNER = Cage.box((0.1, 0, 0.1), (0.7, 0.6, 0.8))
 OUTER = Cage.box((0.05, 0, 0.1), (2.4, 2.4, 2.4))
 EDITS = {
-    "continuous": EditStack([Edit(INNER, OUTER).rotate((0.1, 0.2, 0.3)).translate((0.1, 0.05, 0.1))]),
-    "corner": EditStack([Edit(INNER, OUTER).move_corner(7, (0.15, 0.1, 0.2))]),
+    "continuous": EditStack(
+        [Edit(INNER, OUTER, shell="trilinear").rotate((0.1, 0.2, 0.3)).translate((0.1, 0.05, 0.1))]
+    ),
+    "corner": EditStack([Edit(INNER, OUTER, shell="trilinear").move_corner(7, (0.15, 0.1, 0.2))]),
     "move": EditStack([Edit(INNER, adjustment="discrete").translate((0.2, -0.9, 0.3))]),
     "copy out of bounds": EditStack(
         [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.0, -1.2, 0.2))]

@@ -67,16 +67,20 @@ def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
 
 
 STACKS = {
-    "affine": [Edit(INNER, OUTER).rotate((0, 0.1, 0.3)).translate((0.1, 0, 0.1))],
-    "deformed": [Edit(INNER, OUTER).rotate((0.2, 0.1, 0.3)).move_corner(7, (0.1, 0.1, 0.05))],
+    "affine": [Edit(INNER, OUTER, shell="trilinear").rotate((0, 0.1, 0.3)).translate((0.1, 0, 0.1))],
+    "deformed": [
+        Edit(INNER, OUTER, shell="trilinear").rotate((0.2, 0.1, 0.3)).move_corner(7, (0.1, 0.1, 0.05))
+    ],
     "bent cages": [
-        Edit(BENT, OUTER.move_corner(3, (0.3, 0.2, -0.1))).scale((1.1, 0.9, 1.05)).rotate((0, 0.1, 0))
+        Edit(BENT, OUTER.move_corner(3, (0.3, 0.2, -0.1)), shell="trilinear")
+        .scale((1.1, 0.9, 1.05))
+        .rotate((0, 0.1, 0))
     ],
     "move": [Edit(INNER, adjustment="discrete").translate((0.4, 0, 0)).rotate((0, 0, 0.5))],
     "move bent": [Edit(BENT, adjustment="discrete").translate((0.4, 0, 0)).move_face("+x", (0.1, 0.1, 0))],
     "copy": [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.2, 0, 0)).shear(xy=0.5)],
     "delete": [Edit.delete(BENT)],
-    "nothing": [Edit(INNER, OUTER)],
+    "nothing": [Edit(INNER, OUTER, shell="trilinear")],
     "empty": [],
 }
 STACKS["chain"] = [*STACKS["deformed"], *STACKS["move bent"], *STACKS["affine"], *STACKS["delete"]]
@@ -129,7 +133,7 @@ def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
     assert np.array_equal(points[outside], p[outside]) and np.array_equal(viewdirs[outside], d[outside])
     assert (stretch[outside] == 1.0).all()
     # Inside a continuous edit's box but outside its (turned) outer cage, too.
-    turned = Edit(INNER, Cage.box((0, 0, 0), 1.6, (0.1, 0.2, 0.1))).rotate((0.1, 0, 0))
+    turned = Edit(INNER, Cage.box((0, 0, 0), 1.6, (0.1, 0.2, 0.1)), shell="trilinear").rotate((0.1, 0, 0))
     points, *_ = DeviceStack.from_stack(EditStack([turned])).to_canonical(p, d)
     free = ~turned.outer.grown(1e-5).contains(p)  # type: ignore[union-attr]
     assert np.array_equal(points[free], p[free])
@@ -155,7 +159,7 @@ def test_boxes() -> None:
 def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
     from cagefield.warps.device import DeviceStack
 
-    folded = EditStack([Edit(INNER, OUTER, allow_folding=True).rotate((0, 0, turn))])
+    folded = EditStack([Edit(INNER, OUTER, shell="trilinear", allow_folding=True).rotate((0, 0, turn))])
     p, d = samples(5000)
     points, viewdirs, stretch, _ = DeviceStack.from_stack(folded).to_canonical(p, d)
     assert np.isfinite(points).all() and np.isfinite(viewdirs).all() and np.isfinite(stretch).all()

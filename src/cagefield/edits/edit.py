@@ -15,7 +15,7 @@ from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
-from cagefield.warps import FALLOFFS, SHELLS, Falloff, Shell, Warp
+from cagefield.warps import FALLOFFS, SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp, lattice_error
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.hexahedron import HexahedronMap
@@ -196,7 +196,14 @@ class Edit:
         warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
         if nodes is None or not isinstance(warp, ContinuousWarp):
             return 0.0, 0.0
-        return lattice_error(warp, nodes, samples=samples)
+        if not isinstance(warp.shell, FlowShell):
+            return lattice_error(warp, nodes, samples=samples)
+        # A lattice of a flow in float64 takes minutes; float32's rounding is far below the lattice's error.
+        from cagefield.warps.device import lattice_difference
+
+        points = warp.shell_points(samples)
+        distance = lattice_difference(self.replace(lattice=None), self.replace(lattice=nodes), points)
+        return float(distance.max(initial=0.0)), float(distance.mean()) if len(distance) else 0.0
 
     def _largest_part(self, operation: Operation) -> float:
         cage = self.deformed

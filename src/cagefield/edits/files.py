@@ -234,12 +234,12 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["operations"] = [_from_operation(operation) for operation in edit.operations]
     if not edit.deleted:
         content["adjustment"] = edit.adjustment
-    if edit.adjustment == "continuous":
+    if edit.adjustment == "continuous" or edit.shell != "flow":
         content["shell"] = edit.shell
-        if edit.falloff != "smooth":
-            content["falloff"] = edit.falloff
-        if edit.width != 1.0:
-            content["width"] = edit.width
+    if edit.falloff != "smooth":
+        content["falloff"] = edit.falloff
+    if edit.width != 1.0:
+        content["width"] = edit.width
     if edit.keep_source:
         content["keep_source"] = True
     if edit.lattice is not None:

@@ -32,6 +32,13 @@ class ContinuousWarp:
         shell = self.lattice if self.lattice is not None else self.shell
         return _by_region(points, self.inner, self.outer, shell.to_canonical)
 
+    def shell_points(self, samples: int, seed: int = 0) -> Array:
+        """Those of `samples` random points of the outer cage's frame that lie in V^o minus V, [N,3]."""
+        origin, frame = self.outer.frame
+        points = origin + np.random.default_rng(seed).random((samples, 3)) @ frame.T
+        points = points[self.outer.contains(points)]
+        return points[~self.inner.deformed.contains(points)]
+
     def to_deformed(self, points: Array) -> Mapped:
         """Canonical points [N,3] to deformed space."""
         return _by_region(points, self.inner.inverse, self.outer, self.shell.to_deformed)
@@ -45,10 +52,7 @@ def lattice_error(
     Measured at `samples` random points of the outer cage's frame that lie in the shell V^o minus V; the
     interpolation's own error falls with R^-2 where the map is smooth and with R^-1 at the cages' faces.
     """
-    origin, frame = warp.outer.frame
-    points = origin + np.random.default_rng(seed).random((samples, 3)) @ frame.T
-    points = points[warp.outer.contains(points)]
-    points = points[~warp.inner.deformed.contains(points)]
+    points = warp.shell_points(samples, seed)
     exact = replace(warp, lattice=None)
     lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, warp.outer, resolution)
     difference = lattice.to_canonical(points)[0] - exact.to_canonical(points).points

@@ -146,6 +146,21 @@ class DeviceStack:
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 
+@dataclass(frozen=True)
+class _One:
+    """A stack of one edit."""
+
+    active: tuple[PackedEdit]
+
+
+def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
+    """Distances [N], world units, between an edit's map with and without its lattice at deformed points [N,3]."""
+    p = points.astype(np.float32)
+    d = np.broadcast_to(np.float32([1.0, 0.0, 0.0]), p.shape)
+    maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
+    return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
+
+
 @qd.func
 def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
     """(canonical point, canonical unit view direction, stretch |J d|, emptied 0 or 1) of a deformed sample.
