@@ -102,11 +102,11 @@ def test_discrete_edits_change_less_than_continuous_ones(subject: Subject) -> No
 
 def test_limits(bench: Workbench) -> None:
     (case,) = chosen(["plant"], ["move_pinecone"])
-    result = limits(case, bench, PICTURE)
+    result = limits(case, bench, 40)
     values = [float(row[2]) for row in result.table.rows]
     # Seen from behind, a capture of one side is worse than one all round, and than its own side.
     assert values[3] < values[4] and values[3] < values[2]
-    assert result.picture.shape[1] == 3 * PICTURE + 2 * 8
+    assert result.picture.shape[1] == 3 * 40 + 2 * 8
     (other,) = chosen(["plant"], ["taller"])
     with pytest.raises(CagefieldError, match="plant taller moves no part; choose a discrete edit"):
         limits(other, bench, PICTURE)

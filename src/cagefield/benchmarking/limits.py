@@ -6,7 +6,7 @@ Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from cagefield.benchmarking.ablations import Ablation, title
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.compare import seen
 from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.figures import Pictures, changed_pixels, floats, mean_psnr, pooled_psnr
+from cagefield.benchmarking.figures import Pictures, changed_pixels, mean_psnr, pooled_psnr, stacked
 from cagefield.benchmarking.strips import strip
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench, beside
@@ -36,47 +36,47 @@ def limits(case: Case, bench: Workbench, size: int) -> Ablation:
     """
     if case.moved is None:
         raise CagefieldError(f"{case.scene} {case.name} moves no part; choose a discrete edit")
-    model = procedural_scene(case.scene)
-    scene = bench.scene(case.scene)
-    cameras = [eye(case.scene, size), *scene.cameras["test"]]
-    moved = case.moved(model)
-    edited = seen_all(bench, case.scene, case.edits, cameras)
-    with_light, as_it_falls = photos(moved, cameras), photos(resettled(moved), cameras)
-    shadow = changed_pixels(np.stack(with_light), np.stack(as_it_falls))
+    front = eye(case.scene, size)
+    tests = bench.scene(case.scene).cameras["test"]
+    shown, every = _shots(case, bench, front, [front]), _shots(case, bench, front, tests)
+    shadow = changed_pixels(every.old_shadows, every.new_shadows)
+    before = [n for n, camera in enumerate(tests) if beside(camera, front, REACH)]
 
-    center, extent = model.part_box(model.part_names, 0.05)
-    turn = Edit(Cage.box(center, extent), adjustment="discrete").rotate((0.0, 0.0, np.pi))
-    turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).carrying_light()
-    truth = photos(turned, cameras)
-    around, one_side = bench.scene(case.scene), bench.one_sided(case.scene, eye(case.scene, size), REACH)
-    full, half = (seen(which.with_edits(EditStack([turn])), cameras) for which in (around, one_side))
-    still = seen(one_side, cameras)
-    model_still = photos(model, cameras)
-    front = [n for n, camera in enumerate(cameras) if beside(camera, cameras[0], REACH)]
+    def there(truth: Pictures) -> str:
+        return number(pooled_psnr(every.edited, truth, shadow))
 
-    def of(pictures: Pictures, target: Sequence[np.ndarray]) -> str:
-        return number(mean_psnr(pictures[front], np.stack([target[n] for n in front])))
-
-    def there(target: Sequence[np.ndarray]) -> str:
-        return number(pooled_psnr(np.stack(edited), np.stack(target), shadow))
+    def from_there(pictures: Pictures, truth: Pictures) -> str:
+        return number(mean_psnr(pictures[before], truth[before]) if before else float("nan"))
 
     rows = (
-        (f"shadows: {title(case)}", "against the part moved with its old shadows", there(with_light)),
-        (f"shadows: {title(case)}", "against shadows as they then fall", there(as_it_falls)),
-        (f"single-sided: {case.scene}", "as captured, from the captured side", of(still, model_still)),
-        (f"single-sided: {case.scene}", "turned around, from the captured side", of(half, truth)),
-        (f"captured all round: {case.scene}", "turned around, from the same side", of(full, truth)),
+        (f"shadows: {title(case)}", "against the part moved with its old shadows", there(every.old_shadows)),
+        (f"shadows: {title(case)}", "against shadows as they then fall", there(every.new_shadows)),
+        (
+            f"single-sided: {case.scene}",
+            "as captured, from the captured side",
+            from_there(every.one_side, every.model),
+        ),
+        (
+            f"single-sided: {case.scene}",
+            "turned around, from the captured side",
+            from_there(every.one_side_turned, every.turned),
+        ),
+        (
+            f"captured all round: {case.scene}",
+            "turned around, from the same side",
+            from_there(every.all_round_turned, every.turned),
+        ),
     )
     pictures = [
         [
-            ("edited field", edited[0]),
-            ("truth, with old shadows", with_light[0]),
-            ("truth, shadows as they fall", as_it_falls[0]),
+            ("edited field", shown.edited[0]),
+            ("truth, with old shadows", shown.old_shadows[0]),
+            ("truth, shadows as they fall", shown.new_shadows[0]),
         ],
         [
-            ("captured from this side, turned around", half[0]),
-            ("captured all round, turned around", full[0]),
-            ("truth", truth[0]),
+            ("captured from this side,\nturned around", shown.one_side_turned[0]),
+            ("captured all round,\nturned around", shown.all_round_turned[0]),
+            ("truth", shown.turned[0]),
         ],
     ]
     return Ablation(
@@ -88,8 +88,8 @@ def limits(case: Case, bench: Workbench, size: int) -> Ablation:
                 "Shadows (ambient occlusion of the built-in scenes): PSNR on the pixels where they differ "
                 "with and without the move, and a margin of a 100th of the width.",
                 f"Single-sided: photos from within {REACH:g} degrees of the picture's direction alone; the "
-                "scene is then turned by 180 degrees, which shows its other side. PSNR: test views on that "
-                "side.",
+                "scene is then turned by 180 degrees, which shows its other side. PSNR: the "
+                f"{len(before)} test views on that side.",
             ),
             names=2,
         ),
@@ -97,14 +97,42 @@ def limits(case: Case, bench: Workbench, size: int) -> Ablation:
     )
 
 
-def seen_all(bench: Workbench, name: str, edits: EditStack, cameras: Sequence[Camera]) -> list[np.ndarray]:
-    """Pictures [H,W,3] of the trained scene under edits."""
-    return list(seen(bench.scene(name).with_edits(edits), cameras))
+@dataclass(frozen=True)
+class _Shots:
+    """Pictures [V,H,W,3] of the trained scene, edited or turned, and of the model, the same views each."""
+
+    edited: Pictures
+    old_shadows: Pictures
+    new_shadows: Pictures
+    one_side: Pictures
+    one_side_turned: Pictures
+    all_round_turned: Pictures
+    model: Pictures
+    turned: Pictures
 
 
-def photos(model: ProceduralScene, cameras: Sequence[Camera]) -> list[np.ndarray]:
-    """Photos [H,W,3] of a scene over white, as floats."""
-    return [floats(model.photograph(camera, background="white").rgb8()) for camera in cameras]
+def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera]) -> _Shots:
+    model, scene = procedural_scene(case.scene), bench.scene(case.scene)
+    moved = model if case.moved is None else case.moved(model)
+    center, extent = model.part_box(model.part_names, 0.05)
+    turn = Edit(Cage.box(center, extent), adjustment="discrete").rotate((0.0, 0.0, np.pi))
+    turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).carrying_light()
+    one_side = bench.one_sided(case.scene, front, REACH)
+    return _Shots(
+        edited=seen(scene.with_edits(case.edits), cameras),
+        old_shadows=photos(moved, cameras),
+        new_shadows=photos(resettled(moved), cameras),
+        one_side=seen(one_side, cameras),
+        one_side_turned=seen(one_side.with_edits(EditStack([turn])), cameras),
+        all_round_turned=seen(scene.with_edits(EditStack([turn])), cameras),
+        model=photos(model, cameras),
+        turned=photos(turned, cameras),
+    )
+
+
+def photos(model: ProceduralScene, cameras: Sequence[Camera]) -> Pictures:
+    """Photos [V,H,W,3] of a scene over white."""
+    return stacked([model.photograph(camera, background="white").rgb8() for camera in cameras])
 
 
 def resettled(moved: ProceduralScene) -> ProceduralScene:

@@ -26,11 +26,11 @@ def lpips() -> tuple[Distance | None, str]:
     """
     missing = [name for name in ("torch", "torchvision", "lpips") if find_spec(name) is None]
     if missing:
-        return None, f"LPIPS is left out: {', '.join(missing)} is not installed"
+        return None, f"LPIPS is left out; not installed: {', '.join(missing)}"
     torch = import_module("torch")
     path = Path(torch.hub.get_dir()) / "checkpoints" / WEIGHTS
     if not path.is_file():
-        return None, f"LPIPS is left out: AlexNet's weights ({WEIGHTS}) are not in torch's cache"
+        return None, f"LPIPS is left out; AlexNet's weights ({WEIGHTS}) are not in torch's cache"
     network = import_module("lpips").LPIPS(net="alex", verbose=False).eval()
 
     def distance(pictures: Pictures, truth: Pictures) -> float:

@@ -158,9 +158,9 @@ class _One:
 
 
 def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
-    """Distances [N], world units, between an edit's map with and without its lattice at deformed points [N,3]."""
+    """Distances [N], world units, of an edit's map without and with its lattice at deformed points [N,3]."""
     p = points.astype(np.float32)
-    d = np.broadcast_to(np.float32([1.0, 0.0, 0.0]), p.shape)
+    d = np.broadcast_to(np.array([1.0, 0.0, 0.0], np.float32), p.shape)
     maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
     return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
 

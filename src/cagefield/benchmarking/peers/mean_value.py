@@ -153,29 +153,30 @@ class MeanValueShell:
     surface at which the map could become the identity; the inner region moves by phi, as with every other
     method here. The map is evaluated backwards, as rendering needs it: coordinates with respect to the
     deformed surface, applied to the canonical one. No tetrahedra are made (NeRFshop deforms those of a mesh
-    forwards and inverts them one by one). Faces are split into `splits`^2 pairs of triangles.
+    forwards and inverts them one by one). Faces are split into pairs of triangles, `splits` to a side, of the
+    inner cage and of the outer one.
     """
 
     inner: HexahedronMap
     outer: Cage
-    splits: int
+    splits: tuple[int, int]
 
     @classmethod
     def of(cls, inner: Cage, deformed: Cage, outer: Cage) -> MeanValueShell:
         """The shell map; faces are split where they, or phi on them, are not those of two triangles."""
         phi = HexahedronMap(inner, deformed)
-        exact = phi.affine is not None and _is_planar(deformed) and _is_planar(outer)
-        return cls(phi, outer, 1 if exact else 3)
+        exact = phi.affine is not None and _is_planar(deformed)
+        return cls(phi, outer, (1 if exact else 3, 1 if _is_planar(outer) else 3))
 
     @cached_property
     def _mesh(self) -> tuple[ClosedMesh, Array]:
         """The deformed shell's surface, and the displacement [V,3] to canonical space of its vertices."""
-        u, triangles = cube_surface(self.splits)
+        (u, inner), (w, outer) = (cube_surface(splits) for splits in self.splits)
         hole = hexahedron.points(self.inner.deformed.corners, u)
         moved = hexahedron.points(self.inner.canonical.corners, u) - hole
-        vertices = np.concatenate([hexahedron.points(self.outer.corners, u), hole])
-        mesh = ClosedMesh(vertices, np.concatenate([triangles, triangles[:, ::-1] + len(u)]))
-        return mesh, np.concatenate([np.zeros_like(moved), moved])
+        vertices = np.concatenate([hexahedron.points(self.outer.corners, w), hole])
+        mesh = ClosedMesh(vertices, np.concatenate([outer, inner[:, ::-1] + len(w)]))
+        return mesh, np.concatenate([np.zeros_like(w), moved])
 
     def to_canonical(self, points: Array) -> tuple[Array, Array]:
         """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3] in the shell."""

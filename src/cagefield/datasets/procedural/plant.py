@@ -66,7 +66,7 @@ def _plant() -> Part:
 
 
 def _flower() -> Part:
-    center = np.array([POT_X + 0.03, POT_Y, TABLE_Z + 1.12])
+    center = np.array([POT_X + 0.03, POT_Y, TABLE_Z + 1.27])
     face = place(center, (0, 35, -40))
     petals = [
         face @ place((0, 0, 0), (0, 0, k * 40)) @ place((0.12, 0, 0.015), (0, -15, 0)) for k in range(9)
