@@ -61,6 +61,7 @@ def _plant() -> Part:
     return part(
         "plant",
         tube([(POT_X + x, POT_Y, top + z - 0.02) for x, z in stem], 0.022, Plain(hexcolor("#5d7a36"))),
+        tube([(POT_X + 0.03, POT_Y, TABLE_Z + z) for z in (1.0, 1.15)], 0.018, Plain(hexcolor("#5d7a36"))),
         posed(leaf, Veined(hexcolor("#3f8f3a"), hexcolor("#a9cf6b"), 0.46), leaves),
     )
 
@@ -73,7 +74,7 @@ def _flower() -> Part:
     ]
     return part(
         "flower",
-        tube([(POT_X + 0.03, POT_Y, TABLE_Z + 1.03), tuple(center)], 0.018, Plain(hexcolor("#5d7a36"))),
+        tube([(POT_X + 0.03, POT_Y, TABLE_Z + 1.17), tuple(center)], 0.018, Plain(hexcolor("#5d7a36"))),
         posed(Leaf(0.2, 0.1, 0.01, bend=0.8), Veined(hexcolor("#e4568a"), hexcolor("#f7b4cb"), 0.2), petals),
         posed(
             Sphere(),
