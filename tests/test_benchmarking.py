@@ -113,8 +113,8 @@ def test_cages_hold_one_part_and_it_lands_where_nothing_is(one: Case) -> None:
     scene = procedural_scene(one.scene)
     low, high = scene.part_bounds(part)
     inside = solids(scene, np.stack([low, high]))[part]
-    # The rest of a part is sunk in its neighbour, where no camera sees it: the arm rest's post in the seat.
-    assert edit.inner.contains(inside).mean() > 0.93
+    # The rest of a part is out of sight, sunk in its neighbour or, of the cushion, the side it lies on.
+    assert edit.inner.contains(inside).mean() > 0.92
     held = {name: int(edit.inner.contains(p).sum()) for name, p in solids(scene, edit.inner.aabb).items()}
     assert sum(held.values()) - held[part] < 0.02 * held[part]
     if motion is not None:

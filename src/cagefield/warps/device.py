@@ -137,6 +137,11 @@ class DeviceStack:
             array.setflags(write=False)
         return packed
 
+    @property
+    def flows(self) -> bool:
+        """True where some edit's shell is an exact flow."""
+        return bool((self.params[:, FLOW] > 0.0).any())
+
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
@@ -146,7 +151,7 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            _map_samples(samples, out, self.params, self.lattice, self.n_edits)
+            _map_samples(samples, out, self.params, self.lattice, self.n_edits, self.flows)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 
@@ -166,10 +171,18 @@ def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) ->
 
 
 @qd.func
-def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
+def map_sample(
+    p: vec3,
+    d: vec3,
+    params: qd.template(),
+    lattice: qd.template(),
+    n_edits: qd.i32,
+    flows: qd.template(),
+):
     """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
 
-    An emptied sample is returned where it was when it was found empty.
+    An emptied sample is returned where it was when it was found empty. `flows` is `DeviceStack.flows`: code
+    that integrates a flow, which takes seconds to compile, is in a kernel only where it is needed.
     """
     q = p
     v = d
@@ -177,12 +190,14 @@ def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), 
     for n in range(n_edits):
         e = n_edits - 1 - n
         if emptied == 0 and in_box(q, params, e, BOX):
-            q, v, emptied = map_edit(q, v, params, lattice, e)
+            q, v, emptied = map_edit(q, v, params, lattice, e, flows)
     return q, v, emptied
 
 
 @qd.func
-def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32):
+def map_edit(
+    p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, flows: qd.template()
+):
     """(canonical point, J d, emptied) of a sample through edit e alone."""
     first = qd.cast(params[e, FIRST], qd.i32)
     last = qd.cast(params[e, LAST], qd.i32)
@@ -241,7 +256,8 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif use_flow == 1:
-        q, v = flow_sample(p, d, lattice, first_entry(params, e))
+        if qd.static(flows):
+            q, v = flow_sample(p, d, lattice, first_entry(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
@@ -427,10 +443,12 @@ def displacement(at: vec3, s: vec3, lattice: qd.template(), first: qd.i32, resol
 
 
 @qd.kernel
-def _map_samples(samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32):
+def _map_samples(
+    samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32, flows: qd.template()
+):
     for i in range(samples.shape[0]):
         d = read3(samples, i, 3)
-        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits)
+        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
         stretch = 1.0
         if (v - d).norm() > 0.0:
             stretch = v.norm()
@@ -448,7 +466,7 @@ def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, fra
         j = (n // resolution) % resolution
         k = n // (resolution * resolution)
         p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
-        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0)
+        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
         nodes[n] = q - p
 
 
