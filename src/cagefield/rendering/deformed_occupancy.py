@@ -187,9 +187,9 @@ def probe(
         if contracted == 1:
             d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
         length = qd.max(d.norm(), 1e-20)
-        q, v, stretch, emptied = map_sample(p, d / length, params, lattice, n_edits)
+        q, v, emptied = map_sample(p, d / length, params, lattice, n_edits)
         empty = emptied
-        along = v * stretch * length * scale
+        along = v * length * scale
         image = (q - origin) * scale
         if contracted == 1:
             along = contract_velocity(image, along) * half

@@ -9,6 +9,7 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 
 import quadrants as qd
 
+from cagefield.rendering.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -22,7 +23,7 @@ from cagefield.rendering.grid import (
     sh_basis,
     vec3,
 )
-from cagefield.rendering.traverse import empty_run, safe_inverse, slab
+from cagefield.rendering.traverse import empty_run, is_occupied, safe_inverse, slab
 from cagefield.warps.device import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
@@ -53,6 +54,8 @@ def march_tiles(
     with_normals: qd.i32,
     boxes: F32,
     n_boxes: qd.i32,
+    canonical_codes: I32,
+    canonical_dims: ivec3,
     params: Params,
     lattice: Nodes,
     n_edits: qd.i32,
@@ -94,6 +97,7 @@ def march_tiles(
                 t_end = hit.y
             edit_in = 1e30
             edit_out = -1e30
+            ray = EditedRay(edit=-1)
             if qd.static(edited):
                 world = safe_inverse(d)
                 for k in range(n_boxes):
@@ -107,6 +111,8 @@ def march_tiles(
                     if through.x <= through.y:
                         edit_in = qd.min(edit_in, through.x)
                         edit_out = qd.max(edit_out, through.y)
+                if edit_in <= edit_out:
+                    ray = edited_ray(origin, d, params, n_edits)
             T = 1.0
             rgb = vec3(0.0, 0.0, 0.0)
             normal = vec3(0.0, 0.0, 0.0)
@@ -136,20 +142,21 @@ def march_tiles(
                     else:
                         t += (qd.floor(run / step) + 1.0) * step
                 else:
-                    stretch = 1.0
                     moved = 0
                     alive = 1
                     view = d
                     if qd.static(edited):
                         if t >= edit_in and t <= edit_out:
                             p = origin + t * d
-                            canonical, view, stretch, emptied = map_sample(p, d, params, lattice, n_edits)
+                            canonical, view, emptied, moved = map_along(
+                                ray, t, p, d, params, lattice, n_edits
+                            )
                             if emptied == 1:
                                 alive = 0
-                            if qd.abs(canonical - p).max() > 0.0:
-                                moved = 1
+                            if moved == 1:
                                 g = to_grid(canonical, lower, scale, half, contracted)
-                                if g.min() < 0.0 or (g - qd.cast(resolution - 1, qd.f32)).max() > 0.0:
+                                outside = g.min() < 0.0 or (g - qd.cast(resolution - 1, qd.f32)).max() > 0.0
+                                if outside or not is_occupied(canonical_codes, g, canonical_dims):
                                     alive = 0
                     if alive == 1:
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
@@ -158,8 +165,9 @@ def march_tiles(
                         b = corner_weights(f)
                         raw = gather_density(density, slots, b)
                         if raw > 0.0:
-                            if preserve_opacity == 1:
-                                raw *= stretch
+                            if qd.static(edited):
+                                if preserve_opacity == 1 and moved == 1:
+                                    raw *= view.norm()
                             keep = qd.exp(-raw * h)
                             w = T * (1.0 - keep)
                             T *= keep
@@ -167,7 +175,7 @@ def march_tiles(
                                 seen = basis
                                 if qd.static(edited):
                                     if moved == 1:
-                                        seen = sh_basis(view, K)
+                                        seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
                                 c = gather_rgb(sh, slots, b, seen, K)
                                 rgb += w * qd.max(qd.min(c, 1.0), 0.0)
                                 depth += w * t
@@ -224,8 +232,8 @@ def through_edits(slope: vec3, p: vec3, params: qd.template(), lattice: qd.templ
             axis.y = 1.0
         else:
             axis.z = 1.0
-        _q, v, stretch, _emptied = map_sample(p, axis, params, lattice, n_edits)
-        along = slope.dot(v) * stretch
+        _q, v, _emptied = map_sample(p, axis, params, lattice, n_edits)
+        along = slope.dot(v)
         if a == 0:
             out.x = along
         elif a == 1:

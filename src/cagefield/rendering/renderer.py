@@ -39,7 +39,7 @@ class Renderer:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
         devices.start()
         from cagefield.rendering import occupancy
-        from cagefield.rendering.grid import DeviceGrid
+        from cagefield.rendering.grid import DeviceGrid, to_device
 
         self.field = field
         self.edits = edits if edits is not None else EditStack([])
@@ -47,6 +47,7 @@ class Renderer:
         self.preserve_opacity = preserve_opacity
         self._grid = grid if grid is not None else DeviceGrid.from_field(field)
         self._canonical = occupancy.of_field(field)
+        self._canonical_codes = to_device(self._canonical.codes)
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: tuple[NDArray[np.float32], Any] | None = None
         self._pack_edits()
@@ -125,6 +126,8 @@ class Renderer:
                 int(normals),
                 self._boxes,
                 len(self._stack.boxes),
+                self._canonical_codes,
+                ivec3(*self._canonical.codes.shape),
                 self._stack.params,
                 self._stack.lattice,
                 self._stack.n_edits,

@@ -28,13 +28,6 @@ def safe_inverse(d: vec3):
 
 
 @qd.func
-def brick_code(codes: qd.template(), cell: ivec3, origin: ivec3, dims: ivec3):
-    """The code of the brick that holds a cell; cells outside the brick grid take the nearest brick."""
-    b = qd.max(qd.min((cell - origin) >> 2, dims - 1), 0)
-    return codes[(b.x * dims.y + b.y) * dims.z + b.z]
-
-
-@qd.func
 def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims: ivec3):
     """The ray parameter to the exit of the empty block around grid coordinates g; -1 where it is occupied."""
     cell = qd.cast(qd.floor(g), qd.i32) - origin
@@ -58,3 +51,13 @@ def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims:
         c = (lo + qd.cast(size, qd.f32) - g) * inverse
         run = qd.max(qd.max(a, c).min(), 0.0)
     return run
+
+
+@qd.func
+def is_occupied(codes: qd.template(), g: vec3, dims: ivec3):
+    """True where the sub-block around grid coordinates g is occupied; the brick grid begins at 0."""
+    cell = qd.cast(g, qd.i32)
+    b = qd.min(cell >> 2, dims - 1)
+    code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
+    s = (cell >> 1) & 1
+    return code < 256 and (code >> (s.x * 4 + s.y * 2 + s.z)) & 1 == 1

@@ -41,12 +41,13 @@ Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
 FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
 CONTINUOUS = 8  # 1, or 0 for a discrete edit
-RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly
-OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no further than 2^24
+RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
+FLOW = -1.0
+OFFSET = 10  # first lattice node, or entry of the flow's table, as 65536 * [10] + [11]: a float32 counts no further than 2^24
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
-FLOW = 31  # 1 where the shell is an exact flow, whose table is in `lattice` at the offset [10], [11]
+ALONE = 31  # 1 where no earlier edit reaches into the edit's box
 RECORDS = 32
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
@@ -106,7 +107,8 @@ class DeviceStack:
         params = np.zeros((max(len(edits), 1), WIDTH), dtype=np.float32)
         lattices: list[NDArray[np.float32]] = []
         offset = 0
-        for row, edit in zip(params, edits, strict=False):
+        for number, edit in enumerate(edits):
+            row = params[number]
             _pack(row, edit)
             warp = edit.exact_warp
             if edit.lattice is not None and isinstance(warp, ContinuousWarp):
@@ -117,7 +119,7 @@ class DeviceStack:
                 row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
             elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
                 nodes = _kept(_tables, edit, partial(flow_device.table, warp.shell))
-                row[FLOW] = 1.0
+                row[RESOLUTION] = FLOW
             else:
                 continue
             row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
@@ -126,6 +128,8 @@ class DeviceStack:
         nodes = np.zeros((1, 3), dtype=np.float32)
         if lattices:
             nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
+        for number in range(len(edits)):
+            params[number, ALONE] = not _meets(params[:number], params[number])
         boxes = np.concatenate([np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits])
         packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
@@ -153,33 +157,27 @@ class _One:
 
 
 def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
-    """Distances [N], world units, between an edit's map with and without its lattice at deformed points [N,3]."""
+    """Distances [N], world units, between an edit's map with and without its lattice at points [N,3]."""
     p = points.astype(np.float32)
-    d = np.broadcast_to(np.float32([1.0, 0.0, 0.0]), p.shape)
+    d = np.tile(np.array([1.0, 0.0, 0.0], dtype=np.float32), (len(p), 1))
     maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
     return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
 
 
 @qd.func
 def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
-    """(canonical point, canonical unit view direction, stretch |J d|, emptied 0 or 1) of a deformed sample.
+    """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
 
-    d is unit. An emptied sample is returned where it was when it was found empty.
+    An emptied sample is returned where it was when it was found empty.
     """
     q = p
     v = d
-    stretch = 1.0
     emptied = 0
-    mapped = 0
     for n in range(n_edits):
         e = n_edits - 1 - n
         if emptied == 0 and in_box(q, params, e, BOX):
             q, v, emptied = map_edit(q, v, params, lattice, e)
-            mapped = 1
-    if mapped == 1:
-        stretch = v.norm()
-        v = v / qd.max(stretch, 1e-20)
-    return q, v, stretch, emptied
+    return q, v, emptied
 
 
 @qd.func
@@ -234,7 +232,7 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
                 elif resolution > 0:
                     use_lattice = 1
                     break
-                elif params[e, FLOW] > 0.5:
+                elif resolution < 0:
                     use_flow = 1
                     break
     q = p
@@ -242,16 +240,10 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif use_flow == 1:
-        q, v = flow_sample(p, d, lattice, first_entry(params, e))
+        q, v = flow_sample(p, d, lattice, first_node(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
-
-
-@qd.func
-def first_entry(params: qd.template(), e: qd.i32):
-    """Where edit e's nodes or table begin in `lattice`."""
-    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
@@ -390,13 +382,25 @@ def interpolate(
     p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, resolution: qd.i32
 ):
     """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
-    g = to_nodes(p, params, e)
     s = times(params, e, TO_NODES + 3, d)
+    u, along = displacement(to_nodes(p, params, e), s, lattice, first_node(params, e), resolution)
+    return p + u, d + along
+
+
+@qd.func
+def first_node(params: qd.template(), e: qd.i32):
+    """The place of edit e's first lattice node, or of its flow's table."""
+    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
+
+
+@qd.func
+def displacement(at: vec3, s: vec3, lattice: qd.template(), first: qd.i32, resolution: qd.i32):
+    """(displacement, derivative along s) in the lattice that begins at node `first`; at, s in node units."""
     top = qd.cast(resolution - 1, qd.f32)
-    g = qd.max(qd.min(g, top), 0.0)
+    g = qd.max(qd.min(at, top), 0.0)
     cell = qd.min(qd.cast(g, qd.i32), resolution - 2)
     f = g - qd.cast(cell, qd.f32)
-    n = first_entry(params, e) + (cell.z * resolution + cell.y) * resolution + cell.x
+    n = first + (cell.z * resolution + cell.y) * resolution + cell.x
     plane = resolution * resolution
     v000 = lattice[n]
     v010 = lattice[n + resolution]
@@ -416,20 +420,22 @@ def interpolate(
     z1 = w01 + f.y * y1
     x0 = x00 + f.y * (x10 - x00)
     x1 = x01 + f.y * (x11 - x01)
-    q = p + z0 + f.z * (z1 - z0)
-    v = d + s.x * (x0 + f.z * (x1 - x0)) + s.y * (y0 + f.z * (y1 - y0)) + s.z * (z1 - z0)
-    return q, v
+    u = z0 + f.z * (z1 - z0)
+    along = s.x * (x0 + f.z * (x1 - x0)) + s.y * (y0 + f.z * (y1 - y0)) + s.z * (z1 - z0)
+    return u, along
 
 
 @qd.kernel
 def _map_samples(samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32):
     for i in range(samples.shape[0]):
-        p, d, stretch, emptied = map_sample(
-            read3(samples, i, 0), read3(samples, i, 3), params, lattice, n_edits
-        )
+        d = read3(samples, i, 3)
+        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits)
+        stretch = 1.0
+        if (v - d).norm() > 0.0:
+            stretch = v.norm()
         for a in qd.static(range(3)):
-            out[i, a] = p[a]
-            out[i, 3 + a] = d[a]
+            out[i, a] = q[a]
+            out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
         out[i, 6] = stretch
         out[i, 7] = qd.cast(emptied, qd.f32)
 
@@ -549,6 +555,13 @@ def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array |
     row[at : at + RECORD] = np.concatenate(
         [[affine], W.ravel(), C[0], y.min(axis=0) - slack, y.max(axis=0) + slack, bend.ravel(), D.ravel()]
     )
+
+
+def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
+    """True where the box of one of the other rows meets that of `row`."""
+    low, high = row[BOX : BOX + 3], row[BOX + 3 : BOX + 6]
+    meets = (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low)
+    return bool(meets.all(axis=1).any())
 
 
 def _widened(boxes: Array) -> Array:

@@ -1,0 +1,121 @@
+"""One edit along a whole ray: where the edit is affine and shown by a lattice, so is the ray in it.
+
+A ray that meets one edit only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
+`cagefield.warps.device`), runs straight through the inner region also in canonical space, and straight
+through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
+multiplication in the inner region and one lattice lookup in the shell.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+from cagefield.rendering.grid import vec3
+from cagefield.rendering.traverse import safe_inverse, slab, vec2
+from cagefield.warps.device import (
+    ALONE,
+    BOX,
+    CENTRE,
+    EDGE,
+    MATRIX,
+    NODE_BOX,
+    RECORDS,
+    RESOLUTION,
+    SIMPLE,
+    TO_NODES,
+    displacement,
+    first_node,
+    image,
+    map_sample,
+    read3,
+    times,
+    to_nodes,
+)
+
+EditedRay = qd.types.struct(
+    edit=qd.i32,
+    resolution=qd.i32,
+    first=qd.i32,
+    inner=vec2,
+    outer=vec2,
+    canonical=vec3,
+    velocity=vec3,
+    node=vec3,
+    node_velocity=vec3,
+)
+"""A ray o + t d in deformed space, in the one simple edit that it meets.
+
+edit: its number, or -1 where samples must be mapped one by one; resolution, first: its lattice; inner, outer:
+[t_in, t_out] in the inner region and in the outer cage; canonical + t velocity: the inner region's samples in
+canonical space; node + t node_velocity: the ray in node units of the lattice.
+"""
+
+
+@qd.func
+def edited_ray(origin: vec3, d: vec3, params: qd.template(), n_edits: qd.i32):
+    """The `EditedRay` of a ray with unit direction d."""
+    ray = EditedRay(edit=-1)
+    inverse = safe_inverse(d)
+    met = 0
+    e = -1
+    for n in range(n_edits):
+        through = slab(origin, inverse, read3(params, n, BOX), read3(params, n, BOX + 3))
+        if through.x <= through.y:
+            met += 1
+            e = n
+    if met == 1:  # noqa: SIM102  a kernel's `and` would read params[-1]
+        if params[e, SIMPLE] > 0.5 and params[e, ALONE] > 0.5:
+            ray.edit = e
+            ray.resolution = qd.cast(params[e, RESOLUTION], qd.i32)
+            ray.first = first_node(params, e)
+            at = RECORDS
+            xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
+            xi_velocity = times(params, e, at + MATRIX, d)
+            one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
+            ray.inner = slab(xi, safe_inverse(xi_velocity), -one, one)
+            q, v = image(xi, d, params, e, at)
+            ray.canonical = q
+            ray.velocity = v
+            ray.node = to_nodes(origin, params, e)
+            ray.node_velocity = times(params, e, TO_NODES + 3, d)
+            ray.outer = slab(
+                ray.node,
+                safe_inverse(ray.node_velocity),
+                read3(params, e, NODE_BOX),
+                read3(params, e, NODE_BOX + 3),
+            )
+    return ray
+
+
+@qd.func
+def map_along(
+    ray: qd.template(),
+    t: qd.f32,
+    p: vec3,
+    d: vec3,
+    params: qd.template(),
+    lattice: qd.template(),
+    n_edits: qd.i32,
+):
+    """As `map_sample` for p = o + t d on the ray, and 1 where p was moved, else 0."""
+    q = p
+    v = d
+    emptied = 0
+    moved = 0
+    if ray.edit >= 0:
+        if t >= ray.inner.x and t <= ray.inner.y:
+            q = ray.canonical + t * ray.velocity
+            v = ray.velocity
+            moved = 1
+        elif t >= ray.outer.x and t <= ray.outer.y:
+            u, along = displacement(
+                ray.node + t * ray.node_velocity, ray.node_velocity, lattice, ray.first, ray.resolution
+            )
+            q = p + u
+            v = d + along
+            moved = 1
+    else:
+        q, v, emptied = map_sample(p, d, params, lattice, n_edits)
+        if qd.abs(q - p).max() > 0.0:
+            moved = 1
+    return q, v, emptied, moved
