@@ -43,7 +43,7 @@ FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
 CONTINUOUS = 8  # 1, or 0 for a discrete edit
 RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
 FLOW = -1.0
-OFFSET = 10  # first lattice node, or entry of the flow's table, as 65536 * [10] + [11]: a float32 counts no further than 2^24
+OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a float32 counts to 2^24 only
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
