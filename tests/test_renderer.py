@@ -103,9 +103,11 @@ EDITS = {
     "two": EditStack(
         [
             Edit(INNER, adjustment="discrete").rotate((0, 0, 0.8)).translate((0, -0.5, 0)),
-            Edit(Cage.box((0, -0.4, 0.1), (0.9, 0.9, 0.9)), Cage.box((0, -0.4, 0.1), (1.8, 1.8, 1.8))).scale(
-                1.3
-            ),
+            Edit(
+                Cage.box((0, -0.4, 0.1), (0.9, 0.9, 0.9)),
+                Cage.box((0, -0.4, 0.1), (1.8, 1.8, 1.8)),
+                shell="trilinear",
+            ).scale(1.3),
         ]
     ),
 }
@@ -155,7 +157,9 @@ def test_normals_face_outwards_on_a_ball_and_follow_an_edit():
     cosine = np.einsum("nc,nc->n", outward, frame.normals.reshape(-1, 3))[facing]
     assert facing.sum() > 30
     assert cosine.min() > 0.97  # a soft ball on a grid of 49: within 14 degrees
-    turned = EditStack([Edit(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9)).scale(1.1)])
+    turned = EditStack(
+        [Edit(Cage.box((0, 0, 0), 1.3), Cage.box((0, 0, 0), 1.9), shell="trilinear").scale(1.1)]
+    )
     after = Renderer(field, turned, step=0.25).render(CAMERA, normals=True)
     both = (after.opacity.ravel() > 0.99) & facing
     assert np.einsum("nc,nc->n", outward, after.normals.reshape(-1, 3))[both].mean() > 0.97

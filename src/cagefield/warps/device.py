@@ -42,14 +42,14 @@ Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
 FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
 CONTINUOUS = 8  # 1, or 0 for a discrete edit
-RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly
-OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no further than 2^24
+RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
+FLOW = -1.0
+OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a float32 counts to 2^24 only
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
-FLOW = 31  # 1 where the shell is an exact flow, whose table is in `lattice` at the offset [10], [11]
-ALONE = 32  # 1 where no earlier edit reaches into the edit's box
-RECORDS = 33
+ALONE = 31  # 1 where no earlier edit reaches into the edit's box
+RECORDS = 32
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
@@ -120,7 +120,7 @@ class DeviceStack:
                 row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
             elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
                 nodes = _kept(_tables, edit, partial(flow_device.table, warp.shell))
-                row[FLOW] = 1.0
+                row[RESOLUTION] = FLOW
             else:
                 continue
             row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
@@ -158,9 +158,9 @@ class _One:
 
 
 def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
-    """Distances [N], world units, of an edit's map without and with its lattice at deformed points [N,3]."""
+    """Distances [N], world units, between an edit's map with and without its lattice at points [N,3]."""
     p = points.astype(np.float32)
-    d = np.broadcast_to(np.array([1.0, 0.0, 0.0], np.float32), p.shape)
+    d = np.tile(np.array([1.0, 0.0, 0.0], dtype=np.float32), (len(p), 1))
     maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
     return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
 
@@ -233,7 +233,7 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
                 elif resolution > 0:
                     use_lattice = 1
                     break
-                elif params[e, FLOW] > 0.5:
+                elif resolution < 0:
                     use_flow = 1
                     break
     q = p
@@ -241,16 +241,10 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif use_flow == 1:
-        q, v = flow_sample(p, d, lattice, first_entry(params, e))
+        q, v = flow_sample(p, d, lattice, first_node(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
-
-
-@qd.func
-def first_entry(params: qd.template(), e: qd.i32):
-    """Where edit e's nodes or table begin in `lattice`."""
-    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
@@ -390,8 +384,14 @@ def interpolate(
 ):
     """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
     s = times(params, e, TO_NODES + 3, d)
-    u, along = displacement(to_nodes(p, params, e), s, lattice, first_entry(params, e), resolution)
+    u, along = displacement(to_nodes(p, params, e), s, lattice, first_node(params, e), resolution)
     return p + u, d + along
+
+
+@qd.func
+def first_node(params: qd.template(), e: qd.i32):
+    """The place of edit e's first lattice node, or of its flow's table."""
+    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
