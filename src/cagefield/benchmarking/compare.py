@@ -16,7 +16,7 @@ import numpy as np
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.distortion import Distortion, distortion, shell_points
 from cagefield.benchmarking.figures import Figures, Pictures, compare, stacked
-from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known
+from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
 from cagefield.cameras import Camera
@@ -68,6 +68,11 @@ def measure(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -> 
         CagefieldError: an unknown method.
     """
     check_known(methods)
+    with peers():
+        yield from _measured(cases, methods, bench)
+
+
+def _measured(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -> Iterator[Comparison]:
     maps: dict[tuple[str, str, str], Distortion] = {}
     for case in cases:
         if case.kind != "continuous":

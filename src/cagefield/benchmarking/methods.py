@@ -1,12 +1,12 @@
 """Ways to fill the shell of a continuous edit, by name: ours, the paper's, and stand-ins for the peers'.
 
-Importing this module adds the peers to `warps.SHELLS`, so that an edit takes them by name, is evaluated and
-rendered with them. Only benchmarks do.
+Within `peers()` an edit takes the peers' shells by name, and is evaluated and rendered with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,7 +26,17 @@ def _as_shell(name: str) -> Callable[[Cage, Cage, Cage, Falloff], Shell]:
     return build
 
 
-SHELLS.update({name: _as_shell(name) for name in PEERS})
+@contextmanager
+def peers() -> Iterator[None]:
+    """A context in which the peers are in `warps.SHELLS`, for edits that are made and evaluated there."""
+    added = {name: _as_shell(name) for name in PEERS if name not in SHELLS}
+    SHELLS.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            del SHELLS[name]
+
 
 PEER_LATTICE = 96
 """Nodes an axis of the lattice from which fields are rendered with a peer's map: it has no kernel."""
@@ -40,7 +50,7 @@ class Method:
     lattice: int | None = None
 
     def of(self, edit: Edit) -> Edit:
-        """The edit with this method in its shell; a discrete edit stays as it is."""
+        """The edit with this method in its shell; a discrete edit stays as it is. Peers: within `peers`."""
         if edit.adjustment == "discrete":
             return edit
         falloff = {} if self.shell == "flow" else {"falloff": "smooth", "width": 1.0}
@@ -84,7 +94,8 @@ def exact_map(name: str, edit: Edit) -> BackwardMap:
     check_known((name,), MAPS)
     if edit.adjustment != "continuous":
         raise CagefieldError(f'edit "{edit.name}" is discrete and has no shell; choose a continuous edit')
-    return Method(name).of(edit).exact_warp
+    with peers():
+        return Method(name).of(edit).exact_warp
 
 
 def check_known(names: Sequence[str], known: Sequence[str] = tuple(METHODS)) -> None:

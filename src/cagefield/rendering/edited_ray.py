@@ -24,7 +24,7 @@ from cagefield.warps.device import (
     SIMPLE,
     TO_NODES,
     displacement,
-    first_entry,
+    first_node,
     image,
     map_sample,
     read3,
@@ -67,7 +67,7 @@ def edited_ray(origin: vec3, d: vec3, params: qd.template(), n_edits: qd.i32):
         if params[e, SIMPLE] > 0.5 and params[e, ALONE] > 0.5:
             ray.edit = e
             ray.resolution = qd.cast(params[e, RESOLUTION], qd.i32)
-            ray.first = first_entry(params, e)
+            ray.first = first_node(params, e)
             at = RECORDS
             xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
             xi_velocity = times(params, e, at + MATRIX, d)

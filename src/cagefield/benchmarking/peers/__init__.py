@@ -48,8 +48,7 @@ class PeerShell:
 
     def to_deformed(self, points: Array) -> tuple[Array, Array]:
         """Raises EditError: the map back is all there is."""
-        name, count = type(self.backward).__name__, len(points)
-        raise EditError(f'a {name} has no map to deformed space, for {count} points; use shell="flow"')
+        raise EditError(f'a {type(self.backward).__name__} has no map to deformed space; use shell="flow"')
 
     def least_ratio(self) -> float:
         """Least det J of the map's inverse over 20,000 points of the shell; <= 0 where the map folds."""
