@@ -12,7 +12,7 @@ import numpy as np
 from cagefield.benchmarking.cases import Case, relit
 from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen
 from cagefield.benchmarking.distortion import Distortion, distortion
-from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, pooled_psnr
+from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, mean_psnr, pooled_psnr
 from cagefield.benchmarking.figures import changed_pixels as changed
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import Table, number
@@ -38,7 +38,7 @@ _EYES = {
 _COLUMNS = (
     "scene", "edit", "kind", "truth", "views", "PSNR unedited", "PSNR edited", "PSNR lost", "SSIM unedited",
     "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
-    "there carried", "frame time", "min det J", "max stretch", "map time",
+    "there carried", "unseen", "lost, seen", "frame time", "min det J", "max stretch", "map time",
 )  # fmt: skip
 _LPIPS = ("LPIPS unedited", "LPIPS edited")
 _SHOWN = (
@@ -53,6 +53,8 @@ class Score:
 
     `frame_ratio` is the time of an edited frame over that of an unedited one. Only a continuous edit has a
     distortion and a time of its map; `lpips` is that of the unedited and the edited pictures, where measured.
+    Of a discrete edit, `unseen` is the share of pixels that show what no training photo showed, and
+    `lost_seen` the PSNR lost on the others.
     """
 
     case: Case
@@ -65,6 +67,8 @@ class Score:
     distortion: Distortion | None = None
     time: MapTime | None = None
     lpips: tuple[float, float] | None = None
+    unseen: float = float("nan")
+    lost_seen: float = float("nan")
 
 
 def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
@@ -78,7 +82,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
         edited = scene.with_edits(case.edits)
         ratio = frame_ratio(scene, edited)
         cameras = scene.cameras["test"]
-        carried = float("nan")
+        carried = hidden = lost_seen = float("nan")
         measured, taken = None, None
         if case.kind == "continuous":
             edit = continuous(case)
@@ -94,13 +98,28 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
         if truth not in unedited:
             unedited[truth] = seen(scene, cameras)
         shown = seen(edited, cameras)
-        if case.moved is not None and relit(case.moved(procedural_scene(name))):
+        if case.moved is not None:
             there = changed(before, after)
-            carried = pooled_psnr(shown, bench.moved(case, cameras, carried=True), there)
+            if relit(case.moved(procedural_scene(name))):
+                carried = pooled_psnr(shown, bench.moved(case, cameras, carried=True), there)
+            known = ~bench.unseen(case, cameras, there)
+            hidden = 1.0 - float(known.mean())
+            lost_seen = mean_psnr(unedited[truth], before, known) - mean_psnr(shown, after, known)
         figures = compare(unedited[truth], shown, before, after)
         both = (perceived(unedited[truth], before), perceived(shown, after)) if perceived else None
         yield Score(
-            case, truth, len(cameras), cameras[0].width, figures, carried, ratio, measured, taken, both
+            case,
+            truth,
+            len(cameras),
+            cameras[0].width,
+            figures,
+            carried,
+            ratio,
+            measured,
+            taken,
+            both,
+            hidden,
+            lost_seen,
         )
 
 
@@ -132,6 +151,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "There: on the pixels that the edit changes in truth, and a margin of a 100th of the width; if left: "
         "what the field without the edit would reach there; carried: against parts that keep the light they "
         "had, as an edited field does (where a part was turned).",
+        "Unseen: pixels that show a surface that no training photo showed, such as the ground under a part "
+        "that is moved away; lost, seen: the PSNR lost on all other pixels.",
         "Frame time: edited over unedited, median of frames taken in turn.",
         "Min det J: least volume ratio over the shell of a continuous edit, of its map or the inverse; max "
         "stretch: largest factor by which a length grows or shrinks; map time: for a million points, in the "
@@ -139,15 +160,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
     ]
     perceived = any(score.lpips is not None for score in scores)
     explained += [] if perceived else [lpips()[1]]
-    lost = [score.figures.lost for score in scores]
-    there = [
-        score.figures.there_lost for score in scores if score.figures.there_lost == score.figures.there_lost
-    ]
-    if lost:
-        explained.append(
-            f"Mean of the PSNR lost: {number(float(np.mean(lost)))} dB over {len(lost)} edits"
-            + (f", there {number(float(np.mean(there)))} dB." if there else ".")
-        )
+    explained += _means(scores)
     return Table(
         "Edits against ground truth",
         _COLUMNS + (_LPIPS if perceived else ()),
@@ -156,6 +169,21 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         names=4,
         shown=_SHOWN,
     )
+
+
+def _means(scores: Sequence[Score]) -> Iterator[str]:
+    """The mean of the PSNR lost by continuous edits, and by discrete ones."""
+    for what in ("continuous", "discrete"):
+        chosen = [score for score in scores if (score.case.kind == "continuous") == (what == "continuous")]
+        if not chosen:
+            continue
+        lost = float(np.mean([score.figures.lost for score in chosen]))
+        text = f"Mean of the PSNR lost, {what} edits: {number(lost)} dB over {len(chosen)} edits"
+        if what == "discrete":
+            text += (
+                f", {number(float(np.mean([score.lost_seen for score in chosen])))} dB on what photos showed"
+            )
+        yield text + "."
 
 
 def _row(score: Score, perceived: bool) -> tuple[str, ...]:
@@ -178,6 +206,8 @@ def _row(score: Score, perceived: bool) -> tuple[str, ...]:
         number(figures.there_lost),
         number(figures.there_if_left),
         number(score.there_carried),
+        "-" if np.isnan(score.unseen) else f"{100 * score.unseen:.2f}%",
+        number(score.lost_seen),
         f"x{score.frame_ratio:.2f}",
         "-" if measured is None else number(measured.least_det),
         "-" if measured is None else number(measured.stretch),

@@ -81,9 +81,15 @@ def pooled_psnr(first: Pictures, second: Pictures, mask: NDArray[np.bool_]) -> f
     return psnr(floats(first)[mask], floats(second)[mask])
 
 
-def mean_psnr(pictures: Pictures, truth: Pictures) -> float:
-    """Mean over views of the PSNR; inf only where all views are equal to the truth."""
-    errors = np.array([mse(floats(a), floats(b)) for a, b in zip(pictures, truth, strict=True)])
+def mean_psnr(pictures: Pictures, truth: Pictures, where: NDArray[np.bool_] | None = None) -> float:
+    """Mean over views of the PSNR, of the pixels in the mask `where` [V,H,W] if one is given.
+
+    inf only where all views are equal to the truth. A view without a pixel in the mask is passed over.
+    """
+    masks = np.ones(pictures.shape[:3], bool) if where is None else where
+    errors = np.array(
+        [mse(floats(a)[m], floats(b)[m]) for a, b, m in zip(pictures, truth, masks, strict=True) if m.any()]
+    )
     if not errors.any():
         return float("inf")
     # A view that is exactly right counts as one that is right to half an 8-bit level.

@@ -27,6 +27,7 @@ from cagefield.benchmarking.exact import exact
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
+from cagefield.datasets.procedural.visibility import unseen
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
@@ -36,6 +37,7 @@ from cagefield.scene import Scene
 from cagefield.training.voxel import VoxelConfig, train_voxel
 
 UInt8 = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
 Move = Callable[[float, float, str], None]
 Bar = Callable[[str], AbstractContextManager[Move]]
 
@@ -173,6 +175,23 @@ class Workbench:
         key = digest([case.scene, case.name, carried, _poses(cameras)], (*_MODELLED, "benchmarking/cases.py"))
         what = f"{case.scene}, {case.name}: photos of the truth"
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
+
+    def unseen(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
+        """Pixels [V,H,W] of `moved` that show what none of the scene's photos showed; only those in `where`."""
+        if case.moved is None:
+            raise CagefieldError(f"no part of {case.scene} is moved by {case.name}")
+        scene = procedural_scene(case.scene)
+        moved, photos = case.moved(scene), self.scene(case.scene).cameras["train"]
+        key = digest(
+            ["unseen", case.scene, case.name, _poses(cameras), _poses(photos)],
+            (*_MODELLED, "benchmarking/cases.py"),
+        )
+        masks = (
+            unseen(moved, camera, scene, photos, mask).astype(np.uint8)
+            for camera, mask in zip(cameras, where, strict=True)
+        )
+        what = f"{case.scene}, {case.name}: what no photo showed"
+        return self._kept(case.scene, key, what, lambda: masks, len(cameras)).astype(bool)
 
     def modelled(self, name: str, cameras: Sequence[Camera]) -> UInt8:
         """Photos [V,H,W,3] of a built-in scene as it is, over white."""
