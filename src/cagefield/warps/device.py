@@ -257,14 +257,14 @@ def map_edit(
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif use_flow == 1:
         if qd.static(flows):
-            q, v = flow_sample(p, d, lattice, first_entry(params, e))
+            q, v = flow_sample(p, d, lattice, first_node(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
     return q, v, emptied
 
 
 @qd.func
-def first_entry(params: qd.template(), e: qd.i32):
+def first_node(params: qd.template(), e: qd.i32):
     """Where edit e's nodes or table begin in `lattice`."""
     return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
@@ -406,7 +406,7 @@ def interpolate(
 ):
     """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
     s = times(params, e, TO_NODES + 3, d)
-    u, along = displacement(to_nodes(p, params, e), s, lattice, first_entry(params, e), resolution)
+    u, along = displacement(to_nodes(p, params, e), s, lattice, first_node(params, e), resolution)
     return p + u, d + along
 
 
