@@ -108,6 +108,7 @@ def _corners(
         stack.lattice,
         stack.n_edits,
         int(field.contracted),
+        stack.has_flows,
     )
     return out.reshape(tuple(count)).astype(bool)
 
@@ -129,6 +130,7 @@ def _refined(
         stack.lattice,
         stack.n_edits,
         int(grid.field.contracted),
+        stack.has_flows,
     )
     return out.astype(bool)
 
@@ -163,6 +165,7 @@ def probe(
     lattice: qd.template(),
     n_edits: qd.i32,
     contracted: qd.i32,
+    flows: qd.template(),
 ):
     """(image, reach, empty) of grid coordinates g: image in grid coordinates, reach = row sums of |J|."""
     p = vec3(0.0, 0.0, 0.0)
@@ -187,7 +190,7 @@ def probe(
         if contracted == 1:
             d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
         length = qd.max(d.norm(), 1e-20)
-        q, v, emptied = map_sample(p, d / length, params, lattice, n_edits)
+        q, v, emptied = map_sample(p, d / length, params, lattice, n_edits, flows)
         empty = emptied
         along = v * length * scale
         image = (q - origin) * scale
@@ -213,13 +216,14 @@ def _occupied_corners(
     lattice: Nodes,
     n_edits: qd.i32,
     contracted: qd.i32,
+    flows: qd.template(),
 ):
     for n in range(count.x * count.y * count.z):
         i = n // (count.y * count.z)
         j = (n // count.z) % count.y
         k = n % count.z
         g = qd.cast(lower + 2 * ivec3(i, j, k), qd.f32)
-        image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted)
+        image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
         found = 0
         if empty == 0:
             r = qd.min(reach + 0.5, MOST_CELLS)
@@ -250,6 +254,7 @@ def _occupied_blocks(
     lattice: Nodes,
     n_edits: qd.i32,
     contracted: qd.i32,
+    flows: qd.template(),
 ):
     for n in range(out.shape[0]):
         block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
@@ -257,7 +262,7 @@ def _occupied_blocks(
         k = 0
         while k < 27 and found == 0:
             g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
-            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted)
+            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
             if empty == 0:
                 r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
                 first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)

@@ -96,6 +96,7 @@ def map_along(
     params: qd.template(),
     lattice: qd.template(),
     n_edits: qd.i32,
+    flows: qd.template(),
 ):
     """As `map_sample` for p = o + t d on the ray, and 1 where p was moved, else 0."""
     q = p
@@ -115,7 +116,7 @@ def map_along(
             v = d + along
             moved = 1
     else:
-        q, v, emptied = map_sample(p, d, params, lattice, n_edits)
+        q, v, emptied = map_sample(p, d, params, lattice, n_edits, flows)
         if qd.abs(q - p).max() > 0.0:
             moved = 1
     return q, v, emptied, moved

@@ -63,6 +63,7 @@ def march_tiles(
     K: qd.template(),
     contracted: qd.template(),
     edited: qd.template(),
+    flows: qd.template(),
 ):
     """Marches the pixels of tiles [first_tile, first_tile + tiles), 8 x 8 pixels each, row-major.
 
@@ -149,7 +150,7 @@ def march_tiles(
                         if t >= edit_in and t <= edit_out:
                             p = origin + t * d
                             canonical, view, emptied, moved = map_along(
-                                ray, t, p, d, params, lattice, n_edits
+                                ray, t, p, d, params, lattice, n_edits, flows
                             )
                             if emptied == 1:
                                 alive = 0
@@ -189,7 +190,7 @@ def march_tiles(
                                     if qd.static(edited):
                                         if moved == 1:
                                             slope = through_edits(
-                                                slope, origin + t * d, params, lattice, n_edits
+                                                slope, origin + t * d, params, lattice, n_edits, flows
                                             )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
@@ -221,7 +222,14 @@ def pull_back(slope: vec3, q: vec3):
 
 
 @qd.func
-def through_edits(slope: vec3, p: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
+def through_edits(
+    slope: vec3,
+    p: vec3,
+    params: qd.template(),
+    lattice: qd.template(),
+    n_edits: qd.i32,
+    flows: qd.template(),
+):
     """J^T slope: the gradient in deformed space at p of a gradient in canonical space."""
     out = vec3(0.0, 0.0, 0.0)
     for a in range(3):
@@ -232,7 +240,7 @@ def through_edits(slope: vec3, p: vec3, params: qd.template(), lattice: qd.templ
             axis.y = 1.0
         else:
             axis.z = 1.0
-        _q, v, _emptied = map_sample(p, axis, params, lattice, n_edits)
+        _q, v, _emptied = map_sample(p, axis, params, lattice, n_edits, flows)
         along = slope.dot(v)
         if a == 0:
             out.x = along

@@ -136,6 +136,11 @@ class DeviceStack:
             array.setflags(write=False)
         return packed
 
+    @property
+    def has_flows(self) -> bool:
+        """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
+        return bool((self.params[:, RESOLUTION] == FLOW).any())
+
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
@@ -145,7 +150,7 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            _map_samples(samples, out, self.params, self.lattice, self.n_edits)
+            _map_samples(samples, out, self.params, self.lattice, self.n_edits, self.has_flows)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 
@@ -165,7 +170,14 @@ def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) ->
 
 
 @qd.func
-def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), n_edits: qd.i32):
+def map_sample(
+    p: vec3,
+    d: vec3,
+    params: qd.template(),
+    lattice: qd.template(),
+    n_edits: qd.i32,
+    flows: qd.template(),
+):
     """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
 
     An emptied sample is returned where it was when it was found empty.
@@ -176,13 +188,15 @@ def map_sample(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), 
     for n in range(n_edits):
         e = n_edits - 1 - n
         if emptied == 0 and in_box(q, params, e, BOX):
-            q, v, emptied = map_edit(q, v, params, lattice, e)
+            q, v, emptied = map_edit(q, v, params, lattice, e, flows)
     return q, v, emptied
 
 
 @qd.func
-def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32):
-    """(canonical point, J d, emptied) of a sample through edit e alone."""
+def map_edit(
+    p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, flows: qd.template()
+):
+    """(canonical point, J d, emptied) of a sample through edit e alone; flows: `DeviceStack.has_flows`."""
     first = qd.cast(params[e, FIRST], qd.i32)
     last = qd.cast(params[e, LAST], qd.i32)
     resolution = qd.cast(params[e, RESOLUTION], qd.i32)
@@ -239,10 +253,11 @@ def map_edit(p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e:
     v = d
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
-    elif use_flow == 1:
-        q, v = flow_sample(p, d, lattice, first_node(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
+    if qd.static(flows):  # noqa: SIM102  one is decided when the kernel is compiled
+        if use_flow == 1:
+            q, v = flow_sample(p, d, lattice, first_node(params, e))
     return q, v, emptied
 
 
@@ -426,10 +441,12 @@ def displacement(at: vec3, s: vec3, lattice: qd.template(), first: qd.i32, resol
 
 
 @qd.kernel
-def _map_samples(samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32):
+def _map_samples(
+    samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32, flows: qd.template()
+):
     for i in range(samples.shape[0]):
         d = read3(samples, i, 3)
-        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits)
+        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
         stretch = 1.0
         if (v - d).norm() > 0.0:
             stretch = v.norm()
@@ -447,7 +464,7 @@ def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, fra
         j = (n // resolution) % resolution
         k = n // (resolution * resolution)
         p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
-        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0)
+        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
         nodes[n] = q - p
 
 
