@@ -108,7 +108,7 @@ def _corners(
         stack.lattice,
         stack.n_edits,
         int(field.contracted),
-        stack.flows,
+        stack.has_flows,
     )
     return out.reshape(tuple(count)).astype(bool)
 
@@ -130,7 +130,7 @@ def _refined(
         stack.lattice,
         stack.n_edits,
         int(grid.field.contracted),
-        stack.flows,
+        stack.has_flows,
     )
     return out.astype(bool)
 

@@ -135,7 +135,7 @@ class Renderer:
                 field.sh.shape[1],
                 field.contracted,
                 self._stack.n_edits > 0,
-                self._stack.flows,
+                self._stack.has_flows,
             )
         return _frame(out.to_numpy().reshape(height, width, 8), background, normals)
 

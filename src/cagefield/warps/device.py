@@ -29,7 +29,6 @@ from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_device import flow_point, flow_sample
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.lattice import Lattice
 from cagefield.warps.maps import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
@@ -42,14 +41,14 @@ Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
 FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
 CONTINUOUS = 8  # 1, or 0 for a discrete edit
-RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly
-OFFSET = 10  # first lattice node as 65536 * [10] + [11]: a float32 counts no further than 2^24
+RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
+FLOW = -1.0
+OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a float32 counts to 2^24 only
 TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
 ALONE = 31  # 1 where no earlier edit reaches into the edit's box
-FLOW = 32  # 1 where the shell is an exact flow, whose table is in `lattice` at the offset [10], [11]
-RECORDS = 33
+RECORDS = 32
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
@@ -120,7 +119,7 @@ class DeviceStack:
                 row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
             elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
                 nodes = _kept(_tables, edit, partial(flow_device.table, warp.shell))
-                row[FLOW] = 1.0
+                row[RESOLUTION] = FLOW
             else:
                 continue
             row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
@@ -138,9 +137,9 @@ class DeviceStack:
         return packed
 
     @property
-    def flows(self) -> bool:
-        """True where some edit's shell is an exact flow."""
-        return bool((self.params[:, FLOW] > 0.0).any())
+    def has_flows(self) -> bool:
+        """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
+        return bool((self.params[:, RESOLUTION] == FLOW).any())
 
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
@@ -151,7 +150,7 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            _map_samples(samples, out, self.params, self.lattice, self.n_edits, self.flows)
+            _map_samples(samples, out, self.params, self.lattice, self.n_edits, self.has_flows)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 
@@ -163,9 +162,9 @@ class _One:
 
 
 def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
-    """Distances [N], world units, of an edit's map without and with its lattice at deformed points [N,3]."""
+    """Distances [N], world units, between an edit's map with and without its lattice at points [N,3]."""
     p = points.astype(np.float32)
-    d = np.broadcast_to(np.array([1.0, 0.0, 0.0], np.float32), p.shape)
+    d = np.tile(np.array([1.0, 0.0, 0.0], dtype=np.float32), (len(p), 1))
     maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
     return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
 
@@ -181,8 +180,7 @@ def map_sample(
 ):
     """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
 
-    An emptied sample is returned where it was when it was found empty. `flows` is `DeviceStack.flows`: code
-    that integrates a flow, which takes seconds to compile, is in a kernel only where it is needed.
+    An emptied sample is returned where it was when it was found empty.
     """
     q = p
     v = d
@@ -198,7 +196,7 @@ def map_sample(
 def map_edit(
     p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, flows: qd.template()
 ):
-    """(canonical point, J d, emptied) of a sample through edit e alone."""
+    """(canonical point, J d, emptied) of a sample through edit e alone; flows: `DeviceStack.has_flows`."""
     first = qd.cast(params[e, FIRST], qd.i32)
     last = qd.cast(params[e, LAST], qd.i32)
     resolution = qd.cast(params[e, RESOLUTION], qd.i32)
@@ -248,25 +246,19 @@ def map_edit(
                 elif resolution > 0:
                     use_lattice = 1
                     break
-                elif params[e, FLOW] > 0.5:
+                elif resolution < 0:
                     use_flow = 1
                     break
     q = p
     v = d
     if use_lattice == 1:
         q, v = interpolate(p, d, params, lattice, e, resolution)
-    elif use_flow == 1:
-        if qd.static(flows):
-            q, v = flow_sample(p, d, lattice, first_entry(params, e))
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
+    if qd.static(flows):  # noqa: SIM102  one is decided when the kernel is compiled
+        if use_flow == 1:
+            q, v = flow_sample(p, d, lattice, first_node(params, e))
     return q, v, emptied
-
-
-@qd.func
-def first_entry(params: qd.template(), e: qd.i32):
-    """Where edit e's nodes or table begin in `lattice`."""
-    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
@@ -406,8 +398,14 @@ def interpolate(
 ):
     """(canonical point, J d) from the lattice of edit e; J is the derivative of the interpolation."""
     s = times(params, e, TO_NODES + 3, d)
-    u, along = displacement(to_nodes(p, params, e), s, lattice, first_entry(params, e), resolution)
+    u, along = displacement(to_nodes(p, params, e), s, lattice, first_node(params, e), resolution)
     return p + u, d + along
+
+
+@qd.func
+def first_node(params: qd.template(), e: qd.i32):
+    """The place of edit e's first lattice node, or of its flow's table."""
+    return qd.cast(params[e, OFFSET], qd.i32) * 65536 + qd.cast(params[e, OFFSET + 1], qd.i32)
 
 
 @qd.func
@@ -526,9 +524,6 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
         if shell.motion.is_affine and warp.outer.is_affine:
             return flow_lattice.sample(shell, resolution)
         _sample_flow_lattice(nodes, params, flow_device.table(shell), *place)
-    elif not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
-        lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
-        nodes[:] = lattice.displacement.reshape(-1, 3)
     else:
         _sample_lattice(nodes, params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
@@ -554,8 +549,8 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
         row[LAST] = 8
         for n in range(6):
             _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
-    elif not isinstance(warp.shell, FlowShell) and edit.lattice is None:
-        raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
+    elif not isinstance(warp.shell, FlowShell):
+        raise EditError(f"a {type(warp.shell).__name__} has no kernel")
     origin, frame = warp.outer.frame
     row[TO_NODES : TO_NODES + 3] = origin
     if edit.lattice is not None:

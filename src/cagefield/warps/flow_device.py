@@ -132,27 +132,38 @@ def velocity(
     tangent: qd.template(),
 ):
     """(dZ/dt, its change along D, z, xi) at Z; the guesses are z and xi of the last call."""
+    v = rows_times(lattice, moment + 4, Z) + lattice[moment + 7]
     z = Z
     dz = D
-    if lattice[base + 9].y < 0.5:
-        z = straighten(Z, z_guess, lattice, base + 10, tangent)
-        if qd.static(tangent):
-            dz = straighten_slope(z, D, lattice, base + 10)
-    y = rows_times(lattice, moment, Z) + lattice[moment + 3]
-    v = rows_times(lattice, moment + 4, Z) + lattice[moment + 7]
-    xi = y
+    xi = rows_times(lattice, moment, Z) + lattice[moment + 3]
     dxi = vec3(0.0, 0.0, 0.0)
     dv = vec3(0.0, 0.0, 0.0)
     if qd.static(tangent):
         dxi = rows_times(lattice, moment, D)
         dv = rows_times(lattice, moment + 4, D)
-    if lattice[base + 8].y < 0.5:
-        xi = straighten(y, xi_guess, lattice, moment + 10, tangent)
-        held = qd.max(qd.min(xi, 1.0), -1.0)
-        v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
-        if qd.static(tangent):
-            dxi = straighten_slope(xi, dxi, lattice, moment + 10)
-            dv += rows_times(lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14))
+    # One loop for both cages, not two copies: compilers take long for what it calls.
+    for cage in range(2):
+        outer = cage == 0
+        K = base + 10 if outer else moment + 10
+        straight = lattice[base + 9].y if outer else lattice[base + 8].y
+        if straight < 0.5:
+            y = z if outer else xi
+            x = straighten(y, z_guess if outer else xi_guess, lattice, K, tangent)
+            dx = dz if outer else dxi
+            if qd.static(tangent):
+                dx = straighten_slope(x, dx, lattice, K)
+            if outer:
+                z = x
+                dz = dx
+            else:
+                xi = x
+                dxi = dx
+                held = qd.max(qd.min(xi, 1.0), -1.0)
+                v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
+                if qd.static(tangent):
+                    dv += rows_times(
+                        lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14)
+                    )
     # Outside the outer cage everything is at rest, also after a stage's rounding.
     far = lattice[base + 7] * (1.0 - z * z)
     g = 0.0
