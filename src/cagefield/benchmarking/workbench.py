@@ -177,7 +177,7 @@ class Workbench:
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
 
     def unseen(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
-        """Pixels [V,H,W] of `moved` that show what none of the scene's photos showed; only those in `where`."""
+        """Pixels [V,H,W] in `where`, of `moved`, that show what none of the photos of the scene showed."""
         if case.moved is None:
             raise CagefieldError(f"no part of {case.scene} is moved by {case.name}")
         scene = procedural_scene(case.scene)
