@@ -177,7 +177,7 @@ def test_one_picture_needs_one_view(scene: Path, tmp_path: Path, capsys: pytest.
 
 def test_edits_that_fold_are_refused(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     inner = Cage.box((0, 0, 0), 1.2)
-    twisted = Edit(inner, inner.grown(0.5), name="twist").rotate((0, 0, 1.5))
+    twisted = Edit(inner, inner.grown(0.5), name="twist", shell="trilinear").rotate((0, 0, 1.5))
     Scene.open(scene).with_edits(EditStack([twisted])).save(tmp_path / "folded")
     error = refused(capsys, "render", tmp_path / "folded", "-o", tmp_path / "out")
     assert 'edit "twist"' in error and "is safe" in error
