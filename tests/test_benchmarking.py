@@ -255,7 +255,7 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
 
     text = table(scores, TINY, ("Machine: a test",)).markdown()
     rows = [line for line in text.splitlines() if line.startswith("| microphone")]
-    assert len(rows) == 2 and rows[0].count("|") == 21
+    assert len(rows) == 2 and rows[0].count("|") == 23
     figures = scores[0].figures
     assert f"| {figures.unedited:.2f} | {figures.edited:.2f} | {number(figures.lost)} |" in rows[0]
     assert (

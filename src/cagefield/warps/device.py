@@ -29,6 +29,7 @@ from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_device import flow_point, flow_sample
 from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.lattice import Lattice
 from cagefield.warps.maps import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
@@ -524,6 +525,9 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
         if shell.motion.is_affine and warp.outer.is_affine:
             return flow_lattice.sample(shell, resolution)
         _sample_flow_lattice(nodes, params, flow_device.table(shell), *place)
+    elif not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
+        lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
+        nodes[:] = lattice.displacement.reshape(-1, 3)
     else:
         _sample_lattice(nodes, params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
@@ -549,8 +553,8 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
         row[LAST] = 8
         for n in range(6):
             _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
-    elif not isinstance(warp.shell, FlowShell):
-        raise EditError(f"a {type(warp.shell).__name__} has no kernel")
+    elif not isinstance(warp.shell, FlowShell) and edit.lattice is None:
+        raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
     origin, frame = warp.outer.frame
     row[TO_NODES : TO_NODES + 3] = origin
     if edit.lattice is not None:
