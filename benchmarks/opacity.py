@@ -75,8 +75,8 @@ def main() -> None:
         tuple(rows),
         (
             f"PSNR (dB) against photos of the scene whose part was really scaled, mean of {options.views} "
-            "test views; there: on the pixels that the edit changes. Preserved: density times |J d|, which keeps "
-            f"the optical depth. Gained on the mean: {gain:.2f} dB.",
+            "test views; there: on the pixels that the edit changes. Preserved: density times |J d|; "
+            f"that keeps the optical depth. Gained on the mean: {gain:.2f} dB.",
             f"Machine: {Machine.here()}",
             f"Command: `python benchmarks/opacity.py {options.workdir.name}`",
         ),
