@@ -100,6 +100,30 @@ EDITS = {
         [Edit(INNER, adjustment="discrete", keep_source=True).translate((0.0, -1.2, 0.2))]
     ),
     "delete": EditStack([Edit.delete(INNER)]),
+    "lattice": EditStack(
+        [
+            Edit(INNER, OUTER, shell="trilinear", lattice=24)
+            .rotate((0.1, 0.2, 0.3))
+            .translate((0.1, 0.05, 0.1))
+        ]
+    ),
+    # Samples that the second edit moves land in the box of the first, which their ray does not meet.
+    "lattices that overlap": EditStack(
+        [
+            Edit(
+                Cage.box((-0.25, 0.1, 0.1), (0.4, 0.4, 0.6)),
+                Cage.box((-0.25, 0.1, 0.1), (0.8, 0.9, 1.2)),
+                shell="trilinear",
+                lattice=24,
+            ).translate((-0.15, 0, 0.1)),
+            Edit(
+                Cage.box((-0.2, 0, 0.1), (0.9, 0.9, 0.9)),
+                Cage.box((0.3, 0, 0.1), (2.2, 2.0, 2.0)),
+                shell="trilinear",
+                lattice=24,
+            ).translate((0.5, 0.1, 0)),
+        ]
+    ),
     "two": EditStack(
         [
             Edit(INNER, adjustment="discrete").rotate((0, 0, 0.8)).translate((0, -0.5, 0)),
