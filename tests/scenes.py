@@ -6,11 +6,26 @@ from pathlib import Path
 
 import numpy as np
 
+from cagefield.benchmarking.workbench import Settings
 from cagefield.cameras import turntable
 from cagefield.fields.voxel import VoxelField
 from cagefield.scene import Scene
+from cagefield.training.voxel import VoxelConfig
 
 SH_C0 = 0.28209479177387814
+
+TINY = Settings(
+    views=8,
+    size=32,
+    test_views=3,
+    config=VoxelConfig(steps=60, resolution=24),
+    exact_size=24,
+    exact_views=2,
+    exact_samples=64,
+    compared_size=16,
+    compared_views=1,
+)
+"""Sizes of a benchmark that runs in seconds."""
 
 
 def ball_field(density: float = 40.0, resolution: int = 17, radius: float = 0.5) -> VoxelField:

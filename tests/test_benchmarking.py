@@ -21,7 +21,7 @@ from cagefield.benchmarking.figures import compare, mean_psnr
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
-from cagefield.benchmarking.workbench import Settings, Workbench, digest
+from cagefield.benchmarking.workbench import Workbench, digest
 from cagefield.cages import Cage
 from cagefield.cli import main, parse
 from cagefield.cli.bench import BenchEdits, BenchSpeed, BenchTraining, command_line
@@ -31,21 +31,12 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.scene import Scene
-from cagefield.training.voxel import VoxelConfig, train_voxel
+from cagefield.training.voxel import train_voxel
 from commands import refused
-from scenes import ball_scene, files_of
+from scenes import TINY, ball_scene, files_of
 
 DISCRETE = [case for case in CASES if case.moved is not None]
 DELETED = {"digger": "bucket", "chair": "back", "microphone": "base", "plant": "flower"}
-TINY = Settings(
-    views=8,
-    size=32,
-    test_views=3,
-    config=VoxelConfig(steps=60, resolution=24),
-    exact_size=24,
-    exact_views=2,
-    exact_samples=64,
-)
 
 
 def named(case: Case) -> str:

@@ -25,24 +25,13 @@ from cagefield.benchmarking.distortion import Distortion
 from cagefield.benchmarking.exact import KernelMap, exact
 from cagefield.benchmarking.figures import compare
 from cagefield.benchmarking.methods import METHODS, peers
-from cagefield.benchmarking.workbench import Settings, Workbench
+from cagefield.benchmarking.workbench import Workbench
 from cagefield.cli import main
 from cagefield.edits import EditStack
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Rotate, Scale, Shear, Translate
 from cagefield.errors import CagefieldError
-from cagefield.training.voxel import VoxelConfig
+from scenes import TINY
 
-TINY = Settings(
-    views=8,
-    size=32,
-    test_views=3,
-    config=VoxelConfig(steps=60, resolution=24),
-    exact_size=24,
-    exact_views=2,
-    exact_samples=64,
-    compared_size=16,
-    compared_views=1,
-)
 CONTINUOUS = [case for case in CASES if case.kind == "continuous"]
 
 

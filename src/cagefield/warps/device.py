@@ -27,7 +27,7 @@ from cagefield.hexahedron import Array
 from cagefield.warps import flow_device, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
-from cagefield.warps.flow_device import flow_point, flow_sample
+from cagefield.warps.flow_device import flow_point, flow_sample, solve_columns
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.lattice import Lattice
 from cagefield.warps.maps import Warp
@@ -353,15 +353,11 @@ def locate(p: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
 
 @qd.func
 def bend_solve(a: vec3, b: vec3, c: vec3, g: vec3, xi: vec3, r: vec3):
-    """(dy/dxi)^-1 r for the bend a xi eta + b xi zeta + c eta zeta + g xi eta zeta, by Cramer's rule."""
+    """(dy/dxi)^-1 r for the bend a xi eta + b xi zeta + c eta zeta + g xi eta zeta."""
     u = vec3(1.0, 0.0, 0.0) + xi.y * a + xi.z * b + xi.y * xi.z * g
     v = vec3(0.0, 1.0, 0.0) + xi.x * a + xi.z * c + xi.x * xi.z * g
     w = vec3(0.0, 0.0, 1.0) + xi.x * b + xi.y * c + xi.x * xi.y * g
-    vw = v.cross(w)
-    det = u.dot(vw)
-    if qd.abs(det) < 1e-6:
-        det = 1e-6 if det >= 0.0 else -1e-6
-    return vec3(r.dot(vw), r.dot(w.cross(u)), r.dot(u.cross(v))) / det
+    return solve_columns(u, v, w, r)
 
 
 @qd.func

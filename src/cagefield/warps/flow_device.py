@@ -234,7 +234,7 @@ def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise:
 
 @qd.func
 def straighten_slope(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
-    """(d(xi + B(clamp(xi)))/dxi)^-1 d, by Cramer's rule."""
+    """(d(xi + B(clamp(xi)))/dxi)^-1 d."""
     x = qd.max(qd.min(xi, 1.0), -1.0)
     a = lattice[K]
     b = lattice[K + 1]
@@ -249,11 +249,17 @@ def straighten_slope(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
         v += x.x * a + x.z * c + x.x * x.z * g
     if qd.abs(xi.z) <= 1.0:
         w += x.x * b + x.y * c + x.x * x.y * g
+    return solve_columns(u, v, w, d)
+
+
+@qd.func
+def solve_columns(u: vec3, v: vec3, w: vec3, r: vec3):
+    """x with [u v w] x = r, by Cramer's rule; a determinant under 1e-6 is moved off zero."""
     vw = v.cross(w)
     det = u.dot(vw)
     if qd.abs(det) < 1e-6:
         det = 1e-6 if det >= 0.0 else -1e-6
-    return vec3(d.dot(vw), d.dot(w.cross(u)), d.dot(u.cross(v))) / det
+    return vec3(r.dot(vw), r.dot(w.cross(u)), r.dot(u.cross(v))) / det
 
 
 @qd.func
