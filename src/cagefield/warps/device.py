@@ -12,7 +12,7 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeAlias
 from weakref import WeakKeyDictionary
@@ -503,8 +503,8 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     place = (vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
     params = np.ascontiguousarray(row[None])
     if isinstance(warp.shell, FlowShell):
-        shell = replace(warp.shell, strain=LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5))
-        return flow_lattice.sample(shell, resolution)
+        strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
+        return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
     elif not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
         nodes[:] = lattice.displacement.reshape(-1, 3)
