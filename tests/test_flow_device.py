@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -143,3 +147,21 @@ def test_lattice_error_of_an_edit() -> None:
     # Other points, and a mean of some hundreds of them.
     assert mean == pytest.approx(distance.mean(), rel=0.2) and worst >= 0.8 * distance.max()
     assert edit.lattice_error() == (0.0, 0.0)
+
+
+def test_promises_over_random_edits() -> None:
+    # Two edits in float64, which needs a process of its own; the benchmark takes ten thousand.
+    script = Path(__file__).parents[1] / "benchmarks" / "flow_random.py"
+    code = f"""
+import sys; sys.path.insert(0, {str(script.parent)!r})
+import flow_random, numpy
+rows, _ = flow_random.run((0, 2, 12, True))
+least, moved, inside, face, still, trip, steps, reference = numpy.array(rows).T
+assert (least > 0.0).all() and (moved == 0.0).all(), rows
+assert inside.max() < 1e-12 and trip.max() < 1e-12 and still.max() < 1e-12, rows
+assert 0.0 < face.max() < 1e-4, rows  # the integration's error
+assert reference[0] < 1e-7, rows  # the kernel's Newton method stops at 3e-7
+assert numpy.isnan(reference[1]), rows
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
