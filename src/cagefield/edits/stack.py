@@ -108,6 +108,23 @@ class EditStack:
         """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
         return bounds_of(self.boxes)
 
+    def changed_boxes(self, before: EditStack) -> Array:
+        """Boxes [B,2,3] (min, max) outside all of which this stack maps points as another one does.
+
+        They are those of the edits that the stacks do not share, in deformed space, and of the later edits
+        that take points there.
+        """
+        old, new = before.active, self.active
+        least = min(len(old), len(new))
+        first = next((n for n in range(least) if old[n] != new[n]), least)
+        shared = next((n for n in range(least - first) if old[-1 - n] != new[-1 - n]), least - first)
+        replaced = (*old[first : len(old) - shared], *new[first : len(new) - shared])
+        changed = np.concatenate([np.zeros((0, 2, 3)), *(edit.boxes for edit in replaced)])
+        for edit in new[len(new) - shared :]:
+            if _meet(np.concatenate([edit.boxes, edit.inner.aabb[None]]), changed):
+                changed = np.concatenate([changed, edit.boxes])
+        return changed
+
     def check(self) -> None:
         """Raise `EditError` for the first active edit that cannot be evaluated."""
         for edit in self.active:
@@ -149,6 +166,12 @@ class EditStack:
             mapped = edit.warp.to_deformed(p[rows])
             p[rows], J[rows], hidden[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
         return DeformedPoints(p, J, hidden)
+
+
+def _meet(boxes: Array, others: Array) -> bool:
+    """True where one of the boxes [B,2,3] meets one of the others."""
+    a, b = boxes[:, None], others[None]
+    return bool(((a[:, :, 0] <= b[:, :, 1]) & (b[:, :, 0] <= a[:, :, 1])).all(axis=2).any())
 
 
 def _in_any(boxes: Array, p: Array) -> Mask:

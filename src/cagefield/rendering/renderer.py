@@ -16,6 +16,7 @@ from cagefield.rendering.frame import Background, Frame
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
+    from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
 """Rows of tiles rendered between two looks at `should_stop`."""
@@ -26,6 +27,8 @@ class Renderer:
 
     `step` is the distance between samples in voxels. `with_edits` shares the field's arrays.
     """
+
+    _occupancy: Occupancy
 
     def __init__(
         self,
@@ -53,21 +56,24 @@ class Renderer:
         self._pack_edits()
 
     def with_edits(self, edits: EditStack) -> Renderer:
-        """A renderer of the same field under other edits."""
+        """A renderer of the same field under other edits; what they share with these is kept."""
         other = object.__new__(Renderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
-        other._pack_edits()
+        other._pack_edits(self)
         return other
 
-    def _pack_edits(self) -> None:
-        from cagefield.rendering.deformed_occupancy import deform
+    def _pack_edits(self, before: Renderer | None = None) -> None:
+        from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import to_device
-        from cagefield.warps.device import DeviceStack
+        from cagefield.warps.device import DeviceStack, widened
 
         stack = DeviceStack.from_stack(self.edits)
-        jumps = any(edit.adjustment == "discrete" for edit in self.edits.active)
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps)
+        jumps = _jumps(self.edits)
+        known = None
+        if before is not None and jumps == _jumps(before.edits):
+            known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known)
         self._codes = to_device(self._occupancy.codes)
         self._stack = stack
         self._boxes = to_device(stack.boxes.astype(np.float32))
@@ -145,6 +151,11 @@ class Renderer:
         if (width, height) not in self._pixels:
             self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
         return self._pixels[(width, height)]
+
+
+def _jumps(edits: EditStack) -> bool:
+    """True where an edit's map is not continuous."""
+    return any(edit.adjustment == "discrete" for edit in edits.active)
 
 
 def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> Frame:

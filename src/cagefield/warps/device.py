@@ -139,7 +139,7 @@ class DeviceStack:
             nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
-        boxes = np.concatenate([np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits])
+        boxes = np.concatenate([np.zeros((0, 2, 3))] + [widened(edit.boxes) for edit in edits])
         packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
             array.setflags(write=False)
@@ -516,7 +516,7 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
 def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
     """Write an edit into its row of `params`, with its shell exact."""
     boxes = edit.boxes
-    row[BOX : BOX + 6] = _widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
     warp = edit.exact_warp
     if isinstance(warp, DiscreteWarp):
         row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.keep_source else 2
@@ -565,7 +565,8 @@ def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
     return bool(meets.all(axis=1).any())
 
 
-def _widened(boxes: Array) -> Array:
+def widened(boxes: Array) -> Array:
+    """Boxes [B,2,3] made larger by what float32 samples may be off."""
     rounding = 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)
     slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + rounding[:, None]
     return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)
