@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from cagefield.cameras import Camera
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.voxel import VoxelField
@@ -135,6 +135,13 @@ class Scene:
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
         return scene
+
+    def lattice_errors(self) -> tuple[LatticeError, ...]:
+        """How far the edits' lattices are off their exact maps, in voxels of the field (its smallest edge).
+
+        An unbounded field's voxels are those in the middle of its box of interest.
+        """
+        return self.edits.lattice_errors(float(min(self.field.voxel_size)))
 
     def render(
         self,

@@ -44,6 +44,20 @@ class DeformedPoints:
 
 
 @dataclass(frozen=True)
+class LatticeError:
+    """How far an edit's lattice is off its exact map, in voxels: at most, and on average over the shell.
+
+    `number` is the edit's place in its stack, from 0.
+    """
+
+    number: int
+    name: str
+    resolution: int
+    worst: float
+    mean: float
+
+
+@dataclass(frozen=True)
 class EditStack:
     """Edits e_1 ... e_n: the deformed field of e_k is the canonical field of e_(k+1).
 
@@ -124,6 +138,23 @@ class EditStack:
             if _meet(np.concatenate([edit.boxes, edit.inner.aabb[None]]), changed):
                 changed = np.concatenate([changed, edit.boxes])
         return changed
+
+    def lattice_errors(self, voxel_size: float, *, samples: int = 20_000) -> tuple[LatticeError, ...]:
+        """The errors of the active edits that have a lattice, in voxels of an edge in world units.
+
+        Measured at that many random points of each shell, between the inner and the outer cage. Raises
+        `EditError` for an edit that cannot be evaluated, or a voxel size that is not positive.
+        """
+        if not voxel_size > 0.0:
+            raise EditError(f"voxel_size must be positive, the edge of a voxel, got {voxel_size!r}")
+        errors = []
+        for number, edit in enumerate(self.edits):
+            if edit.lattice is None or edit.adjustment == "discrete":
+                continue
+            if edit.enabled and edit.changes_anything:
+                worst, mean = (error / voxel_size for error in edit.lattice_error(samples=samples))
+                errors.append(LatticeError(number, edit.name, edit.lattice, worst, mean))
+        return tuple(errors)
 
     def check(self) -> None:
         """Raise `EditError` for the first active edit that cannot be evaluated."""
