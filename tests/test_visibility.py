@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cagefield.benchmarking.visibility import unseen
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets.procedural.parts import Part, Primitive, place
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.shapes import Box
 from cagefield.datasets.procedural.textures import Plain
-from cagefield.datasets.procedural.visibility import unseen
 
 GREY = Plain(np.array([0.5, 0.5, 0.5]))
 
@@ -56,3 +56,13 @@ def test_only_pixels_of_the_mask_are_looked_at() -> None:
     where[:, :40] = True
     everywhere = unseen(moved, above(), scene, photos())
     np.testing.assert_array_equal(unseen(moved, above(), scene, photos(), where), everywhere & where)
+
+
+def test_what_photos_showed_at_a_flat_angle_alone_is_unseen() -> None:
+    scene = box_on_plate()
+    # from 5 degrees the photos show the plate's top, too flat; the box's top is above them
+    flat = turntable((0, 0, 0), 4.0, 12, elevation=np.radians(5.0), width=32, height=32, fov_x=0.7)
+    hidden = unseen(scene, above(), scene, flat)
+    assert hidden[12, 12] and hidden[40, 40]
+    steeper = turntable((0, 0, 0), 4.0, 12, elevation=np.radians(20.0), width=32, height=32, fov_x=0.7)
+    assert not unseen(scene, above(), scene, steeper).any()

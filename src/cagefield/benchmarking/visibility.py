@@ -17,6 +17,10 @@ Mask = NDArray[np.bool_]
 REACH = 0.008
 """A surface counts as shown where a photo's ray ends within this distance of it, in world units: a voxel."""
 
+FLATTEST = np.sin(np.radians(10.0))
+"""Sine of the least angle between ray and surface: a flatter photo shows less than a fifth of the pixels, and
+so under a part that stands a hair above the ground a strip thinner than one of them."""
+
 
 def unseen(
     moved: ProceduralScene,
@@ -28,7 +32,8 @@ def unseen(
     """Pixels [H,W] of `moved` whose surface none of the photos of `photographed` showed.
 
     `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
-    centre is followed to its surface, and that point of its part back to where the photos were taken.
+    centre is followed to its surface, and that point of its part back to where the photos were taken. A photo
+    shows it where its ray ends there, at an angle of FLATTEST or more.
     Only pixels of the mask `where` [H,W] are looked at; others, and those without a surface, are False.
     """
     shape = (camera.height, camera.width)
@@ -37,10 +42,16 @@ def unseen(
     hits = trace(moved.placed, camera.origin, directions)
     met = np.flatnonzero(hits.primitive >= 0)
     points = camera.origin[:, None] + hits.t[met] * directions[:, met].astype(np.float64)
+    normals = np.zeros_like(points)
     for index, placed in enumerate(moved.placed):
         rows = np.flatnonzero(hits.primitive[met] == index)
+        instance = hits.instance[met[rows]]
+        local = placed.local(np.ascontiguousarray(points[:, rows], np.float32), instance)
+        normals[:, rows] = placed.world_gradient(placed.local_gradient(local, instance), instance)
         back = _original(placed.part, photographed).motion @ np.linalg.inv(placed.part.motion)
         points[:, rows] = back[:3, :3] @ points[:, rows] + back[:3, 3:]
+        normals[:, rows] = np.linalg.inv(back[:3, :3]).T @ normals[:, rows]
+    normals /= np.maximum(np.linalg.norm(normals, axis=0), 1e-12)
     hidden = np.ones(len(met), bool)
     for photo in photos:
         rows = np.flatnonzero(hidden)
@@ -50,6 +61,8 @@ def unseen(
         rows = rows[((at >= 0) & (at < (photo.width, photo.height))).all(axis=1) & (depth > 0)]
         toward = points[:, rows] - photo.origin[:, None]
         distance = np.linalg.norm(toward, axis=0)
+        steep = -(toward * normals[:, rows]).sum(axis=0) >= FLATTEST * distance
+        rows, toward, distance = rows[steep], toward[:, steep], distance[steep]
         ends = trace(photographed.placed, photo.origin, (toward / distance).astype(np.float32)).t
         hidden[rows[ends > distance - REACH]] = False
     result = np.zeros(shape, bool)
