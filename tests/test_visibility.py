@@ -58,11 +58,15 @@ def test_only_pixels_of_the_mask_are_looked_at() -> None:
     np.testing.assert_array_equal(unseen(moved, above(), scene, photos(), where), everywhere & where)
 
 
-def test_what_photos_showed_at_a_flat_angle_alone_is_unseen() -> None:
-    scene = box_on_plate()
-    # from 5 degrees the photos show the plate's top, too flat; the box's top is above them
-    flat = turntable((0, 0, 0), 4.0, 12, elevation=np.radians(5.0), width=32, height=32, fov_x=0.7)
-    hidden = unseen(scene, above(), scene, flat)
-    assert hidden[12, 12] and hidden[40, 40]
-    steeper = turntable((0, 0, 0), 4.0, 12, elevation=np.radians(20.0), width=32, height=32, fov_x=0.7)
-    assert not unseen(scene, above(), scene, steeper).any()
+def test_ground_seen_through_a_hair_thin_gap_is_unseen() -> None:
+    # low cameras see far under a box that hovers; a gap of 0.004 is under a pixel, one of 0.1 is not
+    low = turntable((0, 0, 0), 4.0, 24, elevation=np.radians(4.0), width=32, height=32, fov_x=0.7)
+    shares = {}
+    for gap in (0.004, 0.1):
+        hovering = box_on_plate().move("box", translate=(0.0, 0.0, gap))
+        gone = hovering.remove("box")
+        shares[gap] = unseen(gone, above(), hovering, (*photos(), *low)).mean()
+    foot = 0.4**2 / (8 * np.tan(0.25)) ** 2
+    # the foot less a rim of the box's rounding and a voxel, 0.02 wide on every side
+    assert 0.75 * foot < shares[0.004] < 1.15 * foot
+    assert shares[0.1] < 0.2 * foot

@@ -15,11 +15,8 @@ from cagefield.datasets.procedural.tracing import trace
 Mask = NDArray[np.bool_]
 
 REACH = 0.008
-"""A surface counts as shown where a photo's ray ends within this distance of it, in world units: a voxel."""
-
-FLATTEST = np.sin(np.radians(10.0))
-"""Sine of the least angle between ray and surface: a flatter photo shows less than a fifth of the pixels, and
-so under a part that stands a hair above the ground a strip thinner than one of them."""
+"""A photo's ray may end within this distance of a surface, in world units: a voxel. It is followed to a point
+so far above it: what is seen through a gap narrower than that, a pixel or less, no photo resolves."""
 
 
 def unseen(
@@ -33,7 +30,7 @@ def unseen(
 
     `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
     centre is followed to its surface, and that point of its part back to where the photos were taken. A photo
-    shows it where its ray ends there, at an angle of FLATTEST or more.
+    shows it where its ray comes to REACH above it.
     Only pixels of the mask `where` [H,W] are looked at; others, and those without a surface, are False.
     """
     shape = (camera.height, camera.width)
@@ -51,7 +48,7 @@ def unseen(
         back = _original(placed.part, photographed).motion @ np.linalg.inv(placed.part.motion)
         points[:, rows] = back[:3, :3] @ points[:, rows] + back[:3, 3:]
         normals[:, rows] = np.linalg.inv(back[:3, :3]).T @ normals[:, rows]
-    normals /= np.maximum(np.linalg.norm(normals, axis=0), 1e-12)
+    points += REACH * normals / np.maximum(np.linalg.norm(normals, axis=0), 1e-12)
     hidden = np.ones(len(met), bool)
     for photo in photos:
         rows = np.flatnonzero(hidden)
@@ -61,8 +58,6 @@ def unseen(
         rows = rows[((at >= 0) & (at < (photo.width, photo.height))).all(axis=1) & (depth > 0)]
         toward = points[:, rows] - photo.origin[:, None]
         distance = np.linalg.norm(toward, axis=0)
-        steep = -(toward * normals[:, rows]).sum(axis=0) >= FLATTEST * distance
-        rows, toward, distance = rows[steep], toward[:, steep], distance[steep]
         ends = trace(photographed.placed, photo.origin, (toward / distance).astype(np.float32)).t
         hidden[rows[ends > distance - REACH]] = False
     result = np.zeros(shape, bool)
