@@ -4,7 +4,7 @@ A run is a sequence of stages. Each stage is a grid: the stored vertices of the 
 largest weight they got in any training ray, cropped to what is left (bounded scenes) and refined. Within a
 stage, batches of pixel patches are marched (`kernels.march_batch`) and every voxel that they met is updated
 (`kernels.gauss_newton`). Patches that meet no occupied block any more are left out of the batches: their
-gradients are zero.
+gradients are zero. At the end, specks are taken out of a bounded scene's field.
 
 On a CPU a run of given `steps` gives the same field for the same seed and number of threads.
 """
@@ -33,6 +33,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress, Snapshots
+from cagefield.training.specks import without_specks
 
 if TYPE_CHECKING:
     from cagefield.training.grid_state import GridState
@@ -169,6 +170,8 @@ def train_voxel(
         if checkpoint is not None and not finished:
             run.store(checkpoint)
     field = run.grid.to_field()
+    if not run.contracted:
+        field = without_specks(field)
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
