@@ -162,16 +162,14 @@ def train_voxel(
             if on_progress is not None:
                 on_progress(run.progress())
             if snapshots is not None and snapshots.due(before, (run.step, run.seconds)):
-                snapshots.on_field(run.progress(), run.grid.to_field())
+                snapshots.on_field(run.progress(), run.field())
             if checkpoint is not None and run.seconds - saved > 60.0:
                 run.store(checkpoint)
                 saved = run.seconds
         finished = run.done >= 1.0
         if checkpoint is not None and not finished:
             run.store(checkpoint)
-    field = run.grid.to_field()
-    if not run.contracted:
-        field = without_specks(field)
+    field = run.field()
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
@@ -493,6 +491,11 @@ class _Run:
         return np.asarray(gains / gains.mean(axis=0), np.float32)
 
     # -- reports and checkpoints ------------------------------------------------------------------------
+
+    def field(self) -> VoxelField:
+        """The field as it is now; that of a bounded scene without specks."""
+        field = self.grid.to_field()
+        return field if self.contracted else without_specks(field)
 
     def progress(self) -> Progress:
         """Where the run stands."""
