@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 import cagefield
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
+from cagefield.benchmarking.visibility import unseen
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
-from cagefield.datasets.procedural.visibility import unseen
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
@@ -184,7 +184,7 @@ class Workbench:
         moved, photos = case.moved(scene), self.scene(case.scene).cameras["train"]
         key = digest(
             ["unseen", case.scene, case.name, _poses(cameras), _poses(photos)],
-            (*_MODELLED, "benchmarking/cases.py"),
+            (*_MODELLED, "benchmarking/cases.py", "benchmarking/visibility.py"),
         )
         masks = (
             unseen(moved, camera, scene, photos, mask).astype(np.uint8)
