@@ -97,17 +97,31 @@ def forward_krrish94(s: State, p: np.ndarray, d: np.ndarray, skip: int | None = 
     return relu(apply(s, "fc_alpha", h)[:, 0]), 1.0 / (1.0 + np.exp(-rgb))
 
 
+def affine(part: Linear, x: np.ndarray) -> np.ndarray:
+    """The layer in float64."""
+    return x @ part.weight.astype(np.float64).T + part.bias
+
+
+def hidden_of(trunk: tuple[Linear, ...], encoded: np.ndarray) -> np.ndarray:
+    """What the trunk of `small_mlp` hands to its heads, in float64."""
+    h = relu(affine(trunk[1], relu(affine(trunk[0], encoded))))
+    return relu(affine(trunk[2], np.concatenate([encoded, h], axis=1)))
+
+
 def small_mlp(seed: int = 0, width: int = 16, octaves: int = 2) -> Mlp:
-    """Three trunk layers with a skip into the last, a view branch of one octave."""
+    """Three trunk layers with a skip into the last, a view branch of one octave; dense in half of space."""
     rng = np.random.default_rng(seed)
     encoded = 3 + 6 * octaves
 
     def linear(outputs: int, inputs: int) -> Linear:
         return Linear(*layer(rng, outputs, inputs))
 
+    trunk = (linear(width, encoded), linear(width, width), linear(width, width + encoded))
+    hidden = hidden_of(trunk, gamma(rng.uniform(-1.5, 1.5, (500, 3)), octaves))
+    weight = layer(rng, 1, width)[0]
     return Mlp(
-        trunk=(linear(width, encoded), linear(width, width), linear(width, width + encoded)),
-        density=linear(1, width),
+        trunk=trunk,
+        density=Linear(weight, -np.median(hidden @ weight.T, axis=0)),
         rgb=linear(3, width // 2),
         feature=linear(width, width),
         view=(linear(width // 2, width + 9),),

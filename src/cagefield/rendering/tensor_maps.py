@@ -17,17 +17,22 @@ Nodes = qd.types.ndarray(dtype=qd.math.vec3, ndim=1)
 
 
 class TensorMap:
-    """An edit stack as a function of tensors; nothing goes through the host where they are on a GPU."""
+    """An edit stack as a function of tensors.
 
-    def __init__(self, edits: PackedStack, device: torch.device) -> None:
+    On a GPU the kernel reads and writes the tensors where they are. On the CPU it sees them as arrays of the
+    same memory, which it takes faster; `as_tensors` hands it tensors there too.
+    """
+
+    def __init__(self, edits: PackedStack, device: torch.device, *, as_tensors: bool = False) -> None:
         packed = DeviceStack.from_stack(edits)
         self.device = device
+        self._as_arrays = device.type == "cpu" and not as_tensors
         self.count, self.flows = packed.n_edits, packed.has_flows
         self._params = self._argument(packed.params)
         self._lattice = self._argument(packed.lattice)
 
     def _argument(self, values: NDArray[np.float32]) -> Any:
-        return values if self.device.type == "cpu" else torch.from_numpy(values.copy()).to(self.device)
+        return values if self._as_arrays else torch.from_numpy(values.copy()).to(self.device)
 
     def __call__(self, points: Any, viewdirs: Any) -> tuple[Any, Any, Any]:
         """(canonical points [N,3], unit viewdirs [N,3], emptied [N]) of deformed samples [N,3]."""
@@ -35,9 +40,7 @@ class TensorMap:
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
         if len(samples):
-            arguments = [samples, out]
-            if self.device.type == "cpu":
-                arguments = [values.numpy() for values in arguments]
+            arguments = [values.numpy() if self._as_arrays else values for values in (samples, out)]
             _map_tensors(*arguments, self._params, self._lattice, self.count, self.flows)
         return out[:, :3], out[:, 3:6], out[:, 6] > 0.5
 
