@@ -1,6 +1,8 @@
 """Baking: any field as a VoxelField, so that it can be edited at interactive speed.
 
-Density is the field's at the vertices. A vertex is stored where the field absorbs at least `opacity` over a
+Density is the field's at the vertices: a signed one, negative in empty space, where the field has
+`signed_density`, because a voxel field clamps after it interpolates and so keeps surfaces between vertices
+where they are. A vertex is stored where the field absorbs at least `opacity` over a
 voxel's edge there or at a neighbour; a first pass on every other vertex finds where to look. Colour is
 fitted to the field's, seen along several directions: with C the colours and Y_k the basis along direction k,
 
@@ -20,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
+from cagefield.fields.contraction import uncontract
 from cagefield.fields.protocol import Field
 from cagefield.fields.voxel import VoxelField
 
@@ -29,7 +32,7 @@ Array = NDArray[Any]
 BACK = 0.02
 """Weight of a direction from which a vertex is seen through its own surface."""
 
-RIDGE = 0.02
+RIDGE = 2e-3
 """Weight of the coefficients' size against a residual's, per direction."""
 
 BLOCK = 1 << 16
@@ -47,6 +50,7 @@ def bake(
     eyes: ArrayLike | None = None,
     views: int = 16,
     opacity: float = 2e-3,
+    contracted: bool = False,
     seed: int = 0,
     on_progress: Callable[[float], None] | None = None,
 ) -> VoxelField:
@@ -57,6 +61,7 @@ def bake(
       around the sphere where left out.
     - views: directions for each vertex.
     - opacity: vertices whose voxel absorbs less are empty.
+    - contracted: bake all of space, with `bounds` as the box of interest.
 
     Raises:
         FieldError: options outside their range, infinite bounds, a field that is empty in them.
@@ -70,18 +75,22 @@ def bake(
         raise FieldError(f"bounds must be a finite box [2,3] to bake in, got {box.tolist()}; give bounds=")
     report = on_progress or (lambda done: None)
 
-    box = _content(field, box, opacity, lambda done: report(0.1 * done))
-    grid = _Grid.within(box, resolution)
+    places = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
+    density = _Density(field, None if places is None else places.mean(axis=0))
+    if contracted:
+        grid = _Grid.contracting(box, resolution)
+    else:
+        box = _content(density, box, opacity, lambda done: report(0.1 * done))
+        grid = _Grid.within(box, resolution)
     least = -np.log1p(-opacity) / grid.edge
-    candidates = _candidates(field, grid, least, lambda done: report(0.1 + 0.2 * done))
+    candidates = _candidates(density, grid, least, lambda done: report(0.1 + 0.2 * done))
     sigma = np.zeros(grid.shape, np.float32)
-    sigma[candidates] = _density(field, grid.positions(np.argwhere(candidates)))
+    sigma[candidates] = density(grid.positions(np.argwhere(candidates)))
     report(0.4)
     stored = grown(sigma > least)
     if not stored.any():
         raise FieldError(f"the field is empty in {box.tolist()}: nothing to bake; give other bounds")
     vertices = np.argwhere(stored)
-    places = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
     coefficients = np.zeros((len(vertices), (sh_degree + 1) ** 2, 3), np.float32)
     chance = np.random.default_rng(seed)
     front = np.stack(np.gradient(sigma), axis=-1)[stored]
@@ -92,19 +101,25 @@ def bake(
         report(0.4 + 0.6 * rows.stop / len(vertices))
     nx, ny, nz = grid.shape
     return VoxelField(
-        bounds=grid.bounds,
+        bounds=box if contracted else grid.bounds,
         resolution=(nx, ny, nz),
-        vertices=np.ravel_multi_index(tuple(vertices.T), grid.shape),
+        vertices=np.asarray(np.ravel_multi_index(tuple(vertices.T), grid.shape), np.int64),
         density=sigma[stored],
         sh=coefficients,
+        contracted=contracted,
     )
 
 
 class _Grid:
-    """Vertices over a box, evenly `edge` apart: cubes, so the box may grow a little at its upper side."""
+    """Vertices over a box, evenly `edge` apart: cubes, so the box may grow a little at its upper side.
 
-    def __init__(self, lower: Array, edge: float, shape: tuple[int, ...]) -> None:
-        self.lower, self.edge, self.shape = lower, edge, shape
+    `edge` is in world units, inside the box of interest where the grid is contracted.
+    """
+
+    def __init__(
+        self, lower: Array, edge: float, shape: tuple[int, ...], interest: Array | None = None
+    ) -> None:
+        self.lower, self.edge, self.shape, self.interest = lower, edge, shape, interest
 
     @classmethod
     def within(cls, box: Array, resolution: int) -> _Grid:
@@ -112,12 +127,22 @@ class _Grid:
         edge = float(size.max()) / (resolution - 1)
         return cls(box[0], edge, tuple(max(2, int(np.ceil(s / edge - 1e-6)) + 1) for s in size))
 
+    @classmethod
+    def contracting(cls, interest: Array, resolution: int) -> _Grid:
+        """The grid of all of space, contracted around the box of interest."""
+        edge = 2.0 * float((interest[1] - interest[0]).max()) / (resolution - 1)
+        return cls(np.full(3, -2.0), edge, (resolution,) * 3, interest)
+
     @property
     def bounds(self) -> Array:
         return np.stack([self.lower, self.lower + (np.array(self.shape) - 1) * self.edge])
 
     def positions(self, vertices: Array) -> Float32:
-        return (self.lower + vertices * self.edge).astype(np.float32)
+        if self.interest is None:
+            return (self.lower + vertices * self.edge).astype(np.float32)
+        cube = -2.0 + 4.0 * vertices / (np.array(self.shape) - 1)
+        middle, half = self.interest.mean(axis=0), 0.5 * (self.interest[1] - self.interest[0])
+        return (middle + half * uncontract(cube)).astype(np.float32)
 
 
 def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -133,14 +158,11 @@ def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
-def _content(field: Field, box: Array, opacity: float, report: Callable[[float], None]) -> Array:
+def _content(density: _Density, box: Array, opacity: float, report: Callable[[float], None]) -> Array:
     """The part of `box` that holds density, by 96 vertices along its longest axis, widened by one."""
     grid = _Grid.within(box, 96)
     sigma = np.concatenate(
-        [
-            _density(field, grid.positions(_plane(grid.shape, index)))
-            for index in _reported(grid.shape[0], report)
-        ]
+        [density(grid.positions(_plane(grid.shape, index))) for index in _reported(grid.shape[0], report)]
     ).reshape(grid.shape)
     found = np.argwhere(sigma > -np.log1p(-opacity) / grid.edge)
     if len(found) == 0:
@@ -151,14 +173,14 @@ def _content(field: Field, box: Array, opacity: float, report: Callable[[float],
 
 
 def _candidates(
-    field: Field, grid: _Grid, least: float, report: Callable[[float], None]
+    density: _Density, grid: _Grid, least: float, report: Callable[[float], None]
 ) -> NDArray[np.bool_]:
     """Vertices of the grid around those of every `_STEP`-th that hold density."""
     shape = tuple(-(-n // _STEP) for n in grid.shape)
     occupied = np.zeros(shape, bool)
     for index in _reported(shape[0], report):
         plane = _plane(shape, index)
-        occupied[index] = (_density(field, grid.positions(_STEP * plane)) > 0.5 * least).reshape(shape[1:])
+        occupied[index] = (density(grid.positions(_STEP * plane)) > 0.5 * least).reshape(shape[1:])
     fine = grown(occupied)
     for axis in range(3):
         fine = np.repeat(fine, _STEP, axis=axis)
@@ -166,14 +188,23 @@ def _candidates(
     return found
 
 
-def _density(field: Field, positions: Float32) -> Float32:
-    """Sigma [N] seen along -z."""
-    sigma = np.empty(len(positions), np.float32)
-    direction = np.array([0.0, 0.0, -1.0], np.float32)
-    for rows in _blocks(len(positions), BLOCK):
-        part = positions[rows]
-        sigma[rows] = field(part, np.broadcast_to(direction, part.shape))[0]
-    return sigma
+class _Density:
+    """Density [N] of positions [N,3], seen from where the cameras stand on average, else along -z."""
+
+    def __init__(self, field: Field, eye: Array | None) -> None:
+        self.field, self.eye = field, eye
+        self.signed = getattr(field, "signed_density", None)
+
+    def __call__(self, positions: Float32) -> Float32:
+        sigma = np.empty(len(positions), np.float32)
+        for rows in _blocks(len(positions), BLOCK):
+            part = positions[rows]
+            toward = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), part.shape)
+            if self.eye is not None:
+                away = (part - self.eye).astype(np.float32)
+                toward = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+            sigma[rows] = self.field(part, toward)[0] if self.signed is None else self.signed(part, toward)
+        return sigma
 
 
 def _colours(field: Field, positions: Float32, along: Float32) -> Float32:
@@ -187,10 +218,9 @@ def _colours(field: Field, positions: Float32, along: Float32) -> Float32:
 
 def _directions(points: Float32, eyes: Array | None, views: int, chance: np.random.Generator) -> Float32:
     """Unit directions [N,K,3] into the scene, from the eyes or from all around."""
-    if eyes is None:
-        away = chance.normal(size=(len(points), views, 3))
-    else:
-        away = points[:, None] - eyes[chance.integers(0, len(eyes), (len(points), views))]
+    away = np.asarray(chance.normal(size=(len(points), views, 3)))
+    if eyes is not None:
+        away = np.asarray(points[:, None] - eyes[chance.integers(0, len(eyes), (len(points), views))])
     return (away / np.linalg.norm(away, axis=-1, keepdims=True)).astype(np.float32)
 
 

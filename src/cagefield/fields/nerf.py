@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -225,6 +225,10 @@ class NerfField:
         """(sigma [N] per world unit, rgb [N,3]) at canonical positions [N,3] along unit viewdirs [N,3]."""
         return self.torch.numpy(positions, viewdirs)
 
+    def signed_density(self, positions: ArrayLike, viewdirs: ArrayLike) -> Float32:
+        """Density [N] per world unit before its ReLU: negative where space is empty, 0 at surfaces."""
+        return self.torch.numpy_signed(positions, viewdirs)
+
     def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,K,3]) at positions [N,3] along K directions each, viewdirs [N,K,3].
 
@@ -257,13 +261,3 @@ def _check_outputs(layer: Linear, outputs: int) -> None:
         raise FieldError(
             f"{layer.name}.weight is {list(layer.weight.shape)}, expected [{outputs}, {layer.inputs}]"
         )
-
-
-def state_of(field: NerfField) -> dict[str, Any]:
-    """Name -> array of all weights: "coarse.trunk.0.weight", ..."""
-    state: dict[str, Any] = {}
-    for part, network in (("coarse", field.coarse), ("fine", field.fine)):
-        for name, layer in [] if network is None else network.layers():
-            state[f"{part}.{name}.weight"] = layer.weight
-            state[f"{part}.{name}.bias"] = layer.bias
-    return state

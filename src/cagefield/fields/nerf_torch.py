@@ -153,6 +153,21 @@ class TorchNerf:
             sigma, rgb = self(self.tensor(p), self.tensor(d))
         return sigma.cpu().numpy(), rgb.cpu().numpy()
 
+    def signed(self, positions: Tensor, viewdirs: Tensor) -> Tensor:
+        """Density [N] per world unit before its ReLU."""
+        if self.field.ndc is None:
+            return self.network.trunk(positions)[0]
+        own, stretch = to_ndc(positions, viewdirs, self.field.ndc)
+        return self.network.trunk(own)[0] * stretch
+
+    def numpy_signed(self, positions: ArrayLike, viewdirs: ArrayLike) -> Float32:
+        """`signed` as numpy arrays, in chunks."""
+        p, d = self.tensor(positions), self.tensor(viewdirs)
+        block = BLOCK.get(self.device.type, 1 << 16)
+        with torch.no_grad():
+            parts = [self.signed(p[i : i + block], d[i : i + block]) for i in range(0, len(p), block)]
+            return torch.cat(parts).cpu().numpy() if parts else np.zeros(0, np.float32)
+
     def numpy_views(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,K,3]) of positions [N,3] and viewdirs [N,K,3], in chunks."""
         p, d = np.asarray(positions, np.float32), np.asarray(viewdirs, np.float32)
