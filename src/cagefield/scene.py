@@ -2,6 +2,7 @@
 
     SCENE/
       field.safetensors   the VoxelField, in canonical space
+      original.safetensors  the NerfField that it was baked from, if any, in the same space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
@@ -26,6 +27,8 @@ from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.voxel import VoxelField
 from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
@@ -39,7 +42,8 @@ FORMAT = "cagefield-scene"
 VERSION = 1
 
 _FIELD, _EDITS, _CAMERAS, _MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
-_FILES = (_FIELD, _EDITS, _CAMERAS, _MANIFEST)
+_ORIGINAL = "original.safetensors"
+_FILES = (_FIELD, _ORIGINAL, _EDITS, _CAMERAS, _MANIFEST)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,7 +52,8 @@ class Scene:
 
     Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
-    the field's picture, per channel, one for each "train" camera; empty where none were fitted.
+    the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
+    the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -61,6 +66,7 @@ class Scene:
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     version: int = VERSION
     gains: tuple[tuple[float, float, float], ...] = ()
+    original: NerfField | None = None
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -103,8 +109,9 @@ class Scene:
         cameras = _read_cameras(folder / _CAMERAS)
         edits = load_edits(folder / _EDITS, check=False)
         field = VoxelField.load(folder / _FIELD)
+        original = load_nerf(folder / _ORIGINAL) if (folder / _ORIGINAL).is_file() else None
         try:
-            return cls(field, edits, cameras, background, gains=gains)
+            return cls(field, edits, cameras, background, gains=gains, original=original)
         except SceneError as error:
             raise SceneError(f"{folder / _MANIFEST}: {error}") from None
 
@@ -120,6 +127,8 @@ class Scene:
         target = check_destination(path, overwrite)
         with replaced_folder(target, _FILES) as draft:
             self.field.save(draft / _FIELD)
+            if self.original is not None:
+                save_nerf(self.original, draft / _ORIGINAL)
             save_edits(self.edits, draft / _EDITS)
             _write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
@@ -154,7 +163,11 @@ class Scene:
         """The edited scene seen by `camera`, over the scene's own background unless another is given.
 
         "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
-        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference.
+        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference; where
+        the scene has an original field, that one, by its own hierarchical sampling.
+
+        Raises:
+            SceneError: normals of an original field, which are not computed.
         """
         colour = self.background if background is None else background_rgb(background)
         if not exact:
@@ -165,6 +178,8 @@ class Scene:
         from cagefield.fields.protocol import Field
         from cagefield.rendering.sampled import render_sampled
 
+        if self.original is not None:
+            return self._render_original(self.original, camera, background, normals)
         field = self.field
         near, far = _sampling_range(field, camera)
         samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
@@ -179,6 +194,17 @@ class Scene:
             edits=EditStack(edit.replace(lattice=None) for edit in self.edits),
             normals=normals,
         )
+
+    def _render_original(
+        self, original: NerfField, camera: Camera, background: Background, normals: bool
+    ) -> Frame:
+        if normals:
+            raise SceneError("normals of the original field are not computed; leave out normals, or exact")
+        original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
+        from cagefield.rendering.nerf import render_nerf
+
+        edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
+        return render_nerf(original, camera, edits=edits, background=background)
 
     @cached_property
     def renderer(self) -> Renderer:
