@@ -405,8 +405,14 @@ class Dragged(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
-    grid: list[list[Vec3]] = []
-    """Polylines of the deformed lattice through the shell, for the faint grid."""
+
+
+class Grid(Message):
+    """The faint grid of an edit: lines of a regular grid through its shell, as the edit bends them."""
+
+    type: Literal["grid"] = "grid"
+    edit: EditId
+    lines: list[list[Vec3]]
 
 
 class Answer(Message):
@@ -441,7 +447,7 @@ class Job(Message):
 
 
 ServerMessage: TypeAlias = Annotated[
-    Hello | State | Dragged | Answer | Notice | Job, Field(discriminator="type")
+    Hello | State | Dragged | Grid | Answer | Notice | Job, Field(discriminator="type")
 ]
 
 
