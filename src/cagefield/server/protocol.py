@@ -23,7 +23,10 @@ Axes: TypeAlias = Literal["world", "cage"]
 View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
 Kind: TypeAlias = Literal["continuous", "move", "copy", "delete"]
 Target: TypeAlias = Literal["field", "inner", "outer", "both"]
-"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode)."""
+"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode).
+
+"both" turns and scales both cages about the inner cage's pivot.
+"""
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
 Text: TypeAlias = Annotated[str, Field(max_length=200)]
@@ -276,11 +279,11 @@ class LoadEdits(Message):
 
 
 class Ask(Message):
-    """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying)."""
+    """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"."""
 
     type: Literal["ask"] = "ask"
     request: int
-    what: Literal["surface", "edit_text"]
+    what: Literal["surface", "edit_text", "grid"]
     x: Annotated[float, Field(ge=0, le=1)] = 0.5
     y: Annotated[float, Field(ge=0, le=1)] = 0.5
     edit: EditId | None = None
@@ -371,6 +374,7 @@ class EditState(Message):
     outer: Corners | None
     pivot: Vec3
     inner_pivot: Vec3
+    outer_pivot: Vec3 | None
     operations: list[str]
     problem: str | None
     """Why the edit cannot be shown, in a sentence with its cure; it is left out of the picture until then."""
@@ -416,13 +420,14 @@ class Grid(Message):
 
 
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, or a text; none of them where there is nothing."""
+    """The answer to an `ask`: a point and its normal, a text, or a grid as in `Dragged`; or nothing."""
 
     type: Literal["answer"] = "answer"
     request: int
     point: Vec3 | None = None
     normal: Vec3 | None = None
     text: str | None = None
+    grid: list[list[Vec3]] = []
 
 
 class Notice(Message):
