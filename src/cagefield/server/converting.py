@@ -80,6 +80,7 @@ def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | N
         outer=None if edit.outer is None else corners(edit.outer),
         pivot=vec3(edit.deformed.pivot),
         inner_pivot=vec3(edit.inner.pivot),
+        outer_pivot=None if edit.outer is None else vec3(edit.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
         problem=problem,
     )

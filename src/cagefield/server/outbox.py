@@ -12,7 +12,7 @@ MOST_WAITING = 200
 
 
 class Outbox:
-    """Messages in order; a waiting state, drag answer, grid or job's progress gives way to a newer one."""
+    """Messages in order; a waiting state, drag answer or job's progress gives way to a newer one."""
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[str, str | bytes]] = deque()
@@ -26,7 +26,7 @@ class Outbox:
         key: str = message.type
         if isinstance(message, protocol.Job):
             key = f"job {message.job}"
-        if isinstance(message, (protocol.State, protocol.Dragged, protocol.Job, protocol.Grid)):
+        if isinstance(message, (protocol.State, protocol.Dragged, protocol.Job)):
             self._waiting = deque(item for item in self._waiting if item[0] != key)
         elif len(self._waiting) >= MOST_WAITING:
             self._waiting.popleft()

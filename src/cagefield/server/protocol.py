@@ -411,16 +411,8 @@ class Dragged(Message):
     outer: Corners | None
 
 
-class Grid(Message):
-    """The faint grid of an edit: lines of a regular grid through its shell, as the edit bends them."""
-
-    type: Literal["grid"] = "grid"
-    edit: EditId
-    lines: list[list[Vec3]]
-
-
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, a text, or a grid as in `Dragged`; or nothing."""
+    """The answer to an `ask`: a point and its normal, a text, or a grid; or nothing."""
 
     type: Literal["answer"] = "answer"
     request: int
@@ -428,6 +420,7 @@ class Answer(Message):
     normal: Vec3 | None = None
     text: str | None = None
     grid: list[list[Vec3]] = []
+    """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
 
 
 class Notice(Message):
@@ -452,7 +445,7 @@ class Job(Message):
 
 
 ServerMessage: TypeAlias = Annotated[
-    Hello | State | Dragged | Grid | Answer | Notice | Job, Field(discriminator="type")
+    Hello | State | Dragged | Answer | Notice | Job, Field(discriminator="type")
 ]
 
 
