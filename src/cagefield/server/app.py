@@ -41,9 +41,9 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
-        hub.start()
+        hub.desk.start()
         yield
-        hub.close()
+        hub.desk.close()
 
     async def socket(websocket: WebSocket) -> None:
         await attend(websocket, hub, hello)

@@ -1,8 +1,8 @@
 """Saving, and what survives a crash. Nothing is overwritten that the user has not asked to be.
 
-Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or not
-at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and an
-editor that is started and finds one restores what it holds.
+Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or
+not at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and
+an editor that is started and finds one restores what it holds.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Keeper:
         )
 
     def recovered(self) -> Document | None:
-        """What an editor that ended without saving left behind; None where there is nothing, or nothing new."""
+        """What an editor that ended without saving left behind; None where that is nothing new."""
         try:
             content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
@@ -98,7 +98,7 @@ class Keeper:
         if now not in (self._written, self._warned):
             self._warned = now
             raise SceneError(
-                f"{self.path / _EDITS} was changed by another program; save again to replace it, or use Save as"
+                f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
             )
         document = session.document
         save_edits(document.stack, self.path / _EDITS)
