@@ -104,7 +104,7 @@ class Keeper:
         save_edits(document.stack, self.path / _EDITS)
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_whole(self.path / CAMERA_PATH) as draft:
-                draft.write_text(dump_path(document.keys, loop=document.loop), encoding="utf-8")
+                draft.write_text(dump_path(document.placed_keys, loop=document.loop), encoding="utf-8")
         self._scene(document).save_manifest(self.path)
         self._done(session)
 
@@ -127,7 +127,9 @@ class Keeper:
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
         if document.keys:
-            (target / CAMERA_PATH).write_text(dump_path(document.keys, loop=document.loop), encoding="utf-8")
+            (target / CAMERA_PATH).write_text(
+                dump_path(document.placed_keys, loop=document.loop), encoding="utf-8"
+            )
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path = target.resolve()
@@ -165,7 +167,7 @@ def _content(document: Document) -> dict[str, object]:
                 "seconds": key.seconds,
                 "parts": {str(name): part for name, part in key.parts.items()},
             }
-            for key in document.keys
+            for key in document.placed_keys
         ],
     }
 

@@ -28,6 +28,9 @@ TILE_SECONDS = 0.12
 SETTLE_SECONDS = 0.12
 """How long nothing may have changed before the view counts as at rest."""
 
+MOST_TILES = 16
+"""Tiles of a view, at most."""
+
 LEAST_SIDE = 96
 """Shorter side of the smallest moving picture, pixels."""
 
@@ -264,7 +267,7 @@ class Scheduler:
 
     def _tiles(self, p: _Page) -> list[Region]:
         """The view cut into tiles of about TILE_SECONDS, the middle ones first."""
-        count = max(1.0, p.width * p.height / (self._rate * TILE_SECONDS))
+        count = min(max(1.0, p.width * p.height / (self._rate * TILE_SECONDS)), MOST_TILES)
         side = math.sqrt(p.width * p.height / count)
         columns, rows = max(1, round(p.width / side)), max(1, round(p.height / side))
         xs = [8 * round(p.width * n / columns / 8) for n in range(columns)] + [p.width]

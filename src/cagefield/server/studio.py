@@ -96,7 +96,7 @@ class Studio:
         if stage == 1:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
             camera = Camera.look_at(
-                self._middle + [size, 0.0, 0.3 * size], self._middle, width=8, height=8, fov_x=0.5
+                self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
             )
             renderer.render(camera)
 
