@@ -409,12 +409,10 @@ class Dragged(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
-    grid: list[list[Vec3]] = []
-    """Polylines of the deformed lattice through the shell, for the faint grid."""
 
 
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, a text, or a grid as in `Dragged`; or nothing."""
+    """The answer to an `ask`: a point and its normal, a text, or a grid; or nothing."""
 
     type: Literal["answer"] = "answer"
     request: int
@@ -422,6 +420,7 @@ class Answer(Message):
     normal: Vec3 | None = None
     text: str | None = None
     grid: list[list[Vec3]] = []
+    """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
 
 
 class Notice(Message):
