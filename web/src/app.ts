@@ -26,6 +26,8 @@ export class App {
   readonly latency = new Latency();
   drag: Drag | null = null;
   lastPicture: PictureHeader | null = null;
+  /** When a picture or a state last came. */
+  lastNews = 0;
   private readonly lines: Lines;
   private readonly handles: Handles;
   private readonly connection: Connection;
@@ -130,7 +132,7 @@ export class App {
     const { now } = this.store;
     const edit = selected(now);
     const eye = this.stage.camera.position.toArray();
-    const grid = this.drag && this.drag.grid.length > 0 ? this.drag.grid : this.grid.lines;
+    const grid = this.drag === null ? this.grid.lines : [];
     const { segments, dots } = scenery(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
@@ -183,6 +185,7 @@ export class App {
   }
 
   private takeState(state: State): void {
+    this.lastNews = performance.now();
     const placed = state.edits.find((edit) => this.placedAfter !== null && edit.id > this.placedAfter);
     if (this.drag?.ended) {
       this.drag = null;
@@ -221,6 +224,7 @@ export class App {
         const decoded = performance.now();
         this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
         this.lastPicture = header;
+        this.lastNews = performance.now();
         this.pending.push(() => this.presented(header, received, decoded));
       } catch {
         this.say("a picture from the server could not be decoded", "warning");

@@ -5,7 +5,7 @@
 import { apply, part, type Operation, type Posed } from "./operations";
 import { containedPart, expectedPart } from "./limits";
 import { middle } from "./cage";
-import type { Corners, Dragged, EditState, PageMessage, Vec3 } from "./protocol";
+import type { Corners, Dragged, EditState, PageMessage } from "./protocol";
 import type { Target } from "./store";
 
 /** The cages of an edit, as they are shown. */
@@ -37,7 +37,6 @@ export class Drag {
   seq = 0;
   /** Why the drag stopped, or null while all of it is followed. */
   why: string | null = null;
-  grid: Vec3[][] = [];
   ended = false;
   private last: { operation: Operation; part: number; why: string | null } | null = null;
   private readonly sent = new Map<number, Operation>();
@@ -73,7 +72,6 @@ export class Drag {
     if (message.drag !== this.id || operation === undefined) return;
     for (const seq of this.sent.keys()) if (seq < message.seq) this.sent.delete(seq);
     this.last = { operation, part: message.part, why: message.why };
-    this.grid = message.grid;
     if (message.seq !== this.seq) return;
     this.why = message.why;
     const pivots = this.after(message.part < 1 ? part(operation, message.part) : operation);

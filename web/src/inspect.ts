@@ -12,8 +12,10 @@ export interface Inspector {
   readonly camera: { c2w: number[]; seq: number };
   /** Why the last drag stopped, what it was. */
   readonly drag: { id: number; seq: number; ended: boolean; why: string | null } | null;
-  /** Whether the last picture is final, and shows the camera and the edits as they are. */
+  /** Whether the last picture is final, and shows the camera as it is and no drag. */
   readonly settled: boolean;
+  /** Milliseconds since a picture or a state came. */
+  readonly quiet: number;
   /** A part of a cage, as it is shown, in CSS pixels of the window. */
   screen(edit: number, kind: Part["kind"], index: number, cage?: "inner" | "deformed" | "outer"): { x: number; y: number };
   /** Where to take hold of the gizmo's handle ("X", "XY", "XYZ", ...), in CSS pixels of the window. */
@@ -52,8 +54,10 @@ export function inspector(app: App): Inspector {
     },
     get settled() {
       const picture = app.lastPicture;
-      const revision = app.store.now.state?.revision;
-      return picture !== null && picture.final && picture.camera === app.camera.seq && picture.revision === revision && app.drag === null;
+      return picture !== null && picture.final && picture.camera === app.camera.seq && app.drag === null;
+    },
+    get quiet() {
+      return performance.now() - app.lastNews;
     },
     screen(id, kind, index, cage = "deformed") {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);

@@ -316,7 +316,7 @@ export interface SetPath {
   loop?: boolean;
 }
 /**
- * The answer to an `ask`: a point and its normal, a text, or a grid as in `Dragged`; or nothing.
+ * The answer to an `ask`: a point and its normal, a text, or a grid; or nothing.
  */
 export interface Answer {
   type: "answer";
@@ -338,7 +338,6 @@ export interface Dragged {
   inner: Corners;
   deformed: Corners;
   outer: Corners | null;
-  grid: Vec3[][];
 }
 /**
  * One edit as pages show it; corners in world units, deformed: the inner cage after its operations.

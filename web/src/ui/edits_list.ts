@@ -1,5 +1,5 @@
 /** The list of edits: name, colour, shown or not, locked or not, order; and what can be done to the selected one. */
-import { ChevronDown, ChevronUp, Copy, Eye, EyeOff, FlipHorizontal2, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
+import { ChevronDown, ChevronUp, Copy, Eye, EyeOff, FlipHorizontal, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import type { EditState } from "../protocol";
@@ -28,7 +28,7 @@ export function editsList(app: App, actions: Actions): HTMLElement {
     needSelected.push(made);
     mirrors.append(made);
   }
-  mirrors.prepend(icon(FlipHorizontal2, 16));
+  mirrors.prepend(icon(FlipHorizontal, 16));
   const bar = h(
     "div",
     { class: "bar" },

@@ -13,7 +13,8 @@ export function historyList(app: App): HTMLElement {
         return h("li", { class: `entry${when}`, onclick: go, data: { entry: String(entry) } }, text);
       }),
     );
-    list.querySelector(".now")?.scrollIntoView({ block: "nearest" });
+    const now = list.children[state.entry] as HTMLElement | undefined;
+    if (now) list.scrollTop = now.offsetTop - list.offsetTop - list.clientHeight / 2;
   });
   return section("History", list);
 }

@@ -1,5 +1,5 @@
 /** The selected edit's options and numbers. */
-import { Pane, type FolderApi } from "tweakpane";
+import { Pane } from "tweakpane";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import { extent } from "../cage";
@@ -15,8 +15,8 @@ interface Point {
   z: number;
 }
 
-const KINDS = { "Continuous: surroundings follow": "continuous", Move: "move", Copy: "copy", Delete: "delete" };
-const SHELLS = { "Flow: cannot fold": "flow", "Trilinear: the paper's": "trilinear" };
+const KINDS = { Continuous: "continuous", Move: "move", Copy: "copy", Delete: "delete" };
+const SHELLS = { Flow: "flow", Trilinear: "trilinear" };
 const FALLOFFS = { Smooth: "smooth", Linear: "linear" };
 const LATTICES = { Exact: 0, "32³ nodes": 32, "64³ nodes": 64, "128³ nodes": 128, "256³ nodes": 256 };
 
@@ -39,6 +39,16 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (edit !== null) app.send({ type: "apply", edit: edit.id, target: target(app.store.now), operation });
   };
 
+  /** Changes the model without taking it for the user's doing, once the change that goes on is over. */
+  const settle = (change: () => void): void => {
+    setTimeout(() => {
+      filling = true;
+      change();
+      pane.refresh();
+      filling = false;
+    });
+  };
+
   const numbers = pane.addFolder({ title: "Numbers" });
   const position = numbers.addBinding(model, "position", { label: "Position", format: short });
   position.on("change", ({ value, last }) => {
@@ -48,17 +58,16 @@ export function options(app: App, actions: Actions): HTMLElement {
     const by = vec(value).map((x, i) => tidy(x - pivot[i])) as Vec3;
     if (Math.hypot(...by) > 1e-9) applyNow({ kind: "translate", by });
   });
-  numbers.addBinding(model, "turn", { label: "Turn by °", format: short });
-  numbers.addButton({ title: "Turn" }).on("click", () => {
-    applyNow({ kind: "rotate", rotation_deg: vec(model.turn), axes: app.store.now.axes });
-    model.turn = point(0, 0, 0);
-    numbers.refresh();
+  numbers.addBinding(model, "turn", { label: "Turn by °", format: short }).on("change", ({ value, last }) => {
+    if (filling || !last || vec(value).every((x) => x === 0)) return;
+    applyNow({ kind: "rotate", rotation_deg: vec(value), axes: app.store.now.axes });
+    settle(() => (model.turn = point(0, 0, 0)));
   });
-  numbers.addBinding(model, "scale", { label: "Scale by", format: short, min: 0.02 });
-  numbers.addButton({ title: "Scale" }).on("click", () => {
-    applyNow({ kind: "scale", by: vec(model.scale), axes: app.store.now.axes });
-    model.scale = point(1, 1, 1);
-    numbers.refresh();
+  numbers.addBinding(model, "scale", { label: "Scale by", format: short }).on("change", ({ value, last }) => {
+    if (filling || !last || vec(value).every((x) => x === 1)) return;
+    if (vec(value).every((x) => x > 0)) applyNow({ kind: "scale", by: vec(value), axes: app.store.now.axes });
+    else app.say("scale factors must be above 0", "warning");
+    settle(() => (model.scale = point(1, 1, 1)));
   });
 
   const kind = pane.addFolder({ title: "Kind" });
@@ -81,6 +90,10 @@ export function options(app: App, actions: Actions): HTMLElement {
   cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
   cages.addButton({ title: "Outer cage by margin" }).on("click", () => actions.outerMargin(model.margin));
 
+  const removeLast = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("remove_last_operation", edit.id)) }, "Take the last one back");
+  const reset = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("reset_operations", edit.id)) }, "Reset");
+  const whole = section("Selected edit", host, h("div", { class: "subtitle" }, "Operations"), operations, h("div", { class: "bar" }, removeLast, reset));
+
   let marginOf: number | null = null;
   app.store.watch(["state", "mode", "cage"], (now) => {
     const edit = selected(now);
@@ -101,22 +114,13 @@ export function options(app: App, actions: Actions): HTMLElement {
     error.hidden = lattice.hidden || edit.lattice === 0;
     for (const binding of [shell, lattice]) binding.disabled = edit.locked;
     filling = true;
-    refresh(pane);
+    pane.refresh();
     filling = false;
     operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));
     removeLast.disabled = reset.disabled = edit.operations.length === 0;
   });
-
-  const removeLast = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("remove_last_operation", edit.id)) }, "Take the last one back");
-  const reset = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("reset_operations", edit.id)) }, "Reset");
-  const whole = section("Selected edit", host, h("div", { class: "subtitle" }, "Operations"), operations, h("div", { class: "bar" }, removeLast, reset));
-  whole.hidden = selected(app.store.now) === null;
   return whole;
 } // prettier-ignore
-
-function refresh(pane: FolderApi): void {
-  pane.refresh();
-}
 
 function latticeError(edit: EditState): string {
   if (edit.lattice_error === null) return "being measured";

@@ -13,8 +13,8 @@ export function status(app: App): HTMLElement {
   app.store.watch(["limit", "notice", "mode", "state"], (now) => {
     const notice = now.notice;
     message.className = `message ${now.limit !== null ? "limit" : (notice?.level ?? "")}`;
-    message.textContent = now.limit ?? notice?.text ?? "";
-    message.title = message.textContent;
+    message.title = now.limit ?? notice?.text ?? "";
+    message.textContent = now.limit !== null ? `The drag stops here: ${now.limit.split(";")[0]}` : message.title;
   });
   app.store.watch(["notice"], (now) => {
     clearTimeout(until);

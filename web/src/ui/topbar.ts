@@ -67,7 +67,7 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
       link(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
       link(Camera, "Screenshot of the field", `screenshot.png${location.search}`, "screenshot.png"),
     ),
-    h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "help"), panel),
+    h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),
     file,
   );
 }
