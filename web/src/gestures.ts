@@ -9,6 +9,7 @@ const UNIT: Record<string, Vector3> = {
   Z: new Vector3(0, 0, 1),
 };
 const LEAST_FACTOR = 0.02;
+const MOST_FACTOR = 50;
 
 /** The translation between two positions of the gizmo. */
 export function translation(from: Vector3, to: Vector3): Operation {
@@ -28,9 +29,9 @@ export function rotation(from: Quaternion, to: Quaternion, axes: Axes, about: st
   return { kind: "rotate", rotation_deg: tidied(axis.clone().multiplyScalar(wrapped)), axes };
 }
 
-/** The scaling that the gizmo's factors mean; none falls below a fiftieth. */
+/** The scaling that the gizmo's factors mean, a fiftieth to fifty along each axis. */
 export function scaling(factors: Vector3, axes: Axes): Operation {
-  const by = factors.toArray().map((s) => tidy(Math.max(s, LEAST_FACTOR))) as Vec3;
+  const by = factors.toArray().map((s) => tidy(Math.min(Math.max(s, LEAST_FACTOR), MOST_FACTOR))) as Vec3;
   return { kind: "scale", by, axes };
 }
 

@@ -6,6 +6,9 @@ import { cornersMove, rotation, scaling, translation } from "./gestures";
 import type { Axes, Operation, Posed } from "./operations";
 import type { Tool } from "./store";
 
+/** Logarithm of the uniform factor for half the height of the view. */
+const UNIFORM_SPEED = 2;
+
 interface Device {
   x: number;
   y: number;
@@ -23,7 +26,7 @@ interface Inner {
 export class Gizmo {
   private readonly proxy = new Object3D();
   private readonly controls: TransformControls;
-  private readonly from = { position: new Vector3(), quaternion: new Quaternion() };
+  private readonly from = { position: new Vector3(), quaternion: new Quaternion(), device: { x: 0, y: 0 } };
   private axes: Axes = "world";
 
   constructor(
@@ -61,11 +64,11 @@ export class Gizmo {
     return this.controls.dragging;
   }
 
-  /** Whether the mouse is over one of the gizmo's handles, which is then highlighted. */
-  hover(device: Device): boolean {
-    if (!this.shown) return false;
+  /** The handle that the mouse is over, which is then highlighted: "X", "XY", "XYZ", "E" and so on, or null. */
+  hover(device: Device): string | null {
+    if (!this.shown) return null;
     this.inner.pointerHover({ ...device, button: -1 });
-    return this.axis !== null;
+    return this.axis;
   }
 
   /** Takes the highlight off. */
@@ -73,7 +76,7 @@ export class Gizmo {
     if (!this.dragging) this.controls.axis = null;
   }
 
-  /** The handle under the mouse: "X", "XY", "XYZ", "E" and so on. */
+  /** The handle that is highlighted, or held. */
   get axis(): string | null {
     return this.controls.axis;
   }
@@ -81,6 +84,7 @@ export class Gizmo {
   begin(device: Device): void {
     this.from.position.copy(this.proxy.position);
     this.from.quaternion.copy(this.proxy.quaternion);
+    this.from.device = { x: device.x, y: device.y };
     this.inner.pointerDown({ ...device, button: 0 });
   }
 
@@ -96,8 +100,15 @@ export class Gizmo {
       case "rotate":
         return rotation(from.quaternion, proxy.quaternion, this.axes, this.axis ?? "");
       case "scale":
-        return scaling(proxy.scale, this.axes);
+        return scaling(this.axis === "XYZ" ? this.uniform(device) : proxy.scale, this.axes);
     }
+  }
+
+  /** Factors of a uniform scaling: larger to the right and up, wherever the mouse took hold. */
+  private uniform(device: Device): Vector3 {
+    const { x, y } = this.from.device;
+    const factor = Math.exp(UNIFORM_SPEED * ((device.x - x) * this.camera.aspect + (device.y - y)));
+    return new Vector3(factor, factor, factor);
   }
 
   /** Stands where the drag could be followed to. */
@@ -111,8 +122,8 @@ export class Gizmo {
     this.controls.axis = null;
   }
 
-  /** A place, in normalised device coordinates, where the mouse takes hold of a handle; null if it is nowhere. */
-  grip(axis: string): Device | null {
+  /** A place, in normalised device coordinates, that is free and where the mouse takes hold of a handle; or null. */
+  grip(axis: string, free: (device: Device) => boolean): Device | null {
     const picker = this.inner._gizmo.picker[this.controls.mode];
     picker.updateMatrixWorld(true);
     const handles = picker.children.filter((child): child is Mesh => child instanceof Mesh);
@@ -128,7 +139,7 @@ export class Gizmo {
         if (Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98) continue;
         ray.setFromCamera(new Vector2(at.x, at.y), this.camera);
         const hit = ray.intersectObjects(handles, false).find((found) => found.object.visible);
-        if (hit?.object.name === axis) return { x: at.x, y: at.y };
+        if (hit?.object.name === axis && free(at)) return { x: at.x, y: at.y };
       }
     }
     return null;

@@ -3,7 +3,9 @@ import { cornersOf, middle, type Part } from "./cage";
 import type { App } from "./app";
 import type { Latency } from "./latency";
 import type { PictureHeader } from "./protocol";
-import { type Editor } from "./store";
+import { pickCorner } from "./picking";
+import { draggable } from "./scenery";
+import { selected, type Editor } from "./store";
 
 export interface Inspector {
   readonly now: Editor;
@@ -67,9 +69,14 @@ export function inspector(app: App): Inspector {
       return inWindow(x, y);
     },
     grip(axis) {
-      const at = app.gizmo.grip(axis);
       const { width, height } = stage.points;
-      return at && inWindow((0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height);
+      const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
+      const edit = selected(app.store.now);
+      const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
+      const at = app.gizmo.grip(axis, (device) =>
+        cages.every(({ corners }) => pickCorner(...pixel(device), corners, stage.project) === null),
+      );
+      return at && inWindow(...pixel(at));
     },
     project(point) {
       const { x, y } = stage.project(point);

@@ -26,10 +26,15 @@ export interface Candidate {
 export function pick(x: number, y: number, { corners, eye }: Candidate, project: Project): Part | null {
   const points = corners.map(project);
   return (
-    nearest("corner", points.map((p) => near(p, x, y, REACH.corner))) ??
+    pickCorner(x, y, corners, project) ??
     nearest("face", facesTowards(corners, eye).map((p) => p && near(project(p), x, y, REACH.face))) ??
     nearest("edge", EDGES.map(([i, j]) => nearSegment(points[i], points[j], x, y)))
   );
+}
+
+/** The corner of a cage at pixel (x, y), or null. */
+export function pickCorner(x: number, y: number, corners: Corners, project: Project): Part | null {
+  return nearest("corner", corners.map((corner) => near(project(corner), x, y, REACH.corner)));
 }
 
 /** The middle of each face that looks towards the eye, null for the others. */

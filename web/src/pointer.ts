@@ -1,11 +1,11 @@
-/** The mouse on the canvas: handles first, then the gizmo, then the view. */
+/** The mouse on the canvas: corners first, then the gizmo, then faces and edges, then the view. */
 import { Plane, Vector3 } from "three";
 import { cornersOf, extent, faceNormal, middle, type Part } from "./cage";
 import type { App } from "./app";
 import { leading } from "./drag";
 import { cornersMove, onLine, onPlane } from "./gestures";
 import { lengthStep, snapped, type Operation } from "./operations";
-import { distanceToEdges, pick } from "./picking";
+import { distanceToEdges, pick, pickCorner } from "./picking";
 import { draggable, shownCages } from "./scenery";
 import { obstacle, selected, target, type Hover } from "./store";
 
@@ -13,6 +13,8 @@ const SNAP_ANGLE = 15;
 const SNAP_FACTOR = 0.1;
 const CLICK_REACH = 4;
 const LINE_REACH = 7;
+/** The gizmo's handle for turning freely: it fills the gizmo, and gives way to what is inside. */
+const WHOLE_BALL = "XYZE";
 
 type Constraint = "X" | "Y" | "Z" | null;
 
@@ -75,8 +77,9 @@ export class Pointer {
   private down(event: PointerEvent): void {
     this.locate(event);
     this.pressed = { ...this.at };
-    const hover = event.button === 0 && !event.altKey ? this.under() : null;
-    if (event.button !== 0 || event.altKey || (hover === null && !this.overGizmo())) {
+    const free = event.button !== 0 || event.altKey;
+    const hover = free ? null : this.under();
+    if (free || (hover === null && this.app.gizmo.axis === null)) {
       this.app.camera.held = true;
       return;
     }
@@ -124,31 +127,39 @@ export class Pointer {
 
   /** Shows what a click would take hold of. */
   private look(): void {
+    const axis = this.app.gizmo.axis;
     const hover = this.under();
+    if (this.app.gizmo.axis !== axis) this.app.stage.invalidate();
     const before = this.app.store.now.hover;
     if (!(hover?.cage === before?.cage && hover?.part.kind === before?.part.kind && hover?.part.index === before?.part.index)) {
       this.app.store.set({ hover });
     }
-    const axis = this.app.gizmo.axis;
-    const over = hover === null ? this.overGizmo() : (this.app.gizmo.leave(), false);
-    if (this.app.gizmo.axis !== axis) this.app.stage.invalidate();
-    this.app.stage.canvas.style.cursor = hover || over ? "pointer" : "";
+    this.app.stage.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
   }
 
+  /** The part of a cage that a click would take hold of; where it is the gizmo's handle instead, that is lit. */
   private under(): Hover | null {
     const { now } = this.app.store;
     const edit = selected(now);
+    this.app.gizmo.leave();
     if (edit === null || !now.cages || obstacle(edit, now.mode) !== null) return null;
+    const { project } = this.app.stage;
+    const { x, y } = this.at;
+    const cages = draggable(now, shownCages(edit, this.app.drag));
+    for (const { cage, corners } of cages) {
+      const corner = pickCorner(x, y, corners, project);
+      if (corner !== null) return { part: corner, cage };
+    }
+    const axis = this.app.gizmo.hover(this.app.stage.device(x, y));
+    if (axis !== null && axis !== WHOLE_BALL) return null;
     const eye = this.app.stage.camera.position.toArray();
-    for (const { cage, corners } of draggable(now, shownCages(edit, this.app.drag))) {
-      const part = pick(this.at.x, this.at.y, { corners, eye }, this.app.stage.project);
-      if (part !== null) return { part, cage };
+    for (const { cage, corners } of cages) {
+      const part = pick(x, y, { corners, eye }, project);
+      if (part === null) continue;
+      this.app.gizmo.leave();
+      return { part, cage };
     }
     return null;
-  }
-
-  private overGizmo(): boolean {
-    return this.app.gizmo.hover(this.app.stage.device(this.at.x, this.at.y));
   }
 
   /** Adds the corners of a part to those that are dragged together, or takes them out again. */
@@ -229,7 +240,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.locate(event);
-    if (this.under() !== null || this.overGizmo()) return;
+    if (this.under() !== null || this.app.gizmo.axis !== null) return;
     const { width, height } = this.app.stage.points;
     this.app.expectEdit();
     this.app.send({ type: "place", x: clamp(this.at.x / width), y: clamp(this.at.y / height) });
