@@ -164,7 +164,7 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
 
 
 def shared_up(poses: Floats) -> Floats:
-    """The unit up direction of cameras with these poses [N,4,4]; exactly +z where it is within 10 degrees of it.
+    """The unit up direction of cameras with these poses [N,4,4]; exactly +z where it is within 10 degrees.
 
     A camera that is not rolled has its +x axis level, so up is the direction most normal to all +x axes: the
     last eigenvector of Σ x xᵀ. Cameras that all share one +x axis leave it open; then it is their mean +y.

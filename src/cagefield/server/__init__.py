@@ -1,1 +1,1 @@
-"""The editor behind `cagefield view`: its state, its renderer's process, and the socket that pages talk to."""
+"""The editor behind `cagefield view`: its state, its rendering process, and the socket pages talk to."""

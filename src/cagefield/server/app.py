@@ -41,9 +41,9 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
-        hub.start()
+        hub.desk.start()
         yield
-        hub.close()
+        hub.desk.close()
 
     async def socket(websocket: WebSocket) -> None:
         await attend(websocket, hub, hello)
@@ -55,7 +55,7 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
         from cagefield.keyframes import dump_path
 
         document = hub.session.document
-        text = dump_path(document.keys, loop=document.loop)
+        text = dump_path(document.placed_keys, loop=document.loop)
         return _download(text, "camera_path.json", "application/json")
 
     async def screenshot(request: Request) -> Response:

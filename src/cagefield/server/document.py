@@ -64,6 +64,15 @@ class Document:
         """The edits as a stack."""
         return EditStack(entry.edit for entry in self.entries)
 
+    @property
+    def placed_keys(self) -> tuple[Keyframe, ...]:
+        """The keyframes with edits named by their place in the list from 1, as files have them."""
+        places = {entry.id: place for place, entry in enumerate(self.entries, start=1)}
+        return tuple(
+            replace(key, parts={places[name]: part for name, part in key.parts.items() if name in places})
+            for key in self.keys
+        )
+
     def place(self, number: int) -> int:
         """Where in the list the edit of that number is. Raises EditError where it is not there any more."""
         for at, entry in enumerate(self.entries):

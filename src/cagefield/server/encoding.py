@@ -43,6 +43,13 @@ def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
     return stream.getvalue()
 
 
+def png(pixels: NDArray[np.uint8]) -> bytes:
+    """A PNG."""
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="PNG", compress_level=3)
+    return stream.getvalue()
+
+
 def depths(frame: Frame, scale: float, stride: int) -> NDArray[np.uint16]:
     """Depths [h,w] in units of `scale`, every `stride`-th pixel; NOTHING where it is half empty."""
     d, opacity = frame.depth[::stride, ::stride], frame.opacity[::stride, ::stride]

@@ -1,8 +1,8 @@
 """Saving, and what survives a crash. Nothing is overwritten that the user has not asked to be.
 
-Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or not
-at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and an
-editor that is started and finds one restores what it holds.
+Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or
+not at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and
+an editor that is started and finds one restores what it holds.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Keeper:
         )
 
     def recovered(self) -> Document | None:
-        """What an editor that ended without saving left behind; None where there is nothing, or nothing new."""
+        """What an editor that ended without saving left behind; None where that is nothing new."""
         try:
             content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
@@ -98,13 +98,13 @@ class Keeper:
         if now not in (self._written, self._warned):
             self._warned = now
             raise SceneError(
-                f"{self.path / _EDITS} was changed by another program; save again to replace it, or use Save as"
+                f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
             )
         document = session.document
         save_edits(document.stack, self.path / _EDITS)
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_whole(self.path / CAMERA_PATH) as draft:
-                draft.write_text(dump_path(document.keys, loop=document.loop), encoding="utf-8")
+                draft.write_text(dump_path(document.placed_keys, loop=document.loop), encoding="utf-8")
         self._scene(document).save_manifest(self.path)
         self._done(session)
 
@@ -127,7 +127,9 @@ class Keeper:
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
         if document.keys:
-            (target / CAMERA_PATH).write_text(dump_path(document.keys, loop=document.loop), encoding="utf-8")
+            (target / CAMERA_PATH).write_text(
+                dump_path(document.placed_keys, loop=document.loop), encoding="utf-8"
+            )
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path = target.resolve()
@@ -165,7 +167,7 @@ def _content(document: Document) -> dict[str, object]:
                 "seconds": key.seconds,
                 "parts": {str(name): part for name, part in key.parts.items()},
             }
-            for key in document.keys
+            for key in document.placed_keys
         ],
     }
 

@@ -43,7 +43,7 @@ def move_corners(corners: tuple[int, ...], by: Triple) -> Operation:
 def move(entry: Entry, target: Target, operation: Operation) -> Moved:
     """The entry's edit after as much of an operation as it can follow.
 
-    Raises EditError for a locked edit, one that is deleted and cannot move, or an outer cage that is not there.
+    Raises EditError for a locked edit, a deleted one, and an outer cage that is not there.
     """
     edit = entry.edit
     if entry.locked:

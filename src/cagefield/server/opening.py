@@ -66,7 +66,7 @@ def _from_outside(scene: Scene) -> Camera:
     size = float(((upper - lower) ** 2).sum()) ** 0.5
     middle = 0.5 * (lower + upper)
     return Camera.look_at(
-        middle + [0.9 * size, -0.9 * size, 0.6 * size], middle, width=800, height=800, fov_x=0.9
+        middle + size * np.array([0.9, -0.9, 0.6]), middle, width=800, height=800, fov_x=0.9
     )
 
 
@@ -90,6 +90,6 @@ def bound_socket(host: str, port: int) -> socket.socket:
     except OSError as error:
         listening.close()
         raise CagefieldError(
-            f"cannot listen on {host}:{port} ({error.strerror}); give another --port, or 0 for any that is free"
+            f"cannot listen on {host}:{port} ({error.strerror}); give another --port, or 0 for a free one"
         ) from None
     return listening

@@ -114,7 +114,7 @@ class CameraMessage(Message):
 
 
 class LookMessage(Message):
-    """What is shown: a view of the field; `before` leaves the edits out left of `split` (0 to 1 of the width)."""
+    """What is shown: a view; `before` leaves the edits out, left of `split` (0 to 1) where that is given."""
 
     type: Literal["look"] = "look"
     view: View = "colour"
@@ -307,7 +307,7 @@ class SetPath(Message):
 
 
 class RenderJob(Message):
-    """Renders the test views to numbered PNGs in a folder, or the camera path to an MP4, in the background."""
+    """Renders the test views to PNGs in a folder, or the camera path to an MP4; in the background."""
 
     type: Literal["render"] = "render"
     what: Literal["test_views", "camera_path"]
@@ -326,9 +326,9 @@ class CancelJob(Message):
 
 
 PageMessage: TypeAlias = Annotated[
-    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | Apply | SetCage
-    | Place | FitInner | OuterMargin | Change | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits
-    | Ask | SetPath | RenderJob | CancelJob,
+    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | Apply
+    | SetCage | Place | FitInner | OuterMargin | Change | SceneChange | Command | Mirror | Reorder | GoTo
+    | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
     Field(discriminator="type"),
 ]  # fmt: skip
 

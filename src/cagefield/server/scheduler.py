@@ -10,6 +10,7 @@ no web and no renderer: it is told what happens and when, and asked for the next
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -26,6 +27,9 @@ TILE_SECONDS = 0.12
 
 SETTLE_SECONDS = 0.12
 """How long nothing may have changed before the view counts as at rest."""
+
+MOST_TILES = 16
+"""Tiles of a view, at most."""
 
 LEAST_SIDE = 96
 """Shorter side of the smallest moving picture, pixels."""
@@ -150,24 +154,22 @@ class Scheduler:
         if p is not None:
             p.unshown = [number for number in p.unshown if number > picture]
 
-    def finished(self, request: Request, rays: int, seconds: float, overhead: float, now: float) -> None:
+    def finished(self, request: Request, rays: int, seconds: float, overhead: float) -> None:
         """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
         self._running = None
-        p = self._pages.get(request.page)
-        if rays > 0:
-            rate = rays / max(seconds - overhead, 1e-4)
-            self._rate += 0.3 * (rate - self._rate)
-            if request.moving:
-                self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
-        if p is not None:
-            p.unshown.append(request.number)
+        self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
+        if request.moving:
+            self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
+        page = self._pages.get(request.page)
+        if page is not None:
+            page.unshown.append(request.number)
 
-    def abandoned(self, request: Request, now: float) -> None:
-        """The picture was not rendered: stopped half-way, or the renderer was lost."""
+    def abandoned(self, request: Request, again: bool) -> None:
+        """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
         running, self._running = self._running, None
-        p = self._pages.get(request.page)
-        if p is not None and running is not None and p.version == running[1]:
-            p.tiles, p.shown_version = None, -1
+        page = self._pages.get(request.page)
+        if again and page is not None and running is not None and page.version == running[1]:
+            page.tiles, page.shown_version = None, -1
 
     def refresh(self, now: float) -> None:
         """Everything is to be rendered anew."""
@@ -208,8 +210,8 @@ class Scheduler:
         """How many pictures are on their way to a page."""
         return len(self._pages[page].unshown)
 
-    def idle(self, now: float) -> bool:
-        """True where no page is owed anything and nothing has moved for a while."""
+    def idle(self) -> bool:
+        """True where no page waits for a picture, or can be sent one."""
         return self._running is None and all(
             p.camera < 0 or len(p.unshown) >= MOST_UNSHOWN or (p.tiles == [] and not p.moving)
             for p in self._pages.values()
@@ -265,15 +267,15 @@ class Scheduler:
 
     def _tiles(self, p: _Page) -> list[Region]:
         """The view cut into tiles of about TILE_SECONDS, the middle ones first."""
-        count = max(1.0, p.width * p.height / (self._rate * TILE_SECONDS))
+        count = min(max(1.0, p.width * p.height / (self._rate * TILE_SECONDS)), MOST_TILES)
         side = math.sqrt(p.width * p.height / count)
         columns, rows = max(1, round(p.width / side)), max(1, round(p.height / side))
         xs = [8 * round(p.width * n / columns / 8) for n in range(columns)] + [p.width]
         ys = [8 * round(p.height * n / rows / 8) for n in range(rows)] + [p.height]
         tiles = [
             Region(x, y, x1 - x, y1 - y, p.width, p.height)
-            for x, x1 in zip(xs, xs[1:], strict=False)
-            for y, y1 in zip(ys, ys[1:], strict=False)
+            for x, x1 in itertools.pairwise(xs)
+            for y, y1 in itertools.pairwise(ys)
             if x1 > x and y1 > y
         ]
 

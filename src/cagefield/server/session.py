@@ -136,7 +136,7 @@ class Session:
             self.revision += 1
 
     def apply(self, number: int, target: Target, operation: Operation) -> Moved:
-        """A whole operation at once. Raises EditError, and changes nothing, where not all of it is possible."""
+        """A whole operation at once. Raises EditError where not all of it is possible."""
         entry = self.document.entry(number)
         moved = move(entry, target, operation)
         if moved.part < 1.0:

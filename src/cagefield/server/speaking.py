@@ -20,7 +20,7 @@ from cagefield.server.converting import (
 from cagefield.server.hub import Hub, Page
 from cagefield.server.placing import fitted
 from cagefield.server.scheduler import Look
-from cagefield.server.tasks import FitTask, Shown, SurfaceTask, values_of
+from cagefield.server.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
 
 
 class Speaker:
@@ -54,6 +54,8 @@ class Speaker:
             if message.edit is None:
                 raise CagefieldError("choose an edit to copy")
             answer = protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
+        elif message.what == "grid":
+            answer = protocol.Answer(request=message.request, grid=await self._grid(message.edit))
         else:
             found = await self._surface(message.x, message.y)
             if found is not None:
@@ -61,6 +63,15 @@ class Speaker:
                     request=message.request, point=tuple(found[0]), normal=tuple(found[1])
                 )
         self._page.outbox.put(answer)
+
+    async def _grid(self, number: int | None) -> Any:
+        if number is None:
+            raise CagefieldError("choose an edit to show the grid of")
+        edit = self._session.shown.entry(number).edit
+        if edit.adjustment != "continuous" or self._session.problem(edit) is not None:
+            return []
+        values = values_of((edit,))[0]
+        return await self._hub.ask(lambda task: GridTask(task, values))
 
     async def _surface(self, x: float, y: float) -> Any:
         camera = self._page.camera
@@ -185,7 +196,9 @@ class Speaker:
         self._hub.changed()
 
     def _render(self, message: protocol.RenderJob) -> None:
-        self._hub.render(message)
+        self._hub.chores.render(message)
+        self._hub.pump()
 
     def _cancel_job(self, message: protocol.CancelJob) -> None:
-        self._hub.cancel_job(message.job)
+        self._hub.chores.cancel(message.job)
+        self._hub.pump()

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.frame import Float32, Frame
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
 from cagefield.server import encoding
-from cagefield.server.scheduler import Region
-from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
+from cagefield.server.scheduler import Look, Region
+from cagefield.server.tasks import WARM_STAGES, EditValues, PictureDone, PictureTask, Shown, Stopped
 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
@@ -79,6 +80,25 @@ class Studio:
             rendered - began,
             time.perf_counter() - rendered,
         )
+
+    def still(self, shown: Shown, camera: Camera, look: Look, stop: Stop | None = None) -> Frame | None:
+        """A whole picture, its edits exact; None where it was stopped."""
+        region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
+        task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
+        return self._frame(task, self.renderer(shown, exact=True), stop or (lambda: False))
+
+    def warm(self, stage: int) -> None:
+        """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
+        voxel = float(max(self.scene.field.voxel_size))
+        inner = Cage.box(self._middle, 8.0 * voxel)
+        edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < WARM_STAGES - 1)
+        if stage == 1:
+            size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
+            camera = Camera.look_at(
+                self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
+            )
+            renderer.render(camera)
 
     def renderer(self, shown: Shown, *, exact: bool) -> Renderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now."""

@@ -12,6 +12,9 @@ from cagefield.edits import Edit
 from cagefield.keyframes import Still
 from cagefield.server.scheduler import Look, Region
 
+WARM_STAGES = 3
+"""Steps in which the kernels of edited pictures are made ready."""
+
 EditValues: TypeAlias = Mapping[str, Any]
 
 
@@ -74,6 +77,14 @@ class FitTask:
 
 
 @dataclass(frozen=True)
+class WarmTask:
+    """One of the renderer's kernels is to be made ready, so that no drag has to wait for it."""
+
+    number: int
+    stage: int
+
+
+@dataclass(frozen=True)
 class ErrorTask:
     """How far an edit's lattice is from its exact map."""
 
@@ -115,7 +126,7 @@ class EndJobTask:
 
 
 Task: TypeAlias = (
-    PictureTask | StillTask | SurfaceTask | FitTask | ErrorTask | GridTask | FrameTask | EndJobTask
+    PictureTask | StillTask | SurfaceTask | FitTask | WarmTask | ErrorTask | GridTask | FrameTask | EndJobTask
 )
 
 

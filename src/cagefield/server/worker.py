@@ -7,12 +7,12 @@ hands it tasks, passes results on, and starts it again when it is lost.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import multiprocessing
 import signal
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from multiprocessing.sharedctypes import Synchronized
 from typing import Any
 
 from cagefield.errors import CagefieldError
@@ -21,7 +21,7 @@ from cagefield.server.tasks import Failed, Ready, Result, Task
 _LOST = (EOFError, ConnectionResetError, BrokenPipeError, OSError)
 
 
-def serve(connection: Connection, generation: Synchronized[int], scene: str, device: str) -> None:
+def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
     """Does tasks until the pipe closes. The scene is read once; what a task raises becomes `Failed`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from cagefield import devices
@@ -51,7 +51,7 @@ def serve(connection: Connection, generation: Synchronized[int], scene: str, dev
             return
 
 
-def _done(working: Any, task: Task, generation: Synchronized[int]) -> Result:
+def _done(working: Any, task: Task, generation: ctypes.c_ulong) -> Result:
     try:
         return working.do(task, lambda wanted: generation.value > wanted)
     except CagefieldError as error:
@@ -78,7 +78,7 @@ class Worker:
         self._on_result, self._on_lost = on_result, on_lost
         context = multiprocessing.get_context("spawn")
         self._context = context
-        self._generation: Synchronized[int] = context.Value("L", 0)
+        self._generation: ctypes.c_ulong = context.RawValue(ctypes.c_ulong, 0)
         self._process: Any = None
         self._connection: Connection | None = None
 

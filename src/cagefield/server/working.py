@@ -3,11 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import CagefieldError
+from cagefield.server.encoding import picture_of, png
+from cagefield.server.grid_lines import grid_lines
+from cagefield.server.job_files import JobFiles
+from cagefield.server.placing import probes
+from cagefield.server.scheduler import Look
 from cagefield.server.studio import Studio
-from cagefield.server.tasks import Answered, FitTask, PictureTask, Result, SurfaceTask, Task
+from cagefield.server.tasks import (
+    Answered,
+    EndJobTask,
+    ErrorTask,
+    FitTask,
+    FrameTask,
+    GridTask,
+    PictureTask,
+    Result,
+    StillTask,
+    Stopped,
+    SurfaceTask,
+    Task,
+    WarmTask,
+)
+
+DENSE = 0.05
+"""Optical depth of a voxel from which on it counts as dense."""
 
 Abandoned = Callable[[int], bool]
 
@@ -17,19 +42,53 @@ class Working:
 
     def __init__(self, studio: Studio) -> None:
         self._studio = studio
+        self._files = JobFiles()
 
     def do(self, task: Task, abandoned: Abandoned) -> Result:
         """The task's result. Raises CagefieldError where it cannot be done."""
         if isinstance(task, PictureTask):
             return self._studio.picture(task, lambda: abandoned(task.generation))
-        if isinstance(task, SurfaceTask):
-            return Answered(task.number, self._surface(task))
-        if isinstance(task, FitTask):
-            return Answered(task.number, self._fit(task))
-        raise NotImplementedError(type(task).__name__)
+        if isinstance(task, FrameTask):
+            return self._frame(task, lambda: abandoned(task.generation))
+        return Answered(task.number, self._answer(task))
 
     def close(self) -> None:
         """Drops what is half done."""
+        self._files.close()
+
+    def _answer(
+        self, task: StillTask | SurfaceTask | FitTask | WarmTask | ErrorTask | GridTask | EndJobTask
+    ) -> Any:
+        if isinstance(task, SurfaceTask):
+            return self._surface(task)
+        if isinstance(task, FitTask):
+            return self._fit(task)
+        if isinstance(task, StillTask):
+            return self._still(task)
+        if isinstance(task, WarmTask):
+            return self._studio.warm(task.stage)
+        if isinstance(task, EndJobTask):
+            return self._files.end(task.job, task.keep)
+        edit = Edit(**task.edit)
+        if isinstance(task, GridTask):
+            return grid_lines(edit)
+        most, mean = edit.lattice_error(samples=5_000)
+        voxel = float(min(self._studio.scene.field.voxel_size))
+        return most / voxel, mean / voxel
+
+    def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
+        frame = self._studio.still(task.shown, task.still.camera, Look(), stop)
+        if frame is None:
+            return Stopped(task.number)
+        self._files.add(task, frame)
+        return Answered(task.number)
+
+    def _still(self, task: StillTask) -> bytes:
+        """The picture as a PNG."""
+        frame = self._studio.still(task.shown, task.camera, task.look)
+        if frame is None:
+            raise CagefieldError("the picture was given up; try again")
+        return png(picture_of(frame, task.look.view, self._studio.reach(task.camera)))
 
     def _surface(self, task: SurfaceTask) -> tuple[list[float], list[float]] | None:
         """(point, normal) of the surface at a pixel; None where the picture is half empty."""
@@ -46,8 +105,6 @@ class Working:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
-        from cagefield.edits import EditStack
-        from cagefield.server.placing import probes
         from cagefield.warps.device import DeviceStack
 
         points = probes(task.cage)
@@ -58,7 +115,3 @@ class Working:
         sigma, _ = field(canonical.astype(np.float64), along)
         dense = (np.asarray(sigma) * float(min(field.voxel_size)) > DENSE) & ~emptied
         return dense.tolist()
-
-
-DENSE = 0.05
-"""Optical depth of a voxel from which on it counts as dense."""
