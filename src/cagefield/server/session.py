@@ -112,6 +112,7 @@ class Session:
         """How far the drag could follow its operation since the beginning; it shows that."""
         drag = self._drag(page, number)
         moved = move(drag.before, drag.target, operation)
+        self._problems = [*self._problems[-63:], (moved.edit, moved.problem)]
         self.drags[page] = replace(drag, now=replace(drag.before, edit=moved.edit))
         self.revision += 1
         return moved
