@@ -55,7 +55,8 @@ start = time.perf_counter()
 from cagefield.cli import main
 code = main(["--help"])
 print("seconds", time.perf_counter() - start)
-print("loaded", *sorted({"quadrants", "torch", "scipy", "starlette", "uvicorn", "pydantic"} & set(sys.modules)))
+heavy = {"quadrants", "torch", "scipy", "starlette", "uvicorn", "pydantic"}
+print("loaded", *sorted(heavy & set(sys.modules)))
 sys.exit(code)
 """
     done = subprocess.run(
