@@ -30,7 +30,7 @@ edits:
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     text = textwrap.dedent((files.__doc__ or "").split("\n\n")[1])
     first, second = parse_edits(text)
-    assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 7
+    assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8
     assert second.deleted and second.inner == Cage.box((2, 0, 0), 0.5)
 
 

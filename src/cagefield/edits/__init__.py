@@ -6,6 +6,7 @@ from cagefield.edits.edit import Edit
 from cagefield.edits.files import dump_edits, load_edits, parse_edits, save_edits
 from cagefield.edits.operations import (
     MoveCorner,
+    MoveCorners,
     MoveEdge,
     MoveFace,
     Operation,
@@ -23,6 +24,7 @@ __all__ = [
     "EditStack",
     "LatticeError",
     "MoveCorner",
+    "MoveCorners",
     "MoveEdge",
     "MoveFace",
     "Operation",
