@@ -57,6 +57,7 @@ class Renderer:
         self._canonical_codes = to_device(self._canonical.codes)
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
+        self._coarse = False
         self._pack_edits()
 
     def with_edits(
