@@ -2,7 +2,7 @@
 
 Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `extended`), is
 
-    x(xi, t) = c(t) + F(t) (xi + B_t(clamp(xi))).
+    x(xi, t) = c(t) + F(t) y_t(xi),    y_t(xi) = xi + B_t(xi) in the cage.
 
 With F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its
 polar decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
@@ -127,7 +127,7 @@ class Motion:
             return a + t[:, None] * (b - a), np.broadcast_to(b - a, (len(t), 3))
         ends = self.confines.coordinates(np.stack([a, b]))
         z = ends[0] + t[:, None] * (ends[1] - ends[0])
-        slope = self.confines.frame @ straightened_slope(self.confines.bend, z)
+        slope = self.confines.frame @ straightened_slope(self.confines.form, z)
         return self.confines.points(z), slope @ (ends[1] - ends[0])
 
     @cached_property
@@ -157,7 +157,7 @@ class Motion:
         if self.confines.is_affine:
             return z.reshape(x.shape), v @ self.confines.inverse.T
         along = hexahedron.solve(
-            slope_columns(self.confines.bend, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
+            slope_columns(self.confines.form, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
         )
         return z.reshape(x.shape), along.T.reshape(x.shape)
 
