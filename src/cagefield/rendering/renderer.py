@@ -40,7 +40,7 @@ class Renderer:
         edits: EditStack | None = None,
         *,
         step: float = 0.5,
-        preserve_opacity: bool = False,
+        preserve_opacity: bool = True,
         grid: DeviceGrid | None = None,
     ) -> None:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
