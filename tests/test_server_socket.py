@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 
 from cagefield.edits import load_edits
 from cagefield.server.protocol import MOST_BYTES
-from editor_server import EditorServer, PageClient, editor_server, page
+from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 
 BALL = {"inner": {"center": [0, 0, 0], "size": 1.1}, "outer": {"margin": 0.4}, "lattice": 16, "name": "ball"}
@@ -145,6 +145,8 @@ def test_a_page_that_shows_slowly_has_two_pictures_waiting_at_most(server: Edito
         for seq in range(1, 60):
             client.look_from(hello, 96 + seq, seq=seq, moving=True)
             time.sleep(0.02)
+        while len(client.pictures) < 2:
+            client.take(PATIENCE)
         with pytest.raises(TimeoutError):
             while True:
                 client.take(2.0)
