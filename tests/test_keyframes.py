@@ -82,7 +82,7 @@ def test_one_key_is_one_picture_and_none_is_an_error() -> None:
 
 
 def test_files_are_nerfstudio_camera_paths_and_give_the_keys_back(tmp_path: Path) -> None:
-    keys = (key(0.0, 10, 40.0, 1.5, e1=0.25), key(1.0, 20, 45.0))
+    keys = (key(0.0, 10, 40.0, 1.5, e1=0.25), key(1.0, 20, 45.0, 0.5))
     file = tmp_path / "path.json"
     file.write_text(dump_path(keys, loop=True, fps=10.0, width=64, height=32))
     assert load_keys(file) == (keys, True)
@@ -94,6 +94,19 @@ def test_files_are_nerfstudio_camera_paths_and_give_the_keys_back(tmp_path: Path
         assert camera.fx == pytest.approx(still.camera.fx)
     file.write_text(dump_path((), loop=False))
     assert load_keys(file) == ((), False)
+
+
+def test_times_are_read_as_nerfstudio_means_them(tmp_path: Path) -> None:
+    document = json.loads(dump_path((key(0.0), key(1.0), key(2.0)), loop=False))
+    first, second, third = document["keyframes"]
+    first |= {"override_transition_enabled": False, "override_transition_sec": None}
+    second |= {"override_transition_enabled": True, "override_transition_sec": 0.5}
+    third |= {"override_transition_enabled": False, "override_transition_sec": 9.0}
+    document["default_transition_sec"] = 3.0
+    file = tmp_path / "path.json"
+    file.write_text(json.dumps(document))
+    # A key's own time is the one in front of it: 0 to 1 takes 0.5 s, 1 to 2 the usual 3 s.
+    assert [k.seconds for k in load_keys(file)[0]] == [0.5, 3.0, 3.0]
 
 
 @pytest.mark.parametrize(

@@ -85,14 +85,10 @@ def test_a_page_is_told_what_there_is_and_sent_a_whole_picture(server: EditorSer
 
 def test_a_drag_moves_the_picture_and_the_state(server: EditorServer) -> None:
     with page(server) as (client, hello):
-        load(client, BALL)
+        number = load(client, BALL)["edits"][0]["id"]
         client.look_from(hello)
         client.final()
         before = red_at(pixels(client))
-        number = client.messages[-1]["edits"][0]["id"] if client.messages[-1]["type"] == "state" else None
-        number = (
-            number or next(m for m in reversed(client.messages) if m["type"] == "state")["edits"][0]["id"]
-        )
         right = np.array(hello["start"]["c2w"]).reshape(4, 4)[:3, 0]
         client.send("drag_begin", drag=1, edit=number, target="field")
         for n in range(1, 6):

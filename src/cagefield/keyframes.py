@@ -136,10 +136,11 @@ def dump_path(
                 "fov": key.fov_y_deg,
                 "aspect": aspect,
                 "override_transition_enabled": True,
-                "override_transition_sec": key.seconds,
+                # nerfstudio's is the time from the key before; the first key's, that of a loop's last leg.
+                "override_transition_sec": keys[n - 1].seconds,
                 "cagefield_parts": {str(name): part for name, part in key.parts.items()},
             }
-            for key in keys
+            for n, key in enumerate(keys)
         ],
         "camera_path": [
             {
@@ -157,14 +158,16 @@ def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
     """(keyframes, loop) of a nerfstudio camera-path file. Raises CameraError where it holds none."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
+        given = document["keyframes"]
+        usual = float(document.get("default_transition_sec", 2.0))
         keys = tuple(
             Keyframe(
                 tuple(float(value) for value in key["matrix"]),
                 float(key["fov"]),
-                float(key.get("override_transition_sec", document.get("default_transition_sec", 2.0))),
+                _seconds(given[(n + 1) % len(given)], usual),
                 {int(name): float(part) for name, part in key.get("cagefield_parts", {}).items()},
             )
-            for key in document["keyframes"]
+            for n, key in enumerate(given)
         )
         return keys, bool(document.get("is_cycle", False))
     except CameraError as error:
@@ -173,3 +176,9 @@ def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
         raise CameraError(
             f"{path} holds no camera path's keyframes ({error}); remove it or write it again"
         ) from None
+
+
+def _seconds(key: dict[str, Any], usual: float) -> float:
+    """The time from the key before to this one."""
+    own = key.get("override_transition_sec")
+    return usual if own is None or not key.get("override_transition_enabled", True) else float(own)

@@ -31,7 +31,7 @@ from cagefield.rendering.grid import (
     ivec3,
     vec3,
 )
-from cagefield.rendering.occupancy import BRICK, Occupancy
+from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
 MOST_CELLS = 12.0
@@ -79,7 +79,7 @@ def deform(
     at = (lower - first) // 2
     region = tuple(slice(a, a + n) for a, n in zip(at, count, strict=True))
     blocks[region] = np.where(touched, near, blocks[region])
-    return Occupancy.from_blocks(first, blocks)
+    return Occupancy.from_blocks(first, blocks, FEW if coarse else MAX_LEAP)
 
 
 def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -73,15 +73,15 @@ class Renderer:
 
     def _pack_edits(self, coarse: bool = False) -> None:
         from cagefield.rendering.deformed_occupancy import deform
-        from cagefield.rendering.grid import to_device
+        from cagefield.rendering.grid import for_kernels
         from cagefield.warps.device import DeviceStack
 
         stack = DeviceStack.from_stack(self.edits)
         jumps = any(edit.adjustment == "discrete" for edit in self.edits.active)
         self._occupancy = deform(self._canonical, self._grid, stack, jumps, coarse)
-        self._codes = to_device(self._occupancy.codes)
+        self._codes = for_kernels(self._occupancy.codes)
         self._stack = stack
-        self._boxes = to_device(stack.boxes.astype(np.float32))
+        self._boxes = for_kernels(stack.boxes.astype(np.float32))
 
     def render(
         self,
@@ -151,7 +151,8 @@ class Renderer:
                 self._stack.n_edits > 0,
                 self._stack.has_flows,
             )
-        return _frame(out.to_numpy().reshape(height, width, 8), background, normals)
+        marched = out if isinstance(out, np.ndarray) else out.to_numpy()
+        return _frame(marched.reshape(height, width, 8), background, normals)
 
     def _device_directions(self, camera: Camera) -> Any:
         """The camera-space directions of a camera's pixels on the device; those of some sizes are kept."""
@@ -165,8 +166,11 @@ class Renderer:
         return self._directions[id(local)][1]
 
     def _buffer(self, width: int, height: int) -> Any:
+        """Where a march writes to; a numpy array on the CPU."""
         import quadrants as qd
 
+        if devices.current() == "cpu":
+            return np.empty(width * height * 8, np.float32)
         if (width, height) not in self._pixels:
             self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
         return self._pixels[(width, height)]

@@ -17,16 +17,23 @@ from cagefield.edits.operations import Operation, Triple
 from cagefield.errors import CagefieldError, EditError
 from cagefield.server.document import Entry
 
+_ROUNDING = 1e-3
+"""Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
+
 Target: TypeAlias = Literal["field", "inner", "outer", "both"]
 
 
 @dataclass(frozen=True)
 class Moved:
-    """An edit after `part` of an operation; `why` says what stopped the rest."""
+    """An edit after `part` of an operation; `why` says what stopped the rest.
+
+    `problem` is the edit's, as `problem` finds it.
+    """
 
     edit: Edit
     part: float = 1.0
     why: str | None = None
+    problem: str | None = None
 
 
 def move_corners(corners: tuple[int, ...], by: Triple) -> Operation:
@@ -74,21 +81,22 @@ def _sum(first: Operation, second: Operation) -> Operation | None:
 def _with_field(edit: Edit, operation: Operation) -> Moved:
     if edit.deleted:
         raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
-    part = 1.0 if problem(edit) is not None else edit.safe_fraction(operation)
-    if part >= 1.0:
-        return Moved(edit.replace(operations=joined(edit.operations, operation)))
-    why = _reason(edit, operation)
-    done = edit.replace(operations=joined(edit.operations, operation.part(part))) if part > 0.0 else edit
-    return Moved(done, part, why)
-
-
-def _reason(edit: Edit, operation: Operation) -> str:
-    """Why the whole operation is not possible, in a line."""
     try:
-        edit.then(operation).check()
+        whole = edit.replace(operations=joined(edit.operations, operation))
     except CagefieldError as error:
-        return _short(str(error))
-    return "the cages would not fit together on the way there"
+        why = _short(str(error))
+    else:
+        found = problem(whole)
+        if found is None or problem(edit) is not None:
+            return Moved(whole, problem=found)
+        why = found
+    part = edit.safe_fraction(operation)
+    while part > 0.0:
+        done = edit.replace(operations=joined(edit.operations, operation.part(part)))
+        if problem(done) is None:
+            return Moved(done, part, why)
+        part -= _ROUNDING
+    return Moved(edit, 0.0, why)
 
 
 def _short(message: str) -> str:
@@ -111,7 +119,7 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
 
     part = largest_safe(safe)
     if part >= 1.0:
-        return Moved(at(1.0))
+        return Moved(at(1.0), problem=None if was_fine else problem(at(1.0)))
     try:
         why = problem(at(1.0)) or "the cages would not fit together on the way there"
     except CagefieldError as error:

@@ -60,7 +60,7 @@ class Guard:
         """
         host = headers.get("host", "")
         if not self._is_ours(host):
-            return f"this editor does not answer to the name {host!r}; open the link that `cagefield view` printed"
+            return f"this editor does not answer to {host!r}; open the link that `cagefield view` printed"
         origin = headers.get("origin")
         if (origin is not None or needs_origin) and not _same_origin(origin, host):
             return f"the page at {origin!r} may not talk to this editor; open the link that was printed"
