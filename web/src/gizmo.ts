@@ -125,7 +125,7 @@ export class Gizmo {
   /** A place, in normalised device coordinates, that is free and where the mouse takes hold of a handle; or null. */
   grip(axis: string, free: (device: Device) => boolean): Device | null {
     const picker = this.inner._gizmo.picker[this.controls.mode];
-    picker.updateMatrixWorld(true);
+    this.controls.getHelper().updateMatrixWorld(true);
     const handles = picker.children.filter((child): child is Mesh => child instanceof Mesh);
     const ray = new Raycaster();
     for (const handle of handles.filter((child) => child.name === axis)) {

@@ -69,6 +69,7 @@ export function inspector(app: App): Inspector {
       return inWindow(x, y);
     },
     grip(axis) {
+      app.arrange();
       const { width, height } = stage.points;
       const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
       const edit = selected(app.store.now);

@@ -16,7 +16,7 @@ from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
 from cagefield.server import encoding
 from cagefield.server.scheduler import Look, Region
-from cagefield.server.tasks import WARM_STAGES, EditValues, PictureDone, PictureTask, Shown, Stopped
+from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
@@ -92,7 +92,10 @@ class Studio:
         voxel = float(max(self.scene.field.voxel_size))
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
-        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < WARM_STAGES - 1)
+        if stage == 3:
+            edit.lattice_error(samples=64)
+            return
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
         if stage == 1:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
             camera = Camera.look_at(
