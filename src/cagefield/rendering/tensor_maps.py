@@ -77,7 +77,7 @@ def _map_tensors(
             out[i, a] = q[a]
             out[i, 3 + a] = d[a] if unchanged else v[a] / length
         gain = 1.0 - qd.cast(emptied, qd.f32)
-        if qd.static(preserve_opacity):
+        if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
             if not unchanged:
                 gain *= length / qd.max(d.norm(), 1e-20)
         out[i, 6] = gain
