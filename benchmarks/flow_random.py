@@ -1,23 +1,30 @@
-"""Prints the worst of the flow shell's promises over many random edits.
+"""Prints the worst of the flow shell's promises over many random edits, and writes them as a table.
 
-    python benchmarks/flow_random.py --edits 10000
+    python benchmarks/flow_random.py --edits 10000 --out benchmarks/results/flow_random.md
 
-Both cages are deformed in half of the edits; each has one to three operations: turns to 180 degrees,
-scales from 0.3 to what fits, shears, moves, drags of corners, edges and faces, to 98% of what is safe.
-Points of the shell are random, a third of them close to the inner cage. Errors are shares of the outer cage's
-size. An edit whose first cages, or operations, are impossible is drawn again, and counted.
+Both cages are bent in half of the edits; each has one to three operations: turns to 180 degrees, scales from
+0.3 to what fits, shears, moves, drags of corners, edges and faces; what would go too far is done to 98% of
+what is safe. An edit whose first cages, or operations, are impossible is drawn again, and counted. Points
+of the shell are random, a third of them close to the inner cage. The map is the renderer's kernel, compiled
+in float64 (--float32: as the renderer has it), whose difference from the numpy reference is measured on every
+100th edit. Errors are shares of the outer cage's size.
 """
 
-from __future__ import annotations
-
 import argparse
+import multiprocessing
 import time
+from dataclasses import astuple, dataclass
+from pathlib import Path
 
 import numpy as np
+import quadrants as qd
 from scipy.spatial.transform import Rotation
 
+from cagefield import devices
+from cagefield.benchmarking.machine import Machine
+from cagefield.benchmarking.tables import Table, write_text
 from cagefield.cages import Cage
-from cagefield.edits import Edit
+from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -30,8 +37,61 @@ from cagefield.edits.operations import (
 )
 from cagefield.errors import CagefieldError
 from cagefield.hexahedron import Array
-from cagefield.warps import FlowShell
+from cagefield.warps import FlowShell, flow_device
 from cagefield.warps.flow_motion import Extended
+
+vec3 = qd.math.vec3
+Points = qd.types.ndarray(dtype=vec3, ndim=1)
+
+COMPARED = 100
+"""Every so many edits are compared with the numpy reference."""
+
+
+@dataclass(frozen=True)
+class Promises:
+    """What one edit kept of the promises; errors as shares of the outer cage's size.
+
+    least: least det of d(deformed)/d(canonical) over the shell's points, -1 where one is not positive; moved:
+    of points outside the outer cage, through the stack; inside: of points in the inner cage, against the
+    trilinear map; face: of the flow on the inner cage's faces, against the same; still: of the flow on the
+    outer cage's faces; trip: of to_canonical(to_deformed(p)) against p; steps: of Runge-Kutta; reference:
+    against numpy, NaN where not compared.
+    """
+
+    least: float
+    moved: float
+    inside: float
+    face: float
+    still: float
+    trip: float
+    steps: float
+    reference: float
+
+
+@qd.kernel
+def _map(points: Points, out: Points, table: Points):
+    """Writes the image of each point, and the three columns of its Jacobian."""
+    for n in range(points.shape[0]):
+        for a in range(3):
+            d = vec3(0.0, 0.0, 0.0)
+            d[a] = 1.0
+            q, v = flow_device.flow_sample(points[n], d, table, 0)
+            out[4 * n] = q
+            out[4 * n + 1 + a] = v
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """The flow through a table, as a function of points [N,3]: (points [N,3], Jacobians [N,3,3])."""
+
+    table: Array
+
+    def __call__(self, points: Array) -> tuple[Array, Array]:
+        kind = self.table.dtype
+        out = np.zeros((4 * len(points), 3), kind)
+        _map(np.ascontiguousarray(points, kind), out, self.table)
+        rows = out.reshape(-1, 4, 3).astype(np.float64)
+        return rows[:, 0], rows[:, 1:].transpose(0, 2, 1)
 
 
 def random_edit(rng: np.random.Generator) -> Edit:
@@ -73,30 +133,71 @@ def random_operation(rng: np.random.Generator) -> Operation:
     return MoveFace(str(rng.choice(["+x", "-y", "+z"])), (x, y, z))
 
 
-def measure(edit: Edit, rng: np.random.Generator, n: int) -> tuple[float, float, float, float, float]:
-    """(least det, identity error, inner face's error, round trip's error, steps)."""
+def measure(edit: Edit, rng: np.random.Generator, n: int, kind: type, compared: bool) -> Promises:
+    """What the edit keeps, at about n points of each kind."""
     assert edit.outer is not None
     shell = FlowShell(edit.inner, edit.deformed, edit.outer)
+    knots = shell.knots
+    there, back = (Compiled(flow_device.table_along(shell, k).astype(kind)) for k in (knots, knots[::-1]))
     size = float(np.ptp(edit.outer.corners, axis=0).max())
-    origin, frame = edit.outer.frame
-    place = Extended.of(edit.deformed)
-    near = on_cube(rng, n // 3) * rng.uniform(1.0, 1.2, (n // 3, 1))
-    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, place.points(near)])
-    p = p[edit.outer.contains(p)]
-    p = p[~edit.deformed.contains(p)]
-    face = on_cube(rng, 8)
-    still = Extended.of(edit.outer).points(on_cube(rng, 8))
-    q, J = shell.to_canonical(np.concatenate([p, place.points(face), still]))
-    k = len(p)
-    inside = np.abs(q[k : k + 8] - Extended.of(edit.inner).points(face)).max()
-    back = shell.to_deformed(q[:k])[0]
-    return (
-        float(1.0 / np.linalg.det(J[:k]).max()) if (np.linalg.det(J[:k]) > 0.0).all() else -1.0,
-        float(np.abs(q[k + 8 :] - still).max() / size),
-        float(inside / size),
-        float(np.abs(back - p).max() / size),
-        float(len(shell.knots) - 1),
+    p = _shell_points(edit.outer, edit.deformed, rng, n)
+    q, J = back(p)
+    det = np.linalg.det(J)
+    reference = float("nan")
+    if compared:
+        reference = float(np.abs(shell.to_canonical(p)[0] - q).max(initial=0.0) / size)
+    face = on_cube(rng, n // 3)
+    on_face = back(Extended.of(edit.deformed).points(face))[0] - Extended.of(edit.inner).points(face)
+    rim = Extended.of(edit.outer).points(on_cube(rng, n // 3))
+    return Promises(
+        least=float(1.0 / det.max()) if (det > 0.0).all() else -1.0,
+        moved=_moved(edit, rng, n) / size,
+        inside=_inside(edit, rng, n) / size,
+        face=float(np.abs(on_face).max() / size),
+        still=float(np.abs(back(rim)[0] - rim).max() / size),
+        trip=_round_trip(_shell_points(edit.outer, edit.inner, rng, n), there, back) / size,
+        steps=float(len(knots) - 1),
+        reference=reference,
     )
+
+
+def _shell_points(outer: Cage, inner: Cage, rng: np.random.Generator, n: int) -> Array:
+    """Points between the cages, a third of them near the inner one."""
+    origin, frame = outer.frame
+    near = on_cube(rng, n // 3) * rng.uniform(1.0, 1.2, (n // 3, 1))
+    p = np.concatenate([origin + rng.random((n, 3)) @ frame.T, Extended.of(inner).points(near)])
+    return p[outer.contains(p) & ~inner.contains(p)]
+
+
+def _moved(edit: Edit, rng: np.random.Generator, n: int) -> float:
+    """How far the stack moves points around the outer cage."""
+    assert edit.outer is not None
+    p = Extended.of(edit.outer).points(on_cube(rng, n) * rng.uniform(1.001, 2.0, (n, 1)))
+    p = p[~edit.outer.contains(p)]
+    return float(np.abs(EditStack([edit]).to_canonical(p).points - p).max(initial=0.0))
+
+
+def _inside(edit: Edit, rng: np.random.Generator, n: int) -> float:
+    """How far the stack's map of points in the inner cage is from the trilinear one."""
+    xi = rng.uniform(-0.999, 0.999, (n, 3))
+    q = EditStack([edit]).to_canonical(Extended.of(edit.deformed).points(xi)).points
+    return float(np.abs(q - Extended.of(edit.inner).points(xi)).max())
+
+
+def _round_trip(q: Array, there: Compiled, back: Compiled) -> float:
+    """How far to_canonical(to_deformed(q)) is from q: forwards through the flow, then Newton's method."""
+    p = there(q)[0]
+    found, J = back(p)
+    error = np.linalg.norm(found - q, axis=1)
+    for _ in range(4):
+        trial = p - np.linalg.solve(J, (found - q)[:, :, None])[:, :, 0]
+        new, slope = back(trial)
+        size = np.linalg.norm(new - q, axis=1)
+        better = size < error
+        p[better], found[better], J[better], error[better] = (
+            trial[better], new[better], slope[better], size[better]
+        )  # fmt: skip
+    return float(error.max(initial=0.0))
 
 
 def on_cube(rng: np.random.Generator, n: int) -> Array:
@@ -105,34 +206,84 @@ def on_cube(rng: np.random.Generator, n: int) -> Array:
     return xi / np.abs(xi).max(axis=1, keepdims=True)
 
 
-def main() -> None:
-    """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--edits", type=int, default=10_000, help="number of random edits")
-    parser.add_argument("--points", type=int, default=24, help="points per edit")
-    parser.add_argument("--minutes", type=float, default=1e9, help="stop after this long")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    rng = np.random.default_rng(options.seed)
-    start, rows, refused = time.monotonic(), [], 0
-    while len(rows) < options.edits and time.monotonic() - start < 60.0 * options.minutes:
+def run(task: tuple[int, int, int, bool]) -> tuple[list[tuple[float, ...]], int]:
+    """(promises of a number of edits, draws refused) from a seed."""
+    seed, edits, points, double = task
+    devices.start("cpu", double=double)
+    kind = np.float64 if double else np.float32
+    rng = np.random.default_rng(seed)
+    rows: list[tuple[float, ...]] = []
+    refused = 0
+    while len(rows) < edits:
         try:
             edit = random_edit(rng)
         except CagefieldError:
             refused += 1
             continue
         if edit.changes_anything:
-            rows.append(measure(edit, rng, options.points))
-    det, identity, inside, trip, steps = np.array(rows).T
-    print(f"{len(rows)} edits ({refused} draws refused), {options.points} points each")
-    print(
-        f"least det J {det.min():.2e}, median {np.median(det):.2f};"
-        f" not positive in {int((det <= 0.0).sum())} edits"
+            compared = (seed * edits + len(rows)) % COMPARED == 0
+            rows.append(astuple(measure(edit, rng, points, kind, compared)))
+    return rows, refused
+
+
+def table(rows: Array, refused: int, points: int, command: str) -> Table:
+    """The worst, the middle and the number of failures of each promise."""
+    least, moved, inside, face, still, trip, steps, reference = rows.T
+    asked = (
+        ("moved outside the outer cage", moved, 0.0),
+        ("trilinear map inside the inner cage", inside, 1e-6),
+        ("flow on the inner cage's faces", face, None),
+        ("flow on the outer cage's faces", still, None),
+        ("round trip", trip, 1e-4),
     )
-    print(f"identity on the outer cage: worst {identity.max():.1e}")
-    print(f"phi on the inner cage: worst {inside.max():.1e}, median {np.median(inside):.1e}")
-    print(f"round trip: worst {trip.max():.1e}, median {np.median(trip):.1e}")
-    print(f"steps: median {int(np.median(steps))}, most {int(steps.max())}")
+    folded = str(int((least <= 0.0).sum()))
+    cells = [("least det J", f"{least.min():.1e}", f"{np.median(least):.2f}", "> 0", folded)]
+    for name, values, limit in asked:
+        over = "-" if limit is None else str(int((values > limit).sum()))
+        at_most = "-" if limit is None else f"{limit:g}"
+        cells.append((name, f"{values.max():.1e}", f"{np.median(values):.1e}", at_most, over))
+    compared = reference[~np.isnan(reference)]
+    notes = (
+        f"{len(rows)} random edits ({refused} draws refused), about {points} points of each kind per edit.",
+        "Errors are shares of the outer cage's size.",
+        f"Runge-Kutta steps: median {int(np.median(steps))}, most {int(steps.max())}.",
+        f"Kernel against the numpy reference, {len(compared)} edits: worst {compared.max(initial=0.0):.1e}.",
+        f"Machine: {Machine.here()}",
+        f"Command: `{command}`",
+    )
+    columns = ("promise", "worst", "median", "asked", "edits that fail")
+    return Table("Promises of the flow shell over random edits", columns, tuple(cells), notes)
+
+
+def main() -> None:
+    """Print the table, and write it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--edits", type=int, default=10_000, help="number of random edits")
+    parser.add_argument("--points", type=int, default=24, help="points of each kind per edit")
+    parser.add_argument("--float32", action="store_true", help="the kernel as the renderer has it")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, help="Markdown file for the table")
+    options = parser.parse_args()
+    share = min(50, options.edits)
+    parts = -(-options.edits // share)
+    tasks = [(options.seed + n, share, options.points, not options.float32) for n in range(parts)]
+    rows: list[tuple[float, ...]] = []
+    refused, start = 0, time.monotonic()
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        for done, more in pool.imap_unordered(run, tasks):
+            rows += done
+            refused += more
+            worst = min(row[0] for row in rows)
+            print(
+                f"{time.monotonic() - start:6.0f} s: {len(rows)} edits, least det J {worst:.1e}", flush=True
+            )
+    kind = " --float32" if options.float32 else ""
+    command = f"python benchmarks/flow_random.py --edits {options.edits} --points {options.points}{kind}"
+    result = table(np.array(rows), refused, options.points, command)
+    result.show()
+    if options.out is not None:
+        write_text(options.out, result.markdown())
 
 
 if __name__ == "__main__":

@@ -17,11 +17,12 @@ DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
 _started: str | None = None
 
 
-def start(device: str = "auto") -> str:
+def start(device: str = "auto", *, double: bool = False) -> str:
     """The name of the running device: "cpu", "cuda", "metal" or "vulkan".
 
     The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes
-    CUDA or Metal where there is one, else the CPU.
+    CUDA or Metal where there is one, else the CPU. With `double`, numbers that kernels give no type are
+    float64: for references, not for the renderer; the first call decides.
 
     Raises:
         DeviceError: an unknown name, a device this machine lacks, or a second, different device.
@@ -52,6 +53,7 @@ def start(device: str = "auto") -> str:
             # Without that pass kernels compile three to nine times faster and run as fast.
             qd.init(
                 arch=archs[chosen],
+                default_fp=qd.f64 if double else qd.f32,
                 offline_cache=True,
                 cfg_optimization=False,
                 log_level="error",

@@ -24,6 +24,7 @@ import numpy as np
 import quadrants as qd
 from numpy.typing import NDArray
 
+from cagefield.hexahedron import Array
 from cagefield.warps.flow_shell import FlowShell
 
 vec3 = qd.math.vec3
@@ -33,7 +34,12 @@ HEADER, MOMENT = 18, 17
 
 def table(shell: FlowShell) -> NDArray[np.float32]:
     """The table [T,3] of a flow shell, with the steps that its `strain` asks for."""
-    motion, knots = shell.motion, shell.knots[::-1]
+    return table_along(shell, shell.knots[::-1]).astype(np.float32)
+
+
+def table_along(shell: FlowShell, knots: Array) -> Array:
+    """The table [T,3], float64, of the flow through times [K+1]: from 0 to 1 to deformed space."""
+    motion = shell.motion
     steps = len(knots) - 1
     times = np.empty(2 * steps + 1)
     times[::2], times[1::2] = knots, 0.5 * (knots[1:] + knots[:-1])
@@ -62,7 +68,7 @@ def table(shell: FlowShell) -> NDArray[np.float32]:
     rows[:-1:2, 9, 0] = np.diff(knots)
     rows[:, 10:14] = motion.start.bend + times[:, None, None] * bend_rate
     rows[:, 14:17] = outer.inverse @ F
-    return np.concatenate([head, rows.reshape(-1, 3)]).astype(np.float32)
+    return np.concatenate([head, rows.reshape(-1, 3)])
 
 
 @qd.func
