@@ -260,7 +260,7 @@ def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
         editor.until(f"cagefield.now.state.revision > {revision} && cagefield.drag === null")
     editor.settle()
     last, after = editor.state, editor.pixels()
-    assert last["entry"] == first["entry"] + 10 and len(editor.edit["operations"]) == 10
+    assert last["entry"] == first["entry"] + 10
     for key, wanted, seen in (("Control+z", first, before), ("Control+Shift+Z", last, after)):
         editor.press(*[key] * 10)
         editor.until(f"cagefield.now.state.entry === {wanted['entry']}")
@@ -290,7 +290,7 @@ def sees(editor: EditorPage, at: NDArray[np.float64]) -> None:
 
 def test_lines_are_solid_before_the_field_and_dashed_behind_it(editor: EditorPage, scene: Path) -> None:
     file = scene.parent / "low.yaml"
-    file.write_text(EDITS.replace("-0.215]", "-0.35]").replace("0.36]}", "0.63]}"))  # 0.27 into the ground
+    file.write_text(EDITS.replace("-0.215]", "-0.27]").replace("0.36]}", "0.46]}"))  # 0.1 into the ground
     editor.changed(lambda: editor.page.set_input_files("input[type=file]", file))
     editor.tools(tool="select")
     lines = np.abs(editor.pixels(cages=True) - editor.pixels()).max(axis=2) > 0.1

@@ -24,6 +24,9 @@ QUICK_LATTICE = 32
 MOVING_QUALITY, REST_QUALITY = 85, 95
 """JPEG qualities."""
 
+KEPT_EDITS = 64
+"""Edits whose maps are kept for when they are shown again."""
+
 MOST_DEPTHS = 120_000
 """Depths sent with a picture, at most."""
 
@@ -46,8 +49,8 @@ class Studio:
         self.plain = Renderer(scene.field)
         self._edits: list[Edit] = []
         self._coarse: list[tuple[Edit, Edit]] = []
-        self._exact: _Kept | None = None
-        self._quick: _Kept | None = None
+        self._exact: list[_Kept] = []
+        self._quick: list[_Kept] = []
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))
@@ -105,8 +108,8 @@ class Studio:
 
     def renderer(self, shown: Shown, *, exact: bool) -> Renderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now."""
-        for kept in (self._exact, None if exact else self._quick):
-            if kept is not None and kept.shown == shown:
+        for kept in self._exact if exact else (*self._exact, *self._quick):
+            if kept.shown == shown:
                 return kept.renderer
         edits = self.edits(shown.edits)
         if not exact:
@@ -115,9 +118,10 @@ class Studio:
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
         )
         if exact:
-            self._exact = _Kept(shown, renderer)
+            # Two: what pages show, and what a job renders.
+            self._exact = [*self._exact[-1:], _Kept(shown, renderer)]
         else:
-            self._quick = _Kept(shown, renderer)
+            self._quick = [_Kept(shown, renderer)]
         return renderer
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
@@ -126,7 +130,8 @@ class Studio:
         for fields in values:
             edit = Edit(**fields)
             found.append(next((known for known in self._edits if known == edit), edit))
-        self._edits = found
+        others = [known for known in self._edits if not any(known is edit for edit in found)]
+        self._edits = [*found, *others][:KEPT_EDITS]
         return found
 
     def reach(self, camera: Camera) -> tuple[float, float]:
