@@ -12,6 +12,7 @@ from hypothesis import given
 
 from cagefield import devices
 from cagefield.edits import Edit, EditStack
+from cagefield.hexahedron import Array
 from cagefield.warps.continuous import ContinuousWarp
 from random_cages import examples, unit_vectors
 from test_flow_shell import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points
@@ -83,24 +84,56 @@ def test_lattice_error_falls_with_its_order(name: str) -> None:
     assert (orders > 1.3).all() and (orders < 2.6).all()
 
 
-@pytest.mark.parametrize("name", ["turn of 90", "corner after rotation"])
-def test_lattice_nodes_are_the_maps_values(name: str) -> None:
+def nodes_and_reference(edit: Edit, resolution: int) -> tuple[Array, Array]:
+    """(displacements [R^3,3] by the lattice's kernel, those of the exact map)."""
     from cagefield.warps.device import DeviceStack
 
-    edit = EDITS[name].replace(lattice=9)
-    nodes = DeviceStack.from_stack(EditStack([edit])).lattice
+    nodes = DeviceStack.from_stack(EditStack([edit.replace(lattice=resolution)])).lattice
     warp = edit.exact_warp
     assert isinstance(warp, ContinuousWarp)
     origin, frame = warp.outer.frame
-    g = np.linspace(0.0, 1.0, 9)
+    g = np.linspace(0.0, 1.0, resolution)
     z, y, x = np.meshgrid(g, g, g, indexing="ij")
     p = origin + np.stack([x, y, z], axis=-1).reshape(-1, 3) @ frame.T
-    expected = warp.to_canonical(p).points - p
-    # The lattice's steps are four times as long as the reference's: the error of the integration.
-    np.testing.assert_allclose(nodes, expected, atol=5e-3)
-    assert np.median(np.abs(nodes - expected)) < 1e-4
-    on_faces = np.abs(p).max(axis=1) > 0.8 - 1e-9
-    assert np.abs(nodes[on_faces]).max() < 1e-6
+    return nodes.astype(np.float64), warp.to_canonical(p).points - p
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_lattice_nodes_are_the_maps_values(name: str) -> None:
+    nodes, expected = nodes_and_reference(EDITS[name], 9)
+    # The lattice's steps are eight times as long as the reference's: the error of the integration, which is
+    # largest in the slot, and at the linear profile's kinks.
+    apart = np.abs(nodes - expected).max(axis=1)
+    assert apart.max() < 2e-2 and apart.mean() < 1e-3
+    still = np.abs(expected).max(axis=1) < 1e-12
+    # All on the faces of the box are, also where a bent outer cage reaches them only with its corners.
+    assert still.sum() >= 9**3 - 7**3
+    assert np.abs(nodes[still]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["turn of 90", "corner after rotation", "bent cages"])
+def test_lattice_with_the_references_steps_is_the_reference(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cagefield.warps import device
+
+    monkeypatch.setattr(device, "LATTICE_STRAIN", 0.125)
+    nodes, expected = nodes_and_reference(EDITS[name], 9)
+    apart = np.abs(nodes - expected).max(axis=1)
+    # Rounding in float32; in bent cages the steps' own error, which differs in the outer cage's coordinates.
+    assert apart.max() < 5e-5 and np.median(apart) < 2e-6
+
+
+def test_nodes_that_are_lost_are_marched_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cagefield.warps import flow_lattice
+
+    edit = EDITS["bent cages"]
+    vectors, _ = nodes_and_reference(edit, 9)
+    monkeypatch.setattr(flow_lattice.devices, "is_gpu", lambda: True)  # marks all of them
+    singly, expected = nodes_and_reference(edit.replace(name="again"), 9)
+    assert not np.array_equal(vectors, singly)
+    # Both are off by the same integration; what is between them is far less.
+    assert np.abs(vectors - singly).max() < 0.1 * np.abs(singly - expected).max() + 1e-4
 
 
 def test_lattice_error_of_an_edit() -> None:

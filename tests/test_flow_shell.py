@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from cagefield.cages import Cage
+from cagefield.cages import Axes, Cage
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.edit import largest_safe
+from cagefield.edits.limits import along, flow_reach
+from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import Falloff, FlowShell
-from cagefield.warps.flow_motion import TIMES, Extended
+from cagefield.warps.extended import Extended, bends_one_to_one, stay_one_to_one, straightened_slope
+from cagefield.warps.flow_motion import TIMES
 from random_cages import can_be_evaluated, dragged, examples, random_operation, seeds
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -293,6 +299,78 @@ PROBLEMS = [
 def test_problems_are_named(edit: Edit, message: str) -> None:
     with pytest.raises(EditError, match=message):
         edit.check()
+
+
+def test_bends_that_are_one_to_one_have_a_positive_determinant_everywhere() -> None:
+    rng = np.random.default_rng(0)
+    K = rng.uniform(-1.0, 1.0, (60, 4, 3)) * rng.uniform(0.1, 0.9, (60, 1, 1))
+    g = np.linspace(-1.3, 1.3, 27)  # -1 and 1 among them, where the least values are, beyond the faces
+    xi = np.stack(np.meshgrid(g, g, g), axis=-1).reshape(-1, 3)
+    xi = np.concatenate([xi, xi * (1.0 - 1e-9)])
+    least = np.array([np.linalg.det(straightened_slope(k, xi)).min() for k in K])
+    found = bends_one_to_one(K)
+    assert 10 < found.sum() < 50
+    assert (least[found] > 0.0).all()
+    # A grid misses the least value inside the cage by a little.
+    assert (least[~found] < 0.02).all()
+
+
+def test_bends_that_stay_one_to_one() -> None:
+    rng = np.random.default_rng(1)
+    K = rng.uniform(-0.5, 0.5, (80, 4, 3)) * rng.uniform(0.1, 1.0, (80, 1, 1))
+    expected = [all(bends_one_to_one((t * k)[None])[0] for t in (0.25, 0.5, 0.75, 1.0)) for k in K]
+    assert np.array_equal(stay_one_to_one(np.zeros((4, 3)), K), expected)
+    assert 10 < np.sum(expected) < 70
+
+
+def bisected(edit: Edit, operation: Operation) -> float:
+    """The safe fraction by nothing but `check`."""
+
+    def safe(t: float) -> bool:
+        try:
+            edit.then(operation.part(t)).check()
+        except (CageError, EditError):
+            return False
+        return True
+
+    return largest_safe(safe)
+
+
+@examples(12)
+@given(flow_edits(), st.integers(0, 6), seeds)
+def test_safe_fraction_is_that_of_the_checks(edit: Edit, kind: int, seed: int) -> None:
+    operation = random_operation(np.random.default_rng(seed), kind, 1.5)
+    found, expected = edit.safe_fraction(operation), bisected(edit, operation)
+    # Both stop within 1e-3 of the limit; an operation that is unsafe for less than a sixteenth of its way may
+    # be cut off there by the one that looks closer.
+    assert found <= expected + 1e-3
+    if abs(found - expected) > 1e-3:
+        edit.then(operation.part(found)).check()
+        with pytest.raises(EditError):
+            edit.then(operation.part(found + 1e-3)).check()
+
+
+def test_safe_fraction_where_an_edge_reaches_the_outer_cage_first() -> None:
+    # The middle of the outer cage's top sags to z = 0.5 between two raised corners.
+    sagging = OUTER.move_corner(5, (0, 0, -0.6)).move_corner(6, (0, 0, -0.6))
+    edit = Edit(Cage.box((0, 0, 0), 0.6, (0, 0, np.pi / 4)), sagging)
+    operation = Translate((0, 0, 0.5))
+    found = edit.safe_fraction(operation)
+    assert found == pytest.approx(bisected(edit, operation), abs=1e-3)
+    corners_alone = flow_reach(operation, edit.deformed, (edit.inner, sagging), fine=False)
+    assert corners_alone > found + 0.01
+
+
+@pytest.mark.parametrize("kind", range(7))
+@pytest.mark.parametrize("axes", ["world", "cage"])
+def test_corners_along_an_operation_are_those_of_its_parts(kind: int, axes: Axes) -> None:
+    cage = Cage.box((0.1, 0.2, 0), (0.5, 0.6, 0.7), (0.3, 0.2, 0.1)).move_corner(3, (0.05, 0.02, -0.04))
+    operation = random_operation(np.random.default_rng(kind), kind, 0.2)
+    if isinstance(operation, (Rotate, Scale, Shear)):
+        operation = replace(operation, axes=axes)
+    t = np.array([0.0, 0.3, 1.0])
+    expected = [operation.part(share).apply(cage).corners for share in t.tolist()]
+    np.testing.assert_allclose(along(operation, cage, t), expected, atol=1e-12)
 
 
 def test_safe_fraction_ends_at_the_outer_cage() -> None:

@@ -144,6 +144,12 @@ class Cage:
         A = self.affine[0]
         return np.asarray(A / np.linalg.norm(A, axis=0))
 
+    @property
+    def heading(self) -> Array:
+        """The rotation [3,3] nearest to `axes`."""
+        U, _, Vt = np.linalg.svd(self.axes)
+        return np.asarray(U @ Vt)
+
     def coordinates(self, points: ArrayLike) -> tuple[Array, Mask]:
         """(u [N,3], inside [N]) of points [N,3]: u in [0,1]^3 where inside, else unspecified."""
         p = np.asarray(points, dtype=np.float64)
@@ -173,8 +179,7 @@ class Cage:
         """
         R = rotation_matrix(vector(theta, "rotate"))
         if axes == "cage":
-            U, _, Vt = np.linalg.svd(self.axes)  # the rotation nearest to the edge directions
-            R = (U @ Vt) @ R @ (U @ Vt).T
+            R = self.heading @ R @ self.heading.T
         return self._linear(R, axes)
 
     def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Cage:
@@ -324,14 +329,26 @@ def _named_shears(S: Array) -> str:
     return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)
 
 
+def are_valid(corners: Array) -> Mask:
+    """Mask [B] of the corners [B,8,3] that a `Cage` may have."""
+    bernstein, lengths = _orientation(corners)
+    floor = _FLAT * lengths.prod(axis=1)
+    return (floor > 0.0) & hexahedron.are_positive(bernstein - floor[:, None, None, None])
+
+
+def _orientation(corners: Array) -> tuple[Array, Array]:
+    """(Bernstein coefficients [B,3,3,3] of the determinants, mean edges [B,3] along each axis)."""
+    tails, heads = np.array(EDGES).T
+    lengths = np.linalg.norm(corners[:, heads] - corners[:, tails], axis=2)
+    return hexahedron.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
+
+
 def _check_orientation(corners: Array) -> None:
     """Raise `CageError` where the Jacobian determinant is not positive over the whole hexahedron."""
-    pairs = np.array(EDGES)
-    lengths = np.linalg.norm(corners[pairs[:, 1]] - corners[pairs[:, 0]], axis=1).reshape(3, 4).mean(axis=1)
-    bernstein = hexahedron.determinant_coefficients(corners)
-    floor = _FLAT * lengths.prod()
-    if floor > 0.0 and hexahedron.is_positive(bernstein - floor):
+    if are_valid(corners[None])[0]:
         return
+    bernstein, lengths = (each[0] for each in _orientation(corners[None]))
+    floor = _FLAT * lengths.prod()
     at_corners = bernstein[::2, ::2, ::2].transpose(2, 1, 0).ravel()  # corner k = x + 2y + 4z
     k = int(np.argmin(at_corners))
     where = f"corner {k} at {format_vector(corners[k])}"

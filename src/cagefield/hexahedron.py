@@ -124,12 +124,19 @@ def determinant_coefficients(corners: Array) -> Array:
     eight coefficients at the corners of the block are the determinants at the corners of the hexahedron.
     """
     along = [corners[..., _EDGE_HEADS[a], :] - corners[..., _EDGE_TAILS[a], :] for a in range(3)]
-    triple = np.einsum(
-        "...nd,...nd->...n",
-        along[0][..., _TRIPLES[:, 0], :],
-        np.cross(along[1][..., _TRIPLES[:, 1], :], along[2][..., _TRIPLES[:, 2], :]),
-    )
+    a, b, c = (np.moveaxis(edges, -1, 0) for edges in along)
+    normals = _cross(b[..., :, None], c[..., None, :])  # [3,...,4,4]
+    triple = np.einsum("d...i,d...jk->...ijk", a, normals).reshape(*a.shape[1:-1], 64)
     return np.asarray((triple @ _TRIPLE_WEIGHTS.T).reshape(*triple.shape[:-1], 3, 3, 3))
+
+
+def are_positive(bernstein: Array) -> Mask:
+    """Mask [B] of the triquadratic polynomials with coefficients [B,3,3,3] that `is_positive` finds so."""
+    mask = np.asarray((bernstein > 0.0).all(axis=(1, 2, 3)))
+    doubtful = ~mask & (bernstein[:, ::2, ::2, ::2] > 0.0).all(axis=(1, 2, 3))
+    for row in np.flatnonzero(doubtful):
+        mask[row] = is_positive(bernstein[row])
+    return mask
 
 
 def is_positive(bernstein: Array, depth: int = 6) -> bool:
@@ -181,7 +188,7 @@ def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
     for _ in range(40):
         if len(active) == 0:
             break
-        step = _solve(_derivative(C, xi[:, active]), residual[:, active])
+        step = solve(_derivative(C, xi[:, active]), residual[:, active])
         # A step of more than one cell leaves the region in which the linearisation says anything.
         step /= np.maximum(1.0, np.abs(step).max(axis=0) / 2.0)
         before = size[active]
@@ -290,8 +297,8 @@ def _in_hull(local: Array, y: Array) -> Mask:
     return np.asarray(inside.all(axis=1))
 
 
-def _solve(J: tuple[Array, Array, Array], r: Array) -> Array:
-    """J^-1 r [3,N] by Cramer's rule; singular J are moved off zero (the line search guards the step)."""
+def solve(J: tuple[Array, Array, Array], r: Array) -> Array:
+    """J^-1 r [3,N] by Cramer's rule, from the columns [3,N] of J; singular J are moved off zero."""
     a, b, c = J
     bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
     det = _off_zero((a * bc).sum(axis=0), 1e-12)
@@ -306,23 +313,22 @@ def _cross(a: Array, b: Array) -> Array:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _triples() -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], NDArray[np.intp], Array]:
-    """Edge tails and heads per axis, the 64 products of one edge per axis, and their Bernstein weights."""
+def _triples() -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], Array]:
+    """Edge tails and heads per axis, and the Bernstein weights [27,64] of products of one edge per axis."""
     tails, heads = [], []
     for axis in range(3):
         tail = np.array([k for k in range(8) if not k >> axis & 1])
         tails.append(tail)
         heads.append(tail | 1 << axis)
-    rows, weights = [], np.zeros((27, 64))
+    weights = np.zeros((27, 64))
     for n, (i, j, k) in enumerate(product(range(4), repeat=3)):
         degree = (BITS[tails[0][i]] + BITS[tails[1][j]] + BITS[tails[2][k]]).astype(int)
         # B1_i B1_j = C(1,i) C(1,j) / C(2,i+j) B2_{i+j}: one half where the two indices differ.
         weights[degree[0] * 9 + degree[1] * 3 + degree[2], n] = np.prod(np.where(degree == 1, 0.5, 1.0))
-        rows.append((i, j, k))
-    return tails, heads, np.array(rows), weights
+    return tails, heads, weights
 
 
-_EDGE_TAILS, _EDGE_HEADS, _TRIPLES, _TRIPLE_WEIGHTS = _triples()
+_EDGE_TAILS, _EDGE_HEADS, _TRIPLE_WEIGHTS = _triples()
 _SPLIT: Array = np.array(
     [
         [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.25, 0.5, 0.25]],

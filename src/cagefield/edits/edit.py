@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from cagefield.cages import Axes, Cage, format_vector, outside_by
 from cagefield.edits import operations as ops
+from cagefield.edits.limits import flow_reach
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
@@ -214,6 +215,13 @@ class Edit:
             except CageError:
                 return False
 
+        if self.adjustment == "continuous" and self.shell == "flow" and self.outer is not None:
+            if safe(1.0):
+                return 1.0
+            for fine in (False, True):
+                reach = flow_reach(operation, cage, (self.inner, self.outer), fine=fine)
+                if reach < 1.0 and safe(reach):
+                    return reach
         return largest_safe(safe)
 
     def _safe_part(self) -> str:
@@ -230,11 +238,11 @@ class Edit:
         """True where the edit can be evaluated with its inner cage at `deformed`."""
         if self.adjustment == "discrete" or self.outer is None:
             return True
+        if self.shell == "flow":  # which finds corners outside by itself
+            return self._shell(deformed).problem() is None
         if not self.outer.contains(deformed.corners).all():
             return False
-        if self.shell == "trilinear" and self.allow_folding:
-            return True
-        return self._shell(deformed).problem() is None
+        return self.allow_folding or self._shell(deformed).problem() is None
 
     def _problem(self, deformed: Cage) -> tuple[str, str]:
         """(what is wrong, the cure) with the inner cage at a `deformed` that is not safe."""

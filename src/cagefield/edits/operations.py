@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Axes, Cage, factors, vector
+from cagefield.cages import FACES, Axes, Cage, factors, vector
 
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -137,6 +137,11 @@ class MoveCorner:
     by: Triple
     noun: ClassVar[str] = "corner move"
 
+    @property
+    def corners(self) -> tuple[int, ...]:
+        """The corners that move."""
+        return (self.corner,)
+
     def apply(self, cage: Cage) -> Cage:
         """The deformed cage."""
         return cage.move_corner(self.corner, self.by)
@@ -157,6 +162,11 @@ class MoveEdge:
     by: Triple
     noun: ClassVar[str] = "edge move"
 
+    @property
+    def corners(self) -> tuple[int, ...]:
+        """The corners that move."""
+        return self.edge
+
     def apply(self, cage: Cage) -> Cage:
         """The deformed cage."""
         return cage.move_edge(self.edge, self.by)
@@ -176,6 +186,11 @@ class MoveFace:
     face: str
     by: Triple
     noun: ClassVar[str] = "face move"
+
+    @property
+    def corners(self) -> tuple[int, ...]:
+        """The corners that move."""
+        return FACES[self.face]
 
     def apply(self, cage: Cage) -> Cage:
         """The deformed cage."""

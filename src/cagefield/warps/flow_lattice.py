@@ -1,8 +1,11 @@
-"""The lattice of a flow shell between parallelepipeds, sampled by a Quadrants kernel in float32.
+"""The lattice of a flow shell, sampled by a Quadrants kernel in float32.
 
-The march of `flow_device`, written for `LANES` nodes at a time and without branches, so that compilers can
-use vector instructions: a vector here holds one number of each of the nodes. The table is
-that of `flow_device`.
+The march of `flow_device`, written for `LANES` nodes at a time: the innermost loops run over them, have no
+branches, and keep each number of all of them in one array, so that compilers use vector instructions. The
+table is that of `flow_device`. Two things differ from the march of single samples, by less than the error of
+its steps: it goes on in the outer cage's coordinates z, so that only the start of a way is straightened
+there, and the inner cage's xi are followed by two of Newton's steps a stage, not to rounding. Nodes that
+these do not suffice for are marked, and marched again one by one.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -12,119 +15,195 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield.warps.flow_device import HEADER, MOMENT, table
+from cagefield.warps.flow_device import HEADER, MOMENT, flow_point, table
+from cagefield.warps.flow_lanes import bend, newton, times, unbend, weight_at
 from cagefield.warps.flow_shell import FlowShell
 
-LANES = 8
+LANES = 64
 lanes = qd.types.vector(LANES, qd.f32)
 vec3 = qd.math.vec3
 mat3 = qd.types.matrix(3, 3, qd.f32)
 Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 
+START_STEPS = 8
+"""Newton's steps for the outer cage's coordinates at the start of a way."""
+
+LOST = 1e30
+"""Written to nodes whose coordinates were not followed."""
+
+FOLLOWED = 0.05
+"""Largest residual of the inner cage's coordinates, in units of xi, after the first of two steps."""
+
 
 def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     """Displacements to canonical space [R^3,3], x fastest, of the nodes of an outer cage; see `Lattice`.
 
-    Both cages must be parallelepipeds. Nodes inside the inner cage go along with it, up to the error of the
-    integration; those on the outer cage's faces stay where they are.
+    Nodes inside the inner cage go along with it, up to the error of the integration; those on the outer
+    cage's faces and outside them stay where they are.
     """
     devices.start()
     origin, frame = shell.outer.frame
     nodes = np.empty((resolution**3, 3), dtype=np.float32)
-    _march(nodes, table(shell), vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    place = (table(shell), vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    if devices.is_gpu():  # which has a lane for every node
+        nodes[:] = LOST
+    else:
+        _march(nodes, *place, not shell.motion.confines.is_affine, not shell.motion.is_affine)
+    if (nodes[:, 0] == np.float32(LOST)).any():
+        _march_lost(nodes, *place)
     return nodes
 
 
 @qd.kernel
-def _march(nodes: Nodes, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
+def _march_lost(nodes: Nodes, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
+    for n in range(nodes.shape[0]):
+        if nodes[n].x == LOST:
+            p = place(n, origin, frame, resolution)
+            nodes[n] = flow_point(p, table, 0) - p
+
+
+@qd.kernel
+def _march(
+    nodes: Nodes,
+    table: Nodes,
+    origin: vec3,
+    frame: mat3,
+    resolution: qd.i32,
+    bent_outer: qd.template(),
+    bent_inner: qd.template(),
+):
     count = nodes.shape[0]
     for block in range((count + LANES - 1) // LANES):
-        px = lanes(0.0)
-        py = lanes(0.0)
-        pz = lanes(0.0)
-        for lane in qd.static(range(LANES)):
-            n = qd.min(block * LANES + lane, count - 1)
-            at = vec3(n % resolution, (n // resolution) % resolution, n // (resolution * resolution))
-            p = origin - table[3] + frame @ (at / qd.cast(resolution - 1, qd.f32))
-            px[lane] = p.x
-            py[lane] = p.y
-            pz[lane] = p.z
-        x, y, z = times(table, 0, px, py, pz)
-        x0 = x
-        y0 = y
-        z0 = z
+        # z, its rate k and the weighted sum of rates s; xi; the largest residual of xi.
+        zx = lanes(0.0)
+        zy = lanes(0.0)
+        zz = lanes(0.0)
+        kx = lanes(0.0)
+        ky = lanes(0.0)
+        kz = lanes(0.0)
+        sx = lanes(0.0)
+        sy = lanes(0.0)
+        sz = lanes(0.0)
+        bx = lanes(0.0)
+        by = lanes(0.0)
+        bz = lanes(0.0)
+        lost = lanes(0.0)
+        for lane in range(LANES):
+            p = place(qd.min(block * LANES + lane, count - 1), origin, frame, resolution) - table[3]
+            Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
+            x = Zx
+            y = Zy
+            z = Zz
+            if qd.static(bent_outer):
+                x = qd.max(qd.min(Zx, 1.0), -1.0)
+                y = qd.max(qd.min(Zy, 1.0), -1.0)
+                z = qd.max(qd.min(Zz, 1.0), -1.0)
+                for _ in qd.static(range(START_STEPS)):
+                    x, y, z, lost[lane] = newton(x, y, z, Zx, Zy, Zz, table, 10)
+            zx[lane] = x
+            zy[lane] = y
+            zz[lane] = z
+            if qd.static(bent_inner):
+                ix, iy, iz = times(table, HEADER, Zx, Zy, Zz)
+                ix += table[HEADER + 3].x
+                iy += table[HEADER + 3].y
+                iz += table[HEADER + 3].z
+                x = ix
+                y = iy
+                z = iz
+                for _ in qd.static(range(START_STEPS)):
+                    x, y, z, _r = newton(x, y, z, ix, iy, iz, table, HEADER + 10)
+                bx[lane] = x
+                by[lane] = y
+                bz[lane] = z
         steps = qd.cast(table[8].x, qd.i32)
         for n in range(steps):
             start = HEADER + 2 * MOMENT * n
             h = table[start + 9].x
-            kx = lanes(0.0)
-            ky = lanes(0.0)
-            kz = lanes(0.0)
-            sx = lanes(0.0)
-            sy = lanes(0.0)
-            sz = lanes(0.0)
             share = 0.0
             for stage in range(4):
                 if stage == 1:
                     share = 0.5 * h
                 elif stage == 3:
                     share = h
-                moment = start + ((stage + 1) // 2) * MOMENT
-                kx, ky, kz = velocity(x + share * kx, y + share * ky, z + share * kz, table, moment)
+                kept = 0.0 if stage == 0 else 1.0
                 weight = 2.0 if (stage == 1 or stage == 2) else 1.0
-                sx += weight * kx
-                sy += weight * ky
-                sz += weight * kz
-            x += (h / 6.0) * sx
-            y += (h / 6.0) * sy
-            z += (h / 6.0) * sz
-        qx, qy, qz = times(table, 4, x - x0, y - y0, z - z0)
-        for lane in qd.static(range(LANES)):
+                moment = start + ((stage + 1) // 2) * MOMENT
+                for lane in range(LANES):
+                    x = zx[lane] + share * kx[lane]
+                    y = zy[lane] + share * ky[lane]
+                    z = zz[lane] + share * kz[lane]
+                    Zx = x
+                    Zy = y
+                    Zz = z
+                    if qd.static(bent_outer):
+                        tx, ty, tz = bend(x, y, z, table, 10)
+                        Zx += tx
+                        Zy += ty
+                        Zz += tz
+                    ix, iy, iz = times(table, moment, Zx, Zy, Zz)
+                    ix += table[moment + 3].x
+                    iy += table[moment + 3].y
+                    iz += table[moment + 3].z
+                    vx, vy, vz = times(table, moment + 4, Zx, Zy, Zz)
+                    vx += table[moment + 7].x
+                    vy += table[moment + 7].y
+                    vz += table[moment + 7].z
+                    if qd.static(bent_inner):
+                        x1, y1, z1, _r = newton(bx[lane], by[lane], bz[lane], ix, iy, iz, table, moment + 10)
+                        ix, iy, iz, residual = newton(x1, y1, z1, ix, iy, iz, table, moment + 10)
+                        bx[lane] = ix
+                        by[lane] = iy
+                        bz[lane] = iz
+                        lost[lane] = qd.max(lost[lane], residual)
+                        cx = qd.max(qd.min(ix, 1.0), -1.0)
+                        cy = qd.max(qd.min(iy, 1.0), -1.0)
+                        cz = qd.max(qd.min(iz, 1.0), -1.0)
+                        tx, ty, tz = bend(cx, cy, cz, table, 14)
+                        tx, ty, tz = times(table, moment + 14, tx, ty, tz)
+                        vx += tx
+                        vy += ty
+                        vz += tz
+                    w = weight_at(x, y, z, ix, iy, iz, table, moment)
+                    vx *= w
+                    vy *= w
+                    vz *= w
+                    if qd.static(bent_outer):
+                        vx, vy, vz = unbend(x, y, z, vx, vy, vz, table, 10)
+                    kx[lane] = vx
+                    ky[lane] = vy
+                    kz[lane] = vz
+                    sx[lane] = kept * sx[lane] + weight * vx
+                    sy[lane] = kept * sy[lane] + weight * vy
+                    sz[lane] = kept * sz[lane] + weight * vz
+            for lane in range(LANES):
+                zx[lane] += (h / 6.0) * sx[lane]
+                zy[lane] += (h / 6.0) * sy[lane]
+                zz[lane] += (h / 6.0) * sz[lane]
+        for lane in range(LANES):
             n = block * LANES + lane
             if n < count:
-                nodes[n] = vec3(qx[lane], qy[lane], qz[lane])
+                p = place(n, origin, frame, resolution) - table[3]
+                x = zx[lane]
+                y = zy[lane]
+                z = zz[lane]
+                moved = vec3(0.0, 0.0, 0.0)
+                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) < 1.0:
+                    Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
+                    if qd.static(bent_outer):
+                        tx, ty, tz = bend(x, y, z, table, 10)
+                        x += tx
+                        y += ty
+                        z += tz
+                    qx, qy, qz = times(table, 4, x - Zx, y - Zy, z - Zz)
+                    moved = vec3(qx, qy, qz)
+                    if lost[lane] > FOLLOWED:
+                        moved = vec3(LOST, LOST, LOST)
+                nodes[n] = moved
 
 
 @qd.func
-def velocity(x: lanes, y: lanes, z: lanes, table: qd.template(), moment: qd.i32):
-    """dZ/dt at Z, in three parts."""
-    bx, by, bz = times(table, moment, x, y, z)
-    bx += table[moment + 3].x
-    by += table[moment + 3].y
-    bz += table[moment + 3].z
-    vx, vy, vz = times(table, moment + 4, x, y, z)
-    vx += table[moment + 7].x
-    vy += table[moment + 7].y
-    vz += table[moment + 7].z
-    H = table[7]
-    height = table[moment + 8]
-    dx = 1.0 / qd.max(H.x * (1.0 - x * x), 1e-6)
-    dy = 1.0 / qd.max(H.y * (1.0 - y * y), 1e-6)
-    dz = 1.0 / qd.max(H.z * (1.0 - z * z), 1e-6)
-    ex = height.x * qd.max(qd.abs(bx) - 1.0, 0.0)
-    ey = height.y * qd.max(qd.abs(by) - 1.0, 0.0)
-    ez = height.z * qd.max(qd.abs(bz) - 1.0, 0.0)
-    dx *= dx
-    dy *= dy
-    dz *= dz
-    ex *= ex
-    ey *= ey
-    ez *= ez
-    q = qd.sqrt(qd.sqrt((dx * dx + dy * dy + dz * dz) * (ex * ex + ey * ey + ez * ez)))
-    g = qd.max((1.0 / (1.0 + q) - 1.0) * table[8].z + 1.0, 0.0)
-    linear = table[9].x
-    w = g * (linear + (1.0 - linear) * g * (3.0 - 2.0 * g))
-    return w * vx, w * vy, w * vz
-
-
-@qd.func
-def times(table: qd.template(), at: qd.i32, x: lanes, y: lanes, z: lanes):
-    """The matrix whose rows are three entries of the table, times (x, y, z)."""
-    a = table[at]
-    b = table[at + 1]
-    c = table[at + 2]
-    return (
-        a.x * x + a.y * y + a.z * z,
-        b.x * x + b.y * y + b.z * z,
-        c.x * x + c.y * y + c.z * z,
-    )
+def place(n: qd.i32, origin: vec3, frame: mat3, resolution: qd.i32):
+    """The place of a node in the world."""
+    at = vec3(n % resolution, (n // resolution) % resolution, n // (resolution * resolution))
+    return origin + frame @ (at / qd.cast(resolution - 1, qd.f32))

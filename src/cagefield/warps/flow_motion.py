@@ -1,14 +1,11 @@
 """How the inner cage moves from its canonical to its deformed place, for the flow shell.
 
-Notation: xi in [-1,1]^3 are the cage's trilinear coordinates, clamp(xi) their clamping to that cube, t in
-[0,1] the time. The cage at time t, and all of space with it, is
+Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `extended`), is
 
-    x(xi, t) = c(t) + F(t) (xi + B_t(clamp(xi))),
-    B_t(xi) = K_0 xi eta + K_1 xi zeta + K_2 eta zeta + K_3 xi eta zeta,
+    x(xi, t) = c(t) + F(t) (xi + B_t(clamp(xi))).
 
-so inside the cage x is the trilinear map of its corners, and outside it goes on along the columns of F. With
-F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its polar
-decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
+With F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its
+polar decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
 degrees at most), the stretch is log-linear, the bend K goes linearly from the one cage's to the other's,
 and k >= 0 shrinks the cage on its way by just as much as keeps it inside the outer cage. c(t) is a straight
 line, in the outer cage's coordinates where a straight one in space would leave it.
@@ -17,18 +14,25 @@ line, in the outer cage's coordinates where a straight one in space would leave 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cagefield import hexahedron
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array
+from cagefield.hexahedron import Array, Mask
+from cagefield.warps.extended import (
+    AXES,
+    SIGNS,
+    Extended,
+    bend,
+    bends,
+    slope_columns,
+    stay_one_to_one,
+    straightened_slope,
+)
 
-BENDS = [3, 5, 6, 7]
-AXES = [1, 2, 4]
 LEAST_SIZE = 1e-2
 """The cage is shrunk to no less than this on its way."""
 
@@ -40,115 +44,6 @@ TIMES: Array = np.unique(
     np.concatenate([_grid, [0.002, 0.006, 0.0125], 1.0 - np.array([0.002, 0.006, 0.0125])])
 )
 """Times at which the way is looked at: denser at its ends, where a cage with a small gap must shrink fast."""
-
-
-@dataclass(frozen=True)
-class Extended:
-    """Space in a cage's coordinates: x = c + F (xi + B(clamp(xi))).
-
-    Parameters: centre c [3], frame F [3,3], bend K [4,3]; F^-1 and the distances of the faces from the centre
-    along their normals follow from them.
-    """
-
-    centre: Array
-    frame: Array
-    bend: Array
-
-    @classmethod
-    def of(cls, cage: Cage) -> Extended:
-        """The coordinates of a cage at rest."""
-        C = hexahedron.coefficients(cage.corners)
-        F = np.ascontiguousarray(C[AXES].T)
-        bend = C[BENDS] @ np.linalg.inv(F).T
-        if np.abs(bend).max() < 1e-12:
-            bend = np.zeros((4, 3))
-        return cls(C[0], F, bend)
-
-    @cached_property
-    def inverse(self) -> Array:
-        """F^-1 [3,3]."""
-        return np.asarray(np.linalg.inv(self.frame))
-
-    @cached_property
-    def heights(self) -> Array:
-        """Distance [3] of each pair of faces of the affine part from the centre."""
-        return np.asarray(1.0 / np.linalg.norm(self.inverse, axis=1))
-
-    @cached_property
-    def is_affine(self) -> bool:
-        """True for a parallelepiped."""
-        return not self.bend.any()
-
-    def points(self, xi: Array) -> Array:
-        """x [N,3] of coordinates xi [N,3]."""
-        return self.centre + (xi + bend(self.bend, xi.clip(-1.0, 1.0))) @ self.frame.T
-
-    def coordinates(self, points: Array, start: Array | None = None) -> Array:
-        """xi [N,3] of points [N,3], by Newton's method from xi = start."""
-        y = (points - self.centre) @ self.inverse.T
-        return y if self.is_affine else straighten(self.bend, y, start)
-
-    def gradient(self, xi: Array) -> Array:
-        """dxi/dx [N,3,3] at xi [N,3]; at a kink that of the side towards the cage's inside."""
-        if self.is_affine:
-            return np.broadcast_to(self.inverse, (len(xi), 3, 3))
-        return hexahedron.invert(straightened_slope(self.bend, xi)) @ self.inverse
-
-    @cached_property
-    def is_one_to_one(self) -> bool:
-        """True when no two coordinates are the same point: det dx/dxi > 0 inside the cage and around it."""
-        if self.is_affine:
-            return True
-        return bends_one_to_one(self.bend[None])
-
-
-def bend(K: Array, xi: Array) -> Array:
-    """B(xi) [N,3] of the bend K [4,3]."""
-    return _products(xi) @ K
-
-
-def bend_slope(K: Array, xi: Array) -> Array:
-    """dB/dxi [N,3,3], the last axis xi."""
-    x, y, z = xi[:, :1], xi[:, 1:2], xi[:, 2:]
-    along = (y * K[0] + z * K[1] + y * z * K[3], x * K[0] + z * K[2] + x * z * K[3])
-    return np.stack([*along, x * K[1] + y * K[2] + x * y * K[3]], axis=2)
-
-
-def bends_one_to_one(K: Array) -> bool:
-    """True when xi + B(clamp(xi)) takes no two xi to the same point, for each of the bends K [B,4,3]."""
-    corners = _SIGNS + np.stack([bend(k, _SIGNS) for k in K])
-    pieces = corners[:, _NEXT_TO] + _AWAY  # [B,27,8,3]; the map is trilinear on each
-    return hexahedron.is_positive(hexahedron.determinant_coefficients(pieces))
-
-
-def straightened_slope(K: Array, xi: Array) -> Array:
-    """d(xi + B(clamp(xi)))/dxi [N,3,3]."""
-    inside = np.abs(xi) <= 1.0
-    return np.eye(3) + bend_slope(K, xi.clip(-1.0, 1.0)) * inside[:, None, :]
-
-
-def straighten(K: Array, y: Array, start: Array | None = None) -> Array:
-    """xi [N,3] with xi + B(clamp(xi)) = y [N,3], by a damped Newton's method from `start` (else from y)."""
-    xi = y.copy() if start is None else start.copy()
-    rows = np.arange(len(y))
-    residual = xi + bend(K, xi.clip(-1.0, 1.0)) - y
-    for _ in range(60):
-        size = np.abs(residual[rows]).max(axis=1, initial=0.0)
-        rows = rows[size > 1e-14 * (1.0 + np.abs(y[rows]).max(axis=1, initial=0.0))]
-        if len(rows) == 0:
-            break
-        step = (hexahedron.invert(straightened_slope(K, xi[rows])) @ residual[rows][:, :, None])[:, :, 0]
-        size, left, share = np.abs(residual[rows]).max(axis=1), np.arange(len(rows)), 1.0
-        for _ in range(7):
-            trial = xi[rows[left]] - share * step[left]
-            new = trial + bend(K, trial.clip(-1.0, 1.0)) - y[rows[left]]
-            better = np.abs(new).max(axis=1) < size[left]
-            xi[rows[left[better]]], residual[rows[left[better]]] = trial[better], new[better]
-            left, share = left[~better], 0.5 * share
-            if len(left) == 0:
-                break
-        rows = np.delete(rows, left)  # what no step improves has arrived, up to rounding
-    return xi
 
 
 @dataclass(frozen=True)
@@ -183,26 +78,42 @@ class Motion:
         least = KEPT_GAP * min(self.gaps)
         if least <= 0.0:
             return np.inf
-        if (self._gap(TIMES, 0.0) >= least).all():
+        at_rest = self._gap(TIMES, 0.0) - least
+        if at_rest.min() >= 0.0:
             return 0.0
-        low, high = 0.0, -np.log(LEAST_SIZE)
+        high = -float(np.log(LEAST_SIZE))
         if (self._gap(TIMES, high) < least).any():
             return np.inf
-        while high - low > 1e-3:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if (self._gap(TIMES, middle) >= least).all() else (middle, high)
-        return float(high)
+        # The least gap grows with k: regula falsi, over the times at which there is too little of it.
+        times = TIMES[at_rest < 0.0]
+        low, below, above = 0.0, float(at_rest.min()), float(self._gap(times, high).min()) - least
+        for _ in range(40):
+            if high - low <= 1e-3 or above <= 1e-3 * least:
+                break
+            middle = low + np.clip(below / (below - above), 0.01, 0.99) * (high - low)
+            value = float(self._gap(times, middle).min()) - least
+            if value >= 0.0:
+                high, above, below = middle, value, 0.5 * below
+            else:
+                low, below, above = middle, value, 0.5 * above
+        return high
 
     def frames(self, t: Array, shrink: float | None = None) -> tuple[Array, Array, Array, Array]:
         """(c [T,3], F [T,3,3], dc/dt [T,3], dF/dt [T,3,3]) at times t [T]."""
         k = self.shrink if shrink is None else shrink
         turn, stretch, V = self._turn
-        R = Rotation.from_rotvec(t[:, None] * turn).as_matrix()
-        grown = np.exp(t[:, None] * stretch) * np.exp(-k * np.sin(np.pi * t))[:, None]
-        F = R @ (V * grown[:, None, :]) @ V.T @ self.start.frame
+        x, y, z = turn
+        omega = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # omega v = turn x v
+        angle = float(np.linalg.norm(turn))
+        # e^(t omega), by Rodrigues' formula.
+        along = t * np.sinc(t * (angle / np.pi))
+        twice = 0.5 * (t * np.sinc(t * (0.5 * angle / np.pi))) ** 2
+        R = np.eye(3) + along[:, None, None] * omega + twice[:, None, None] * (omega @ omega)
+        grown = np.exp(t[:, None] * stretch - (k * np.sin(np.pi * t))[:, None])
+        last = V.T @ self.start.frame
+        F = R @ (V * grown[:, None, :]) @ last
         rate = stretch - (k * np.pi * np.cos(np.pi * t))[:, None]
-        omega = np.cross(np.eye(3), turn)  # omega v = turn x v
-        dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ V.T @ self.start.frame
+        dF = omega @ F + R @ (V * (grown * rate)[:, None, :]) @ last
         c, dc = self._centre(t)
         return c, F, dc, dF
 
@@ -229,57 +140,76 @@ class Motion:
         inside = 1.0 - np.abs(z).max(axis=1)
         return bool(inside.min() >= 0.9 * min(inside[0], inside[-1]))
 
-    def surface(self, t: Array, shrink: float | None = None, *, fine: bool = False) -> tuple[Array, Array]:
+    def surface(self, t: Array) -> tuple[Array, Array]:
         """(z [T,S,3], dz/dt [T,S,3]) of points on the cage's faces, in the outer cage's coordinates.
 
-        S is 26, the corners and the middles of edges and faces, or 124.
+        In an affine outer cage they are the corners: |z| and |dz/dt| / (1 - |z|) are largest there. In others
+        the middles of edges and faces, too.
         """
-        c, F, dc, dF = self.frames(t, shrink)
-        xi = _SURFACE if fine else _SURFACE[:26]
-        still, going = bend(self.start.bend, xi), bend(self.end.bend - self.start.bend, xi)
-        y = xi + still + t[:, None, None] * going
+        c, F, dc, dF = self.frames(t)
+        xi = SIGNS if self.confines.is_affine else _SURFACE[:26]
+        y = self._straightened(t, xi)
         x = c[:, None] + y @ np.transpose(F, (0, 2, 1))
-        v = dc[:, None] + y @ np.transpose(dF, (0, 2, 1)) + going @ np.transpose(F, (0, 2, 1))
+        v = dc[:, None] + y @ np.transpose(dF, (0, 2, 1))
+        if not self.is_affine:
+            v += bend(self.end.bend - self.start.bend, xi) @ np.transpose(F, (0, 2, 1))
         z = self.confines.coordinates(x.reshape(-1, 3))
-        along = self.confines.gradient(z) @ v.reshape(-1, 3, 1)
-        return z.reshape(x.shape), along.reshape(x.shape)
+        if self.confines.is_affine:
+            return z.reshape(x.shape), v @ self.confines.inverse.T
+        along = hexahedron.solve(
+            slope_columns(self.confines.bend, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
+        )
+        return z.reshape(x.shape), along.T.reshape(x.shape)
 
-    def _gap(self, t: Array, shrink: float, *, fine: bool = False) -> Array:
+    def _straightened(self, t: Array, xi: Array) -> Array:
+        """xi + B_t(xi) [T,S,3] of points xi [S,3] of the cube at times t [T]."""
+        if self.is_affine:
+            return np.broadcast_to(xi, (len(t), *xi.shape))
+        going = bend(self.end.bend - self.start.bend, xi)
+        return xi + bend(self.start.bend, xi) + t[:, None, None] * going
+
+    def _gap(self, t: Array, shrink: float) -> Array:
         """Least distance [T], as a share of the outer cage's half-width, of the cage from the outer cage."""
-        z, _ = self.surface(t, shrink, fine=fine)
-        return 1.0 - np.abs(z).max(axis=(1, 2))
+        c, F, *_ = self.frames(t, shrink)
+        xi = SIGNS if self.confines.is_affine else _SURFACE[:26]
+        x = c[:, None] + self._straightened(t, xi) @ np.transpose(F, (0, 2, 1))
+        z = self.confines.coordinates(x.reshape(-1, 3))
+        return 1.0 - np.abs(z).max(axis=1).reshape(x.shape[:2]).max(axis=1)
 
     @cached_property
     def gaps(self) -> tuple[float, float]:
         """The gaps of the canonical and the deformed cage, as shares of the outer cage's half-width."""
-        first, last = self._gap(np.array([0.0, 1.0]), 0.0, fine=not self.confines.is_affine)
-        return float(first), float(last)
+        return _gap_between(self.inner, self.outer), _gap_between(self.deformed, self.outer)
 
     @cached_property
     def is_one_to_one(self) -> bool:
         """True when the cage stays a valid one, and space around it too, all the way."""
-        return self.is_affine or bends_one_to_one(np.stack([self.bend(t) for t in np.linspace(0.0, 1.0, 5)]))
+        return self.is_affine or bool(stay_one_to_one(self.start.bend, self.end.bend[None])[0])
 
 
-def _products(xi: Array) -> Array:
-    x, y, z = xi[..., 0], xi[..., 1], xi[..., 2]
-    return np.stack([x * y, x * z, y * z, x * y * z], axis=-1)
+def may_bend(inner: Cage, corners: Array) -> Mask:
+    """Mask [B] of the valid cages [B,8,3] that the inner cage can become with its bend one to one."""
+    C = hexahedron.coefficients(corners)
+    ends = bends(C, np.transpose(C[:, AXES], (0, 2, 1)))
+    start = Extended.of(inner).bend
+    if not (start.any() or ends.any()):
+        return np.ones(len(corners), dtype=bool)
+    return stay_one_to_one(start, ends)
 
 
-_SIGNS = 2.0 * hexahedron.BITS - 1.0
+def gaps(corners: Array, confines: Extended, points: int = 124) -> Array:
+    """Least distances [B] of cages [B,8,3] from the outer cage, as shares of its half-width; < 0 outside.
 
-
-def _pieces() -> tuple[NDArray[np.intp], Array]:
-    """The cage and the 26 pieces of space around it, one unit thick along its axes: for corner k of piece n
-
-    the cage's corner [27,8] that it is at or next to, and how far it is from there [27,8,3].
+    Exact in an affine outer cage, where the corners are nearest; else at 124 points of the faces, or 8.
     """
-    sides = np.stack(np.meshgrid(*3 * [[-1.0, 0.0, 1.0]], indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    on = np.where(sides == 0.0, _SIGNS, sides)
-    return (0.5 * (on + 1.0) @ [1.0, 2.0, 4.0]).astype(np.intp), sides * (sides == _SIGNS)
+    x = corners if confines.is_affine or points == 8 else _WEIGHTS @ corners
+    z = confines.coordinates(x.reshape(-1, 3))
+    return 1.0 - np.abs(z).max(axis=1).reshape(x.shape[:2]).max(axis=1)
 
 
-_NEXT_TO, _AWAY = _pieces()
+@lru_cache(maxsize=64)
+def _gap_between(cage: Cage, outer: Cage) -> float:
+    return float(gaps(cage.corners[None], Extended.of(outer))[0])
 
 
 def _surface(nodes: int) -> Array:
@@ -290,3 +220,5 @@ def _surface(nodes: int) -> Array:
 
 
 _SURFACE = np.concatenate([_surface(3), _surface(5)])
+_WEIGHTS = np.prod(1.0 + SIGNS * _SURFACE[:, None], axis=2) / 8.0
+"""Shares [124,8] of a cage's corners in the points of its faces."""

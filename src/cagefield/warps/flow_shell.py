@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from cagefield import hexahedron
-from cagefield.cages import Cage
+from cagefield.cages import Cage, are_valid
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.flow_motion import Extended, Motion, bend, bend_slope
+from cagefield.warps.extended import Extended, bend, bend_slope
+from cagefield.warps.flow_motion import Motion, gaps, may_bend
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
 
@@ -89,17 +90,28 @@ class FlowShell:
         """The way of the inner cage."""
         return Motion(self.inner, self.deformed, self.outer)
 
+    def with_strain(self, strain: float) -> FlowShell:
+        """The shell with other steps, and what is known of its motion."""
+        other = replace(self, strain=strain)
+        other.__dict__.update(motion=self.motion, _strained=self._strained)
+        return other
+
     @cached_property
     def knots(self) -> Array:
         """Times [K+1] from 0 to 1; a step goes from each to the next."""
-        t = np.linspace(0.0, 1.0, 65)
+        t, total = self._strained
+        steps = int(np.clip(np.ceil(total[-1] / self.strain), LEAST_STEPS, MOST_STEPS))
+        return np.interp(np.linspace(0.0, total[-1], steps + 1), total, t)
+
+    @cached_property
+    def _strained(self) -> tuple[Array, Array]:
+        """(times, strain up to each of them)."""
+        t = np.linspace(0.0, 1.0, 65 if self.motion.confines.is_affine else 33)
         z, dz = self.motion.surface(t)
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)
         rate = 1.5 * squeeze + np.linalg.norm(dF @ np.linalg.inv(F), axis=(1, 2)) + 1e-3
-        total = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
-        steps = int(np.clip(np.ceil(total[-1] / self.strain), LEAST_STEPS, MOST_STEPS))
-        return np.interp(np.linspace(0.0, total[-1], steps + 1), total, t)
+        return t, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
 
     def to_canonical(self, points: Array) -> tuple[Array, Array]:
         """(canonical points [N,3], Jacobians [N,3,3]) of deformed points [N,3] in the shell."""
@@ -147,9 +159,24 @@ class FlowShell:
             return 1.0
         return float(1.0 / np.linalg.det(self.to_canonical(points)[1]).max())
 
+    @staticmethod
+    def may_surround(inner: Cage, outer: Cage, corners: Array, *, fine: bool = True) -> Mask:
+        """Mask [B] of the deformed inner cages [B,8,3] in which `problem` finds nothing but for their way.
+
+        Corners that no cage may have are False. Where not fine, only the corners are looked at, and edges or
+        faces that come too near to a bent outer cage are missed.
+        """
+        mask = np.asarray(gaps(corners, Extended.of(outer), 8) >= LEAST_GAP)
+        mask[mask] = are_valid(corners[mask])
+        if fine and not Extended.of(outer).is_affine:
+            mask[mask] = gaps(corners[mask], Extended.of(outer)) >= LEAST_GAP
+        mask[mask] = may_bend(inner, corners[mask])
+        return mask
+
     def problem(self) -> str | None:
         """Why the shell is not one to one, in words that continue "the flow shell ...", or None."""
         motion = self.motion
+        moves = self.deformed is not self.inner
         for gap, when in zip(motion.gaps, (" before any operation", ""), strict=True):
             if gap < 0.0:
                 return (
@@ -162,9 +189,9 @@ class FlowShell:
                 )
         if not motion.start.is_one_to_one:
             return "cannot surround the inner cage: it is bent too far before any operation"
-        if not motion.is_one_to_one:
+        if moves and not motion.is_one_to_one:
             return "cannot follow the inner cage: it is bent too far"
-        if not np.isfinite(motion.shrink):
+        if moves and not np.isfinite(motion.shrink):
             return "finds no way for the inner cage through the outer cage"
         return None
 

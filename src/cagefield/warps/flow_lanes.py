@@ -1,0 +1,152 @@
+"""The flow shell's velocity in plain numbers and without branches, for loops that compilers vectorise.
+
+Vectors are three numbers (x, y, z); z are the coordinates of the outer cage, xi those of the inner one. The
+tables, and the same mathematics for one sample in vectors, are in `flow_device`.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+NEAR = 2e-5
+"""Distances to the outer cage's faces, as shares of its half-width, are taken to be no less than this.
+
+Its eighth power, at the outer cage's edges, is what float32 still has room for.
+"""
+
+
+@qd.func
+def weight_at(
+    x: qd.f32, y: qd.f32, z: qd.f32, ix: qd.f32, iy: qd.f32, iz: qd.f32, table: qd.template(), moment: qd.i32
+):
+    """w at coordinates z of the outer and xi of the inner cage: 1 / (1 + d_i / d_o) in one division."""
+    H = table[7]
+    height = table[moment + 8]
+    dx = qd.max(H.x * (1.0 - x * x), NEAR)
+    dy = qd.max(H.y * (1.0 - y * y), NEAR)
+    dz = qd.max(H.z * (1.0 - z * z), NEAR)
+    ex = height.x * qd.max(qd.abs(ix) - 1.0, 0.0)
+    ey = height.y * qd.max(qd.abs(iy) - 1.0, 0.0)
+    ez = height.z * qd.max(qd.abs(iz) - 1.0, 0.0)
+    product = dx * dy * dz
+    dx *= dx
+    dy *= dy
+    dz *= dz
+    ex *= ex
+    ey *= ey
+    ez *= ez
+    a = dx * dy
+    b = dx * dz
+    c = dy * dz
+    # Two roots, not one of the product, which float32 has no room for.
+    q = qd.sqrt(qd.sqrt(ex * ex + ey * ey + ez * ez) * qd.sqrt(a * a + b * b + c * c))
+    g = qd.max((product / (product + q) - 1.0) * table[8].z + 1.0, 0.0)
+    linear = table[9].x
+    return g * (linear + (1.0 - linear) * g * (3.0 - 2.0 * g))
+
+
+@qd.func
+def newton(
+    x: qd.f32,
+    y: qd.f32,
+    z: qd.f32,
+    ax: qd.f32,
+    ay: qd.f32,
+    az: qd.f32,
+    table: qd.template(),
+    K: qd.i32,
+):
+    """(xi after a step from xi = (x, y, z) towards xi + B(clamp(xi)) = a, the residual before it)."""
+    cx = qd.max(qd.min(x, 1.0), -1.0)
+    cy = qd.max(qd.min(y, 1.0), -1.0)
+    cz = qd.max(qd.min(z, 1.0), -1.0)
+    tx, ty, tz = bend(cx, cy, cz, table, K)
+    rx = x + tx - ax
+    ry = y + ty - ay
+    rz = z + tz - az
+    residual = qd.max(qd.abs(rx), qd.abs(ry), qd.abs(rz))
+    sx, sy, sz = unbend(x, y, z, rx, ry, rz, table, K)
+    return x - sx, y - sy, z - sz, residual
+
+
+@qd.func
+def unbend(
+    x: qd.f32,
+    y: qd.f32,
+    z: qd.f32,
+    rx: qd.f32,
+    ry: qd.f32,
+    rz: qd.f32,
+    table: qd.template(),
+    K: qd.i32,
+):
+    """(d(xi + B(clamp(xi)))/dxi)^-1 r at xi = (x, y, z), by Cramer's rule."""
+    a = table[K]
+    b = table[K + 1]
+    c = table[K + 2]
+    g = table[K + 3]
+    cx = qd.max(qd.min(x, 1.0), -1.0)
+    cy = qd.max(qd.min(y, 1.0), -1.0)
+    cz = qd.max(qd.min(z, 1.0), -1.0)
+    in_x = qd.select(qd.abs(x) <= 1.0, 1.0, 0.0)
+    in_y = qd.select(qd.abs(y) <= 1.0, 1.0, 0.0)
+    in_z = qd.select(qd.abs(z) <= 1.0, 1.0, 0.0)
+    yz = cy * cz
+    xz = cx * cz
+    xy = cx * cy
+    ux = 1.0 + in_x * (cy * a.x + cz * b.x + yz * g.x)
+    uy = in_x * (cy * a.y + cz * b.y + yz * g.y)
+    uz = in_x * (cy * a.z + cz * b.z + yz * g.z)
+    vx = in_y * (cx * a.x + cz * c.x + xz * g.x)
+    vy = 1.0 + in_y * (cx * a.y + cz * c.y + xz * g.y)
+    vz = in_y * (cx * a.z + cz * c.z + xz * g.z)
+    wx = in_z * (cx * b.x + cy * c.x + xy * g.x)
+    wy = in_z * (cx * b.y + cy * c.y + xy * g.y)
+    wz = 1.0 + in_z * (cx * b.z + cy * c.z + xy * g.z)
+    # v x w, w x u and u x v.
+    px = vy * wz - vz * wy
+    py = vz * wx - vx * wz
+    pz = vx * wy - vy * wx
+    qx = wy * uz - wz * uy
+    qy = wz * ux - wx * uz
+    qz = wx * uy - wy * ux
+    tx = uy * vz - uz * vy
+    ty = uz * vx - ux * vz
+    tz = ux * vy - uy * vx
+    inverse = 1.0 / qd.max(ux * px + uy * py + uz * pz, 1e-3)
+    return (
+        (rx * px + ry * py + rz * pz) * inverse,
+        (rx * qx + ry * qy + rz * qz) * inverse,
+        (rx * tx + ry * ty + rz * tz) * inverse,
+    )
+
+
+@qd.func
+def bend(x: qd.f32, y: qd.f32, z: qd.f32, table: qd.template(), K: qd.i32):
+    """B(xi), in three parts, of the bend at a row of the table."""
+    a = table[K]
+    b = table[K + 1]
+    c = table[K + 2]
+    g = table[K + 3]
+    xy = x * y
+    xz = x * z
+    yz = y * z
+    xyz = xy * z
+    return (
+        xy * a.x + xz * b.x + yz * c.x + xyz * g.x,
+        xy * a.y + xz * b.y + yz * c.y + xyz * g.y,
+        xy * a.z + xz * b.z + yz * c.z + xyz * g.z,
+    )
+
+
+@qd.func
+def times(table: qd.template(), at: qd.i32, x: qd.f32, y: qd.f32, z: qd.f32):
+    """The matrix whose rows are three entries of the table, times (x, y, z)."""
+    a = table[at]
+    b = table[at + 1]
+    c = table[at + 2]
+    return (
+        a.x * x + a.y * y + a.z * z,
+        b.x * x + b.y * y + b.z * z,
+        c.x * x + c.y * y + c.z * z,
+    )
