@@ -11,7 +11,7 @@ edits follow, whose truth is the scene's model through the exact map.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +50,9 @@ STANDING: tuple[tuple[str, str, str, Factors], ...] = (
 """Scene, case whose cage is used, part, factors: the part is scaled about the middle of its cage's floor."""
 
 
+CONTINUOUS = "Continuous edits: against the scene's model through the exact map, its density as it is."
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -58,14 +61,15 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path, default=Path("benchmarks/results/opacity.md"))
     parser.add_argument("--steps", type=int, default=6000, help="of the fields' training")
     parser.add_argument("--views", type=int, default=6)
+    parser.add_argument("--scenes", nargs="*", default=("digger", "chair", "microphone", "plant"))
     parser.add_argument("--no-continuous", action="store_true", help="leave out the continuous edits")
     options = parser.parse_args()
     devices.start()
     bench = Workbench(Settings(config=VoxelConfig(steps=options.steps)), options.workdir.resolve())
-    rows = [*scaled(bench, options.views)]
+    rows = [*scaled(bench, options.scenes, options.views)]
     discrete = len(rows)
     if not options.no_continuous:
-        rows += continuous(bench)
+        rows += continuous(bench, options.scenes)
     gains = [float(row[-1]) for row in rows]
     means = [f"scaled parts and scenes: {np.mean(gains[:discrete]):.2f} dB"]
     means += [f"continuous edits: {np.mean(gains[discrete:]):.2f} dB"] if rows[discrete:] else []
@@ -77,12 +81,12 @@ def main() -> None:
             "Preserved: density times |J d|, which keeps the optical depth along a ray however it is "
             f"stretched. PSNR (dB): mean of {options.views} test views, against photos of the scene built "
             "with its parts so scaled and lit as they were; there: on the pixels that the edit changes.",
-            "Continuous edits: against the scene's model through the exact map, its density as it is, at "
-            f"{bench.settings.exact_size}x{bench.settings.exact_size} pixels.",
+            *([] if options.no_continuous else [CONTINUOUS]),
             f"Gained on average by preserving: {'; '.join(means)}.",
             f"Fields: {options.steps} steps.",
             f"Machine: {Machine.here()}",
-            f"Command: `python benchmarks/opacity.py {options.workdir.name} --steps {options.steps}"
+            f"Command: `python benchmarks/opacity.py {options.workdir.name} --steps {options.steps} --views "
+            f"{options.views} --scenes {' '.join(options.scenes)}"
             f"{' --no-continuous' if options.no_continuous else ''}`",
         ),
         names=3,
@@ -90,13 +94,17 @@ def main() -> None:
     write_text(options.out, table.markdown())
 
 
-def scaled(bench: Workbench, views: int) -> Iterator[tuple[str, ...]]:
+def scaled(bench: Workbench, scenes: Sequence[str], views: int) -> Iterator[tuple[str, ...]]:
     """A row for each scaled scene and part."""
     for name, factors in WHOLE:
+        if name not in scenes:
+            continue
         model = procedural_scene(name)
         center, size = model.part_box(model.part_names, 0.05)
         yield _scaled(bench, views, name, model.part_names, Cage.box(center, size), center, factors)
     for name, case, part, factors in STANDING:
+        if name not in scenes:
+            continue
         (edit,) = chosen([name], [case])[0].edits
         floor = edit.inner.corners[:4].mean(axis=0)
         yield _scaled(bench, views, name, (part,), edit.inner, floor, factors)
@@ -124,11 +132,11 @@ def _scaled(
     return _row(bench, name, what, same, EditStack([edit]), cameras, before, truth)
 
 
-def continuous(bench: Workbench) -> Iterator[tuple[str, ...]]:
+def continuous(bench: Workbench, scenes: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """A row for each continuous edit."""
     size = bench.settings.exact_size
     for case in CASES:
-        if case.kind != "continuous":
+        if case.kind != "continuous" or case.scene not in scenes:
             continue
         known = bench.scene(case.scene).cameras["test"][: bench.settings.exact_views]
         cameras = tuple(camera.resized(size, size) for camera in known)

@@ -21,8 +21,9 @@ from cagefield.server.document import Document
 from cagefield.server.grid_lines import grid_lines
 from cagefield.server.placing import PROBES, fitted, probes
 from cagefield.server.scheduler import Look, Region
-from cagefield.server.studio import WARM_STAGES, Studio
+from cagefield.server.studio import Studio
 from cagefield.server.tasks import (
+    WARM_STAGES,
     Answered,
     EndJobTask,
     ErrorTask,

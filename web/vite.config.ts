@@ -17,6 +17,6 @@ export default defineConfig({
       },
     },
   },
-  server: { proxy: { "/socket": { target: "ws://127.0.0.1:8765", ws: true } } },
+  server: { proxy: { "/socket": { target: "ws://localhost:8741", ws: true, headers: { origin: "http://localhost:8741" }, changeOrigin: true } } },
   test: { include: ["tests/**/*.test.ts"] },
 });

@@ -7,7 +7,7 @@
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
-                          "preserve_opacity": true if edits scale density with their map}
+                          "preserve_opacity": false if edits leave density as it is}
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
@@ -70,7 +70,7 @@ class Scene:
     version: int = VERSION
     gains: tuple[tuple[float, float, float], ...] = ()
     original: NerfField | None = None
-    preserve_opacity: bool = False
+    preserve_opacity: bool = True
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -157,8 +157,8 @@ class Scene:
         }
         if self.gains:
             manifest["gains"] = self.gains
-        if self.preserve_opacity:
-            manifest["preserve_opacity"] = True
+        if not self.preserve_opacity:
+            manifest["preserve_opacity"] = False
         draft = folder / f".{_MANIFEST}.{secrets.token_hex(4)}"
         _write_json(manifest, draft)
         draft.replace(folder / _MANIFEST)
@@ -229,7 +229,9 @@ class Scene:
         from cagefield.rendering.nerf import render_nerf
 
         edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
-        return render_nerf(original, camera, edits=edits, background=background)
+        return render_nerf(
+            original, camera, edits=edits, background=background, preserve_opacity=self.preserve_opacity
+        )
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -306,7 +308,7 @@ def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any
         raise SceneError(
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
-    opacity = document.get("preserve_opacity", False)
+    opacity = document.get("preserve_opacity", True)
     if not isinstance(opacity, bool):
         raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
     try:

@@ -128,7 +128,8 @@ export class App {
     return new Vector3(...middle(leading(shownCages(edit, this.drag), target(now)).corners, now.corners));
   }
 
-  private arrange(): void {
+  /** Puts lines, handles and the gizmo where they belong now. */
+  arrange(): void {
     const { now } = this.store;
     const edit = selected(now);
     const eye = this.stage.camera.position.toArray();

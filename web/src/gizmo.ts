@@ -122,24 +122,28 @@ export class Gizmo {
     this.controls.axis = null;
   }
 
-  /** A place, in normalised device coordinates, that is free and where the mouse takes hold of a handle; or null. */
-  grip(axis: string, free: (device: Device) => boolean): Device | null {
+  /**
+   * A place, in normalised device coordinates, where the mouse takes hold of a handle, and around which it
+   * still does at a distance of `slack`; null if there is none. Only free places count.
+   */
+  grip(axis: string, slack: Device, free: (device: Device) => boolean): Device | null {
     const picker = this.inner._gizmo.picker[this.controls.mode];
-    picker.updateMatrixWorld(true);
+    this.controls.getHelper().updateMatrixWorld(true);
     const handles = picker.children.filter((child): child is Mesh => child instanceof Mesh);
     const ray = new Raycaster();
+    const holds = (at: Device): boolean => {
+      ray.setFromCamera(new Vector2(at.x, at.y), this.camera);
+      return ray.intersectObjects(handles, false).find((found) => found.object.visible)?.object.name === axis;
+    };
     for (const handle of handles.filter((child) => child.name === axis)) {
       const places = handle.geometry.getAttribute("position");
-      const centre = new Vector3();
-      for (let i = 0; i < places.count; i++) centre.add(new Vector3().fromBufferAttribute(places, i));
-      const points = [centre.divideScalar(places.count)];
-      for (let i = 0; i < places.count; i += 3) points.push(new Vector3().fromBufferAttribute(places, i));
-      for (const point of points) {
+      const points = Array.from({ length: places.count }, (_, i) => new Vector3().fromBufferAttribute(places, i));
+      const centre = points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
+      for (const point of [centre, ...points]) {
         const at = point.applyMatrix4(handle.matrixWorld).project(this.camera);
-        if (Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98) continue;
-        ray.setFromCamera(new Vector2(at.x, at.y), this.camera);
-        const hit = ray.intersectObjects(handles, false).find((found) => found.object.visible);
-        if (hit?.object.name === axis && free(at)) return { x: at.x, y: at.y };
+        if (Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98 || !free(at)) continue;
+        const around = [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => ({ x: at.x + i * slack.x, y: at.y + j * slack.y })));
+        if (around.every(holds)) return { x: at.x, y: at.y };
       }
     }
     return null;

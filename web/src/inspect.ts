@@ -69,11 +69,13 @@ export function inspector(app: App): Inspector {
       return inWindow(x, y);
     },
     grip(axis) {
+      app.arrange();
       const { width, height } = stage.points;
       const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
       const edit = selected(app.store.now);
       const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
-      const at = app.gizmo.grip(axis, (device) =>
+      const slack = { x: 4 / width, y: 4 / height };
+      const at = app.gizmo.grip(axis, slack, (device) =>
         cages.every(({ corners }) => pickCorner(...pixel(device), corners, stage.project) === null),
       );
       return at && inWindow(...pixel(at));

@@ -24,7 +24,7 @@ from cagefield.datasets.procedural.writer import FOV_X
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
 
-_TIMED_VIEWS, _ROUNDS = 3, 5
+_TIMED_VIEWS, _ROUNDS = 2, 3
 
 _EYES = {
     "digger": (1.6, -3.5, 1.3),
@@ -93,6 +93,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             truth, before = "exact map", bench.mapped(name, None, cameras)
             after = bench.mapped(name, case.edits, cameras)
         else:
+            cameras = cameras[: bench.settings.discrete_views]
             truth, before = "photos", bench.modelled(name, cameras)
             after = bench.moved(case, cameras)
         if truth not in unedited:

@@ -57,7 +57,8 @@ class Settings:
 
     Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
     the first `exact_views` test cameras, with `exact_samples` samples a ray; that of the methods that are
-    compared at compared_size x compared_size for the first `compared_views`.
+    compared at compared_size x compared_size for the first `compared_views`. Discrete edits are measured on
+    the first `discrete_views` test photos, None for all.
 
     Raises:
         CagefieldError: sizes and numbers that are too small.
@@ -72,6 +73,7 @@ class Settings:
     exact_samples: int = 768
     compared_size: int = 64
     compared_views: int = 3
+    discrete_views: int | None = None
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -83,9 +85,10 @@ class Settings:
             ("exact_samples", 1),
             ("compared_size", 16),
             ("compared_views", 1),
+            ("discrete_views", 1),
         ):
             value = getattr(self, name)
-            if value < least:
+            if value is not None and value < least:
                 raise CagefieldError(f"{name} is {value}; it must be at least {least}")
 
 

@@ -22,6 +22,8 @@ from cagefield.server.worker import Worker
 RESTARTS = 3
 """How often in a minute the rendering process is started again."""
 
+_GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
+
 Level = Literal["info", "warning", "error"]
 Make = Callable[[int], Task]
 
@@ -77,6 +79,7 @@ class Desk:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = False
         self._closing = False
+        self._given_up = False
         self._running: _Running | None = None
         self._queue: deque[_Running] = deque()
         self._numbers = 0
@@ -96,6 +99,8 @@ class Desk:
 
     async def ask(self, make: Make) -> Any:
         """What the rendering process answers to the task `make(number)`. Raises CagefieldError."""
+        if self._given_up:
+            raise CagefieldError(_GIVEN_UP)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
 
         def done(result: Result) -> None:
@@ -191,14 +196,18 @@ class Desk:
         now = time.monotonic()
         self._losses = [at for at in self._losses if now - at < 60.0] + [now]
         if len(self._losses) > RESTARTS:
-            self._office.notice(
-                "error",
-                "the renderer ends again and again (out of memory?); save your edits and restart the editor",
-            )
+            self._give_up()
             return
         self._office.notice("warning", "the renderer was lost and is started again; no edits are lost")
         self.scheduler.refresh(now)
         self.worker.start()
+
+    def _give_up(self) -> None:
+        self._given_up = True
+        self._office.notice("error", _GIVEN_UP)
+        while self._queue:
+            waiting = self._queue.popleft()
+            self._finish(waiting, Failed(waiting.task.number, _GIVEN_UP))
 
     def _from_thread(self, method: Callable[..., None]) -> Callable[..., None]:
         """The method, callable from another thread: runs in the event loop."""

@@ -19,10 +19,10 @@ LINES = 7
 POINTS = 33
 """Points of a line."""
 
-NODES = 33
+NODES = 25
 """Lattice nodes along an axis at which the map is looked at."""
 
-ROUNDS = 40
+ROUNDS = 30
 """Iterations of the inverse, damped by one half."""
 
 

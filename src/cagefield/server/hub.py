@@ -126,6 +126,7 @@ class Hub:
     def save_as(self, path: str, overwrite: bool) -> None:
         """Saves the scene with its edits as another folder, which is edited from then on."""
         self.keeper.save_as(self.session, path, overwrite)
+        self.desk.worker.scene = str(self.keeper.path)
         self.notice("info", f"saved to {self.keeper.path}")
 
     # ---- rendering ----

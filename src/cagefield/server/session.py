@@ -8,7 +8,7 @@ changes nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
@@ -17,26 +17,16 @@ from cagefield.errors import EditError
 from cagefield.hexahedron import Array
 from cagefield.keyframes import Keyframe
 from cagefield.server.document import COLOURS, Document, Entry
+from cagefield.server.drags import Drags
 from cagefield.server.history import History
 from cagefield.server.kinds import Kind, with_kind, with_shell
 from cagefield.server.moving import Moved, Target, move, problem
+from cagefield.server.naming import fresh_name, named, of
 from cagefield.server.placing import outer_around, pair_around
 from cagefield.server.reflecting import mirrored
 
 LATTICE = 64
 """Lattice nodes along an axis of a new continuous edit."""
-
-_TARGETS: dict[Target, str] = {"field": "", "inner": " inner cage", "outer": " outer cage", "both": " cages"}
-
-
-@dataclass(frozen=True)
-class Drag:
-    """A drag that goes on: its number on its page, the entry as it was, and what it has become."""
-
-    number: int
-    target: Target
-    before: Entry
-    now: Entry
 
 
 class Session:
@@ -48,7 +38,7 @@ class Session:
         self.bounds = bounds
         self.voxel = voxel
         self.selected: int | None = document.entries[-1].id if document.entries else None
-        self.drags: dict[int, Drag] = {}
+        self.drags = Drags()
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
@@ -64,11 +54,7 @@ class Session:
     @property
     def shown(self) -> Document:
         """The document as the drags that go on show it."""
-        document = self.document
-        for drag in self.drags.values():
-            if document.has(drag.now.id):
-                document = document.put(drag.now)
-        return document
+        return self.drags.shown(self.document)
 
     @property
     def saved(self) -> bool:
@@ -101,19 +87,14 @@ class Session:
     def drag_begin(self, page: int, number: int, edit: int, target: Target) -> None:
         """A page begins to drag; a drag of its own that went on is given up."""
         self.drag_cancel(page)
-        entry = self.document.entry(edit)
-        if entry.locked:
-            raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
-        self.drags[page] = Drag(number, target, entry, entry)
+        self.drags.begin(page, number, self._unlocked(edit), target)
         self.selected = edit
         self.revision += 1
 
     def drag(self, page: int, number: int, operation: Operation) -> Moved:
         """How far the drag could follow its operation since the beginning; it shows that."""
-        drag = self._drag(page, number)
-        moved = move(drag.before, drag.target, operation)
+        moved = self.drags.move(page, number, operation)
         self._problems = [*self._problems[-63:], (moved.edit, moved.problem)]
-        self.drags[page] = replace(drag, now=replace(drag.before, edit=moved.edit))
         self.revision += 1
         return moved
 
@@ -122,18 +103,17 @@ class Session:
 
         Where another page has changed the edit meanwhile, the operation is done to what it is now.
         """
-        drag = self._drag(page, number)
-        del self.drags[page]
+        drag = self.drags.take(page, number)
         self.revision += 1
         entry = self.document.entry(drag.before.id)
         moved = move(entry, drag.target, operation)
         if moved.part > 0.0 and moved.edit != entry.edit:
-            self._put(_named(operation, drag.target, entry), replace(entry, edit=moved.edit))
+            self._put(named(operation, drag.target, entry), replace(entry, edit=moved.edit))
         return moved
 
     def drag_cancel(self, page: int) -> None:
         """The page's drag is given up, if there is one."""
-        if self.drags.pop(page, None) is not None:
+        if self.drags.cancel(page):
             self.revision += 1
 
     def apply(self, number: int, target: Target, operation: Operation) -> Moved:
@@ -142,7 +122,7 @@ class Session:
         moved = move(entry, target, operation)
         if moved.part < 1.0:
             raise EditError(f"{moved.why}; {moved.part:.0%} of it is possible")
-        self._put(_named(operation, target, entry), replace(entry, edit=moved.edit))
+        self._put(named(operation, target, entry), replace(entry, edit=moved.edit))
         return moved
 
     # ---- cages ----
@@ -151,24 +131,24 @@ class Session:
         """The "inner" or "outer" cage by its corners; the field does not move."""
         entry = self._unlocked(number)
         edit = entry.edit.replace(**{which: cage})
-        self._put(f"Set {which} cage{_of(entry)}", replace(entry, edit=edit))
+        self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
 
     def place(self, point: Array, view_height: float) -> int:
         """The number of a new continuous edit, selected, its cages around a point [3] of a surface."""
         inner, outer = pair_around(point, view_height, self.bounds, self.voxel)
-        edit = Edit(inner, outer, name=self._fresh_name("edit"), lattice=LATTICE)
+        edit = Edit(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Place cages", edit)
 
     def fit_inner(self, number: int, inner: Cage) -> None:
         """The inner cage as it was fitted to its content."""
         entry = self._unlocked(number)
-        self._put(f"Fit inner cage{_of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
+        self._put(f"Fit inner cage{of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
 
     def outer_margin(self, number: int, margin: float) -> None:
         """The outer cage as a margin around all that the inner cage is and was."""
         entry = self._unlocked(number)
         outer = outer_around(entry.edit, margin)
-        self._put(f"Outer margin{_of(entry)}", replace(entry, edit=entry.edit.replace(outer=outer)))
+        self._put(f"Outer margin{of(entry)}", replace(entry, edit=entry.edit.replace(outer=outer)))
 
     # ---- options and the list ----
 
@@ -196,7 +176,7 @@ class Session:
             words.append("show" if options["enabled"] else "hide")
         words += [name for name in options if name != "enabled"]
         if entry != before:
-            self._put(f"{', '.join(words).capitalize()}{_of(before)}", entry)
+            self._put(f"{', '.join(words).capitalize()}{of(before)}", entry)
 
     def preserve_opacity(self, value: bool) -> None:
         """Whether density is scaled with the map, for all edits."""
@@ -213,22 +193,22 @@ class Session:
     def duplicate(self, number: int) -> int:
         """The number of a copy of an edit, after it."""
         entry = self.document.entry(number)
-        edit = entry.edit.replace(name=self._fresh_name(entry.edit.name or "edit"))
-        return self._add(f"Duplicate{_of(entry)}", edit, at=self.document.place(number) + 1)
+        edit = entry.edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
+        return self._add(f"Duplicate{of(entry)}", edit, at=self.document.place(number) + 1)
 
     def mirror(self, number: int, axis: int) -> int:
         """The number of a mirrored copy of an edit, across the plane through the field's middle."""
         entry = self.document.entry(number)
         edit = mirrored(entry.edit, axis, float(self.bounds[:, axis].mean()))
-        edit = edit.replace(name=self._fresh_name(entry.edit.name or "edit"))
-        return self._add(f"Mirror{_of(entry)}", edit, at=self.document.place(number) + 1)
+        edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
+        return self._add(f"Mirror{of(entry)}", edit, at=self.document.place(number) + 1)
 
     def remove(self, number: int) -> None:
         """An edit goes; the one beside it is selected."""
         entry = self._unlocked(number)
         at = self.document.place(number)
         document = self.document.without(number)
-        self._push(f"Remove{_of(entry)}", document)
+        self._push(f"Remove{of(entry)}", document)
         rest = document.entries
         self.selected = rest[min(at, len(rest) - 1)].id if rest else None
 
@@ -237,20 +217,20 @@ class Session:
         entry = self.document.entry(number)
         document = self.document.moved(number, to)
         if document != self.document:
-            self._push(f"Reorder{_of(entry)}", document)
+            self._push(f"Reorder{of(entry)}", document)
 
     def reset_operations(self, number: int) -> None:
         """The inner cage goes back to where it was set."""
         entry = self._unlocked(number)
         if entry.edit.operations:
-            self._put(f"Reset{_of(entry)}", replace(entry, edit=entry.edit.replace(operations=())))
+            self._put(f"Reset{of(entry)}", replace(entry, edit=entry.edit.replace(operations=())))
 
     def remove_last_operation(self, number: int) -> None:
         """The last operation of an edit goes."""
         entry = self._unlocked(number)
         if entry.edit.operations:
             edit = entry.edit.replace(operations=entry.edit.operations[:-1])
-            self._put(f"Remove last operation{_of(entry)}", replace(entry, edit=edit))
+            self._put(f"Remove last operation{of(entry)}", replace(entry, edit=edit))
 
     # ---- texts, path, history ----
 
@@ -308,12 +288,6 @@ class Session:
             self.selected = entries[-1].id if entries else None
         self.revision += 1
 
-    def _drag(self, page: int, number: int) -> Drag:
-        drag = self.drags.get(page)
-        if drag is None or drag.number != number:
-            raise EditError("this drag is over: the edit was changed or the server restarted; begin it again")
-        return drag
-
     def _unlocked(self, number: int) -> Entry:
         entry = self.document.entry(number)
         if entry.locked:
@@ -338,27 +312,3 @@ class Session:
     def _push(self, name: str, document: Document) -> None:
         self.history = self.history.push(name, document)
         self.revision += 1
-
-    def _fresh_name(self, stem: str) -> str:
-        """A name that no edit has: the stem, or it with the lowest free number from 2 ("edit": from 1)."""
-        taken = {entry.edit.name for entry in self.document.entries}
-        head, _, tail = stem.rpartition(" ")
-        stem = head if head and tail.isdigit() else stem
-        if stem not in taken and stem != "edit":
-            return stem
-        number = 1 if stem == "edit" else 2
-        while f"{stem} {number}" in taken:
-            number += 1
-        return f"{stem} {number}"
-
-
-def _named(operation: Operation, target: Target, entry: Entry) -> str:
-    """An operation as the history lists it."""
-    word = {"translation": "Move", "rotation": "Rotate", "scaling": "Scale", "shear": "Shear"}.get(
-        operation.noun, operation.noun.capitalize()
-    )
-    return f"{word}{_TARGETS[target]}{_of(entry)}"
-
-
-def _of(entry: Entry) -> str:
-    return f" of {entry.edit.name}" if entry.edit.name else f" of edit {entry.id}"

@@ -12,7 +12,7 @@ from cagefield.edits import Edit
 from cagefield.keyframes import Still
 from cagefield.server.scheduler import Look, Region
 
-WARM_STAGES = 3
+WARM_STAGES = 4
 """Steps in which the kernels of edited pictures are made ready."""
 
 EditValues: TypeAlias = Mapping[str, Any]
@@ -28,7 +28,7 @@ class Shown:
     """What a picture is of: edits (see `values_of`) and the scene's opacity choice."""
 
     edits: tuple[EditValues, ...]
-    preserve_opacity: bool = False
+    preserve_opacity: bool = True
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,9 @@ class Worker:
         on_result: Callable[[Result], None],
         on_lost: Callable[[], None],
     ) -> None:
-        self._scene, self._device = scene, device
+        self.scene = scene
+        """The folder that is read when the process starts."""
+        self._device = device
         self._on_result, self._on_lost = on_result, on_lost
         context = multiprocessing.get_context("spawn")
         self._context = context
@@ -87,7 +89,7 @@ class Worker:
         here, there = self._context.Pipe()
         process = self._context.Process(
             target=serve,
-            args=(there, self._generation, self._scene, self._device),
+            args=(there, self._generation, self.scene, self._device),
             daemon=True,
             name="cagefield-renderer",
         )

@@ -39,7 +39,10 @@ function readout(app: App, pointer: Pointer): HTMLElement {
     if (!shown) return;
     label.textContent = described(drag.operation!);
     label.classList.toggle("limit", drag.why !== null);
-    label.style.transform = `translate(${pointer.at.x + 18}px, ${pointer.at.y + 18}px)`;
+    const { width, height } = app.stage.points;
+    const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);
+    const y = Math.min(pointer.at.y + 18, height - label.offsetHeight - 6);
+    label.style.transform = `translate(${x}px, ${y}px)`;
   });
   return label;
 }
