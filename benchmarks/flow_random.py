@@ -40,7 +40,7 @@ from cagefield.edits.operations import (
 from cagefield.errors import CagefieldError
 from cagefield.hexahedron import Array, Mask
 from cagefield.warps import FlowShell, flow_device
-from cagefield.warps.flow_motion import Extended
+from cagefield.warps.extended import Extended
 
 vec3 = qd.math.vec3
 Points = qd.types.ndarray(dtype=vec3, ndim=1)

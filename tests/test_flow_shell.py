@@ -18,7 +18,8 @@ from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translat
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import Falloff, FlowShell
-from cagefield.warps.extended import Extended, bends_one_to_one, forms, stay_one_to_one, straightened_slope
+from cagefield.warps.bends import bends_one_to_one, forms, stay_one_to_one
+from cagefield.warps.extended import Extended, straightened_slope
 from cagefield.warps.flow_motion import TIMES
 from random_cages import can_be_evaluated, dragged, examples, random_operation, seeds
 

@@ -7,7 +7,7 @@ to the velocity. It is a list of vec3, appended to the lattices' nodes:
     0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
     7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
     9     linear 0 or 1, outer cage affine 0 or 1
-    10-19 bend and tilts of the outer cage, see `extended.forms`
+    10-19 bend and tilts of the outer cage, see `bends.forms`
     20-23 dK/dt of the inner cage
 
 then for each of 2 steps + 1 moments `MOMENT` of them:
@@ -26,7 +26,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.hexahedron import Array
-from cagefield.warps.extended import forms
+from cagefield.warps.bends import forms
 from cagefield.warps.flow_shell import FlowShell
 
 vec3 = qd.math.vec3

@@ -1,6 +1,6 @@
 """How the inner cage moves from its canonical to its deformed place, for the flow shell.
 
-Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `extended`), is
+Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `bends`), is
 
     x(xi, t) = c(t) + F(t) y_t(xi),    y_t(xi) = xi + B_t(xi) in the cage.
 
@@ -22,16 +22,8 @@ from scipy.spatial.transform import Rotation
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.extended import (
-    AXES,
-    SIGNS,
-    Extended,
-    bend,
-    bends,
-    slope_columns,
-    stay_one_to_one,
-    straightened_slope,
-)
+from cagefield.warps.bends import AXES, SIGNS, bend, bends, stay_one_to_one
+from cagefield.warps.extended import Extended, slope_columns, straightened_slope
 
 LEAST_SIZE = 1e-2
 """The cage is shrunk to no less than this on its way."""

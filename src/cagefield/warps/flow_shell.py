@@ -10,7 +10,8 @@ import numpy as np
 from cagefield import hexahedron
 from cagefield.cages import Cage, are_valid
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.extended import Extended, bend, bend_slope
+from cagefield.warps.bends import bend, bend_slope
+from cagefield.warps.extended import Extended
 from cagefield.warps.flow_motion import Motion, gaps, may_bend
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
