@@ -37,10 +37,16 @@ edits:
     outer: {margin: 0.35}
     lattice: 64
 """
-FLAGS = (
-    "--headless --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
-    " --disable-background-networking --disable-component-update --disable-sync --no-first-run"
-).split()
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
 FRAME = (46, 68)
 """Width and height of the window that is not the picture, with the panel closed."""
 PATIENCE = 180.0
@@ -88,7 +94,8 @@ class EditorLatency:
                 server.terminate()
                 server.wait(10)
         machine = f"{cpu_model()}, {devices.threads()} cores, pages drawn in software"
-        text = f"# The editor's latency\n\n{table}\nMachine: {machine}. `python benchmarks/editor_latency.py SCENE`\n"
+        command = "python benchmarks/editor_latency.py SCENE"
+        text = f"# The editor's latency\n\n{table}\nMachine: {machine}. `{command}`\n"
         print(text)
         if self.out is not None:
             self.out.write_text(text)
