@@ -254,6 +254,7 @@ def test_the_page_the_edit_file_and_a_screenshot_are_served(server: EditorServer
         assert [edit.name for edit in load_edits(file)] == ["ball"]
         shot = urllib.request.urlopen(f"{link}/screenshot.png?page={hello['page']}").read()
         assert Image.open(io.BytesIO(shot)).size == (64, 64)
+        assert urllib.request.urlopen(f"{link}/screenshot.png").read() == shot  # of the newest page
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(f"{link}/screenshot.png?page=999")
 
