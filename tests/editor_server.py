@@ -17,7 +17,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 """Seconds until a message that does not come is given up: the first pictures wait for kernels to compile."""
 
 

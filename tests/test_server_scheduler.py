@@ -228,9 +228,19 @@ def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:
     b.settle()
     assert {tile.exact for tile in b.finish()} == {False}
     b.scheduler.edits(1, False, b.now)
+    tiles = b.finish()
+    assert {(tile.exact, tile.moving) for tile in tiles} == {(True, False)} and tiles[-1].final
+
+
+def test_a_drag_that_ends_with_something_new_shows_it_quickly_first() -> None:
+    b = Bench()
+    b.open(1)
     b.step()
-    b.settle()
-    assert {tile.exact for tile in b.finish()} == {True}
+    b.scheduler.edits(1, True, b.now)
+    b.step()
+    b.scheduler.edits(2, False, b.now)
+    picture = b.step()
+    assert picture is not None and picture.moving and picture.revision == 2
 
 
 def test_an_edit_is_shown_on_every_page_and_a_camera_on_its_own() -> None:

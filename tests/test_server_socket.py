@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -22,7 +23,7 @@ from websockets.sync.client import connect
 
 from cagefield.edits import load_edits
 from cagefield.server.protocol import MOST_BYTES
-from editor_server import EditorServer, PageClient, editor_server, page
+from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 
 BALL = {"inner": {"center": [0, 0, 0], "size": 1.1}, "outer": {"margin": 0.4}, "lattice": 16, "name": "ball"}
@@ -142,16 +143,17 @@ def test_two_pages_show_the_same_and_look_from_their_own_cameras(server: EditorS
 
 def test_a_page_that_shows_slowly_has_two_pictures_waiting_at_most(server: EditorServer) -> None:
     with page(server, slow=True) as (client, hello):
-        for seq in range(1, 60):
-            client.look_from(hello, 96 + seq, seq=seq, moving=True)
-            time.sleep(0.02)
-        with pytest.raises(TimeoutError):
-            while True:
-                client.take(2.0)
+        seq, after, end = 0, 0, time.monotonic() + PATIENCE
+        while after < 60 and time.monotonic() < end:
+            seq, after = seq + 1, after + (len(client.pictures) >= 2)
+            client.look_from(hello, 96 + seq % 50, seq=seq, moving=True)
+            with contextlib.suppress(TimeoutError):
+                client.take(0.03)
         assert len(client.pictures) == 2
         client.send("presented", picture=client.pictures[-1].header["picture"])
         header = client.until(lambda m: m["type"] == "picture")
-        assert header["camera"] == 59
+        # The newest camera, or one that the server heard while it was on its way.
+        assert header["camera"] > seq - 5
 
 
 def test_malformed_messages_get_a_clear_error_and_harm_nothing(server: EditorServer) -> None:
@@ -252,6 +254,7 @@ def test_the_page_the_edit_file_and_a_screenshot_are_served(server: EditorServer
         assert [edit.name for edit in load_edits(file)] == ["ball"]
         shot = urllib.request.urlopen(f"{link}/screenshot.png?page={hello['page']}").read()
         assert Image.open(io.BytesIO(shot)).size == (64, 64)
+        assert urllib.request.urlopen(f"{link}/screenshot.png").read() == shot  # of the newest page
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(f"{link}/screenshot.png?page=999")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import socket
 from pathlib import Path
 
@@ -77,19 +78,23 @@ def bound_socket(host: str, port: int) -> socket.socket:
         CagefieldError: the port is taken, or the host is not an address of this machine.
     """
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except OSError as error:
         raise CagefieldError(
             f"--host {host} is no address ({error.strerror}); give one of this machine's"
         ) from None
-    listening = socket.socket(family)
-    try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen(128)
-    except OSError as error:
-        listening.close()
-        raise CagefieldError(
-            f"cannot listen on {host}:{port} ({error.strerror}); give another --port, or 0 for a free one"
-        ) from None
-    return listening
+    reason: str | None = None
+    for family, _, _, _, address in found:
+        listening = socket.socket(family)
+        try:
+            if os.name == "posix":
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind(address)
+            listening.listen(128)
+            return listening
+        except OSError as error:
+            listening.close()
+            reason = error.strerror
+    raise CagefieldError(
+        f"cannot listen on {host}:{port} ({reason}); give another --port, or 0 for a free one"
+    )

@@ -43,7 +43,7 @@ FIRST_RATE = 4e5
 
 @dataclass(frozen=True)
 class Look:
-    """What of the scene is shown: a view, and where the edits are left out: `before` and `split`."""
+    """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
 
     view: View = "colour"
     before: bool = False
@@ -141,12 +141,19 @@ class Scheduler:
             self._changed(page, now)
 
     def edits(self, revision: int, dragging: bool, now: float) -> None:
-        """The edits' picture is another one, or a drag begins or ends."""
+        """The edits' picture is another one, or a drag begins or ends.
+
+        Where a drag ends with what is shown already, the whole picture comes at once.
+        """
         if revision == self._revision and dragging == self._dragging:
             return
+        let_go = revision == self._revision and not dragging
         self._revision, self._dragging = revision, dragging
-        for page in self._pages:
+        for page, p in self._pages.items():
+            was_shown = p.shown_version == p.version
             self._changed(page, now)
+            if let_go and was_shown:
+                p.shown_version, p.changed = p.version, -math.inf
 
     def presented(self, page: int, picture: int) -> None:
         """A page has shown a picture, and all that were sent before it."""
@@ -157,7 +164,10 @@ class Scheduler:
     def finished(self, request: Request, rays: int, seconds: float, overhead: float) -> None:
         """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
         self._running = None
-        self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
+        region = request.region
+        if (region.width, region.height) == (region.full_width, region.full_height):
+            # A tile may be empty, and says nothing of how long the whole picture takes.
+            self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
         if request.moving:
             self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
         page = self._pages.get(request.page)

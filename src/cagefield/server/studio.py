@@ -16,13 +16,16 @@ from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
 from cagefield.server import encoding
 from cagefield.server.scheduler import Look, Region
-from cagefield.server.tasks import WARM_STAGES, EditValues, PictureDone, PictureTask, Shown, Stopped
+from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
 MOVING_QUALITY, REST_QUALITY = 85, 95
 """JPEG qualities."""
+
+KEPT_EDITS = 64
+"""Edits whose maps are kept for when they are shown again."""
 
 MOST_DEPTHS = 120_000
 """Depths sent with a picture, at most."""
@@ -46,8 +49,8 @@ class Studio:
         self.plain = Renderer(scene.field)
         self._edits: list[Edit] = []
         self._coarse: list[tuple[Edit, Edit]] = []
-        self._exact: _Kept | None = None
-        self._quick: _Kept | None = None
+        self._exact: list[_Kept] = []
+        self._quick: list[_Kept] = []
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))
@@ -55,8 +58,7 @@ class Studio:
     def picture(self, task: PictureTask, stop: Stop) -> PictureDone | Stopped:
         """The part of a picture that a task asks for, encoded."""
         began = time.perf_counter()
-        bare = task.look.before and task.look.split is None
-        renderer = self.plain if bare else self.renderer(task.shown, exact=task.exact)
+        renderer = self.plain if task.look.before else self.renderer(task.shown, exact=task.exact)
         mapped = time.perf_counter()
         if stop():
             return Stopped(task.number)
@@ -85,14 +87,18 @@ class Studio:
         """A whole picture, its edits exact; None where it was stopped."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
         task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
-        return self._frame(task, self.renderer(shown, exact=True), stop or (lambda: False))
+        renderer = self.plain if look.before else self.renderer(shown, exact=True)
+        return self._frame(task, renderer, stop or (lambda: False))
 
     def warm(self, stage: int) -> None:
         """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
         voxel = float(max(self.scene.field.voxel_size))
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
-        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < WARM_STAGES - 1)
+        if stage == 3:
+            edit.lattice_error(samples=64)
+            return
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
         if stage == 1:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
             camera = Camera.look_at(
@@ -102,8 +108,8 @@ class Studio:
 
     def renderer(self, shown: Shown, *, exact: bool) -> Renderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now."""
-        for kept in (self._exact, None if exact else self._quick):
-            if kept is not None and kept.shown == shown:
+        for kept in self._exact if exact else (*self._exact, *self._quick):
+            if kept.shown == shown:
                 return kept.renderer
         edits = self.edits(shown.edits)
         if not exact:
@@ -112,9 +118,10 @@ class Studio:
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
         )
         if exact:
-            self._exact = _Kept(shown, renderer)
+            # Two: what pages show, and what a job renders.
+            self._exact = [*self._exact[-1:], _Kept(shown, renderer)]
         else:
-            self._quick = _Kept(shown, renderer)
+            self._quick = [_Kept(shown, renderer)]
         return renderer
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
@@ -123,7 +130,8 @@ class Studio:
         for fields in values:
             edit = Edit(**fields)
             found.append(next((known for known in self._edits if known == edit), edit))
-        self._edits = found
+        others = [known for known in self._edits if not any(known is edit for edit in found)]
+        self._edits = [*found, *others][:KEPT_EDITS]
         return found
 
     def reach(self, camera: Camera) -> tuple[float, float]:
@@ -134,7 +142,7 @@ class Studio:
     def _frame(self, task: PictureTask, edited: Renderer, stop: Stop) -> Frame | None:
         """The region of the picture; left of a split without the edits."""
         region, split = task.region, task.look.split
-        if not task.look.before or split is None:
+        if task.look.before or split is None:
             return self._part(task, edited, region, stop)
         left = min(max(round(split * region.full_width) - region.x, 0), region.width)
         parts: list[Frame] = []
