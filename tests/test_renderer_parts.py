@@ -87,6 +87,6 @@ def test_short_leaps_are_long_ones_cut_off() -> None:
 
 def test_the_opacity_choice_is_the_renderers_own(plain: Renderer) -> None:
     stack = EditStack(EDITS["squeezed"])
-    kept, asked = plain.with_edits(stack), plain.with_edits(stack, preserve_opacity=True)
-    assert (kept.preserve_opacity, asked.preserve_opacity) == (False, True)
-    assert asked.with_edits(EditStack([])).preserve_opacity
+    kept, asked = plain.with_edits(stack), plain.with_edits(stack, preserve_opacity=False)
+    assert (kept.preserve_opacity, asked.preserve_opacity) == (True, False)
+    assert not asked.with_edits(EditStack([])).preserve_opacity

@@ -39,7 +39,7 @@ def changed(path: Path) -> tuple[Keeper, Session]:
     session.apply(1, "field", Translate((0.1, 0, 0)))
     session.change(1, locked=True)
     session.set_path((KEY,), True)
-    session.preserve_opacity(True)
+    session.preserve_opacity(False)
     keeper.autosave(session)
     return keeper, session
 
@@ -50,7 +50,7 @@ def test_saving_writes_everything_and_opening_finds_it(path: Path) -> None:
     keeper.save(session)
     assert session.saved and session.document.entry(1).locked
     scene = Scene.open(path)
-    assert scene.edits[0] == BALL.translate((0.1, 0, 0)) and scene.preserve_opacity
+    assert scene.edits[0] == BALL.translate((0.1, 0, 0)) and not scene.preserve_opacity
     assert load_keys(path / "camera_path.json") == ((KEY,), True)
     assert before["field.safetensors"] == files_of(path)["field.safetensors"]
     assert opened(path)[1].document.keys == (KEY,)
@@ -64,7 +64,7 @@ def test_an_autosave_is_restored_as_one_entry_and_saving_removes_it(path: Path) 
     assert found is not None
     fresh.restore(found)
     assert fresh.document.stack == session.document.stack
-    assert fresh.document.keys == (KEY,) and fresh.document.loop and fresh.document.preserve_opacity
+    assert fresh.document.keys == (KEY,) and fresh.document.loop and not fresh.document.preserve_opacity
     assert fresh.document.entry(1).locked and not fresh.saved
     fresh.undo()
     assert fresh.saved and fresh.document.stack == EditStack([BALL])

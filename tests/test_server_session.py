@@ -200,7 +200,7 @@ def test_undo_and_redo_of_everything() -> None:
     did()
     s.remove(2)
     did()
-    s.preserve_opacity(True)
+    s.preserve_opacity(False)
     did()
     s.set_path((Keyframe(tuple(np.eye(4).reshape(-1)), 40.0),), True)
     did()

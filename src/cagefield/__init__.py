@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from cagefield.edits.files import load_edits as load_edits
     from cagefield.edits.files import save_edits as save_edits
     from cagefield.errors import CagefieldError as CagefieldError
+    from cagefield.fields.nerf import NerfField as NerfField
     from cagefield.fields.voxel import VoxelField as VoxelField
     from cagefield.rendering.frame import Frame as Frame
     from cagefield.scene import Scene as Scene
@@ -33,6 +34,7 @@ _HOME = {
     "Edit": "cagefield.edits",
     "EditStack": "cagefield.edits",
     "Frame": "cagefield.rendering.frame",
+    "NerfField": "cagefield.fields.nerf",
     "Scene": "cagefield.scene",
     "VoxelField": "cagefield.fields.voxel",
     "load_dataset": "cagefield.datasets.dataset",

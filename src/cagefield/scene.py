@@ -2,11 +2,12 @@
 
     SCENE/
       field.safetensors   the VoxelField, in canonical space
+      original.safetensors  the NerfField that it was baked from, if any, in the same space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
-                          "preserve_opacity": true if edits scale density with their map}
+                          "preserve_opacity": false if edits leave density as it is}
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
@@ -25,9 +26,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from cagefield.cameras import Camera
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.voxel import VoxelField
 from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
@@ -41,7 +44,8 @@ FORMAT = "cagefield-scene"
 VERSION = 1
 
 _FIELD, _EDITS, _CAMERAS, _MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
-_FILES = (_FIELD, _EDITS, _CAMERAS, _MANIFEST)
+_ORIGINAL = "original.safetensors"
+_FILES = (_FIELD, _ORIGINAL, _EDITS, _CAMERAS, _MANIFEST)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,7 +54,8 @@ class Scene:
 
     Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
-    the field's picture, per channel, one for each "train" camera; empty where none were fitted.
+    the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
+    the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
     `preserve_opacity` multiplies density by |J d| where an edit moved it.
 
     Raises:
@@ -64,7 +69,8 @@ class Scene:
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
     version: int = VERSION
     gains: tuple[tuple[float, float, float], ...] = ()
-    preserve_opacity: bool = False
+    original: NerfField | None = None
+    preserve_opacity: bool = True
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -107,8 +113,17 @@ class Scene:
         cameras = _read_cameras(folder / _CAMERAS)
         edits = load_edits(folder / _EDITS, check=False)
         field = VoxelField.load(folder / _FIELD)
+        original = load_nerf(folder / _ORIGINAL) if (folder / _ORIGINAL).is_file() else None
         try:
-            return cls(field, edits, cameras, background, gains=gains, preserve_opacity=preserve_opacity)
+            return cls(
+                field,
+                edits,
+                cameras,
+                background,
+                gains=gains,
+                original=original,
+                preserve_opacity=preserve_opacity,
+            )
         except SceneError as error:
             raise SceneError(f"{folder / _MANIFEST}: {error}") from None
 
@@ -124,6 +139,8 @@ class Scene:
         target = check_destination(path, overwrite)
         with replaced_folder(target, _FILES) as draft:
             self.field.save(draft / _FIELD)
+            if self.original is not None:
+                save_nerf(self.original, draft / _ORIGINAL)
             save_edits(self.edits, draft / _EDITS)
             _write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
@@ -140,8 +157,8 @@ class Scene:
         }
         if self.gains:
             manifest["gains"] = self.gains
-        if self.preserve_opacity:
-            manifest["preserve_opacity"] = True
+        if not self.preserve_opacity:
+            manifest["preserve_opacity"] = False
         draft = folder / f".{_MANIFEST}.{secrets.token_hex(4)}"
         _write_json(manifest, draft)
         draft.replace(folder / _MANIFEST)
@@ -151,6 +168,13 @@ class Scene:
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
         return scene
+
+    def lattice_errors(self) -> tuple[LatticeError, ...]:
+        """How far the edits' lattices are off their exact maps, in voxels of the field (its smallest edge).
+
+        An unbounded field's voxels are those in the middle of its box of interest.
+        """
+        return self.edits.lattice_errors(float(min(self.field.voxel_size)))
 
     def render(
         self,
@@ -163,7 +187,11 @@ class Scene:
         """The edited scene seen by `camera`, over the scene's own background unless another is given.
 
         "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
-        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference.
+        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference; where
+        the scene has an original field, that one, by its own hierarchical sampling.
+
+        Raises:
+            SceneError: normals of an original field, which are not computed.
         """
         colour = self.background if background is None else background_rgb(background)
         if not exact:
@@ -174,6 +202,8 @@ class Scene:
         from cagefield.fields.protocol import Field
         from cagefield.rendering.sampled import render_sampled
 
+        if self.original is not None:
+            return self._render_original(self.original, camera, background, normals)
         field = self.field
         near, far = _sampling_range(field, camera)
         samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
@@ -188,6 +218,19 @@ class Scene:
             edits=EditStack(edit.replace(lattice=None) for edit in self.edits),
             normals=normals,
             preserve_opacity=self.preserve_opacity,
+        )
+
+    def _render_original(
+        self, original: NerfField, camera: Camera, background: Background, normals: bool
+    ) -> Frame:
+        if normals:
+            raise SceneError("normals of the original field are not computed; leave out normals, or exact")
+        original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
+        from cagefield.rendering.nerf import render_nerf
+
+        edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
+        return render_nerf(
+            original, camera, edits=edits, background=background, preserve_opacity=self.preserve_opacity
         )
 
     @cached_property
@@ -265,7 +308,7 @@ def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any
         raise SceneError(
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
-    opacity = document.get("preserve_opacity", False)
+    opacity = document.get("preserve_opacity", True)
     if not isinstance(opacity, bool):
         raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
     try:

@@ -59,9 +59,11 @@ def parse(args: list[str]) -> Command | int:
     """The subcommand that `args` ask for, or an exit code: 0 after help, 2 after a complaint."""
     import tyro
 
+    from cagefield.cli.bake import Bake
     from cagefield.cli.bench import Bench
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
+    from cagefield.cli.import_nerf import ImportNerf
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
     from cagefield.cli.render import Render
@@ -72,6 +74,8 @@ def parse(args: list[str]) -> Command | int:
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
         | Annotated[Train, tyro.conf.subcommand("train")]
+        | Annotated[ImportNerf, tyro.conf.subcommand("import")]
+        | Annotated[Bake, tyro.conf.subcommand("bake")]
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Render, tyro.conf.subcommand("render")]

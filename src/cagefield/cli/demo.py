@@ -33,7 +33,7 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 800
+    steps: int = 1200
     """Number of training steps."""
     resolution: int = 160
     """Voxels along the longest axis at the end."""

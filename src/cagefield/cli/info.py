@@ -33,6 +33,11 @@ class Info:
             f"            {kind} {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} around {_point(field.center)}"
         )
         print(f"            voxel edge {max(field.voxel_size):.4g}, colour SH degree {field.sh_degree}")
+        if scene.original is not None:
+            original = scene.original
+            print(f"original    NeRF: coarse {original.coarse}; fine {original.fine or 'none'}")
+            space = "NDC" if original.ndc else f"depth {original.near:.4g} to {original.far:.4g}"
+            print(f"            {original.samples[0]} + {original.samples[1]} samples a ray, {space}")
         background = "none" if scene.background is None else _point(scene.background)
         print(f"background  {background}")
         for split, cameras in scene.cameras.items():

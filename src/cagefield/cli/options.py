@@ -72,7 +72,24 @@ class TrainingOptions:
         )
 
 
+@dataclass(frozen=True)
+class BakingOptions:
+    """How a field is baked into voxels."""
+
+    resolution: int = 256
+    """Voxels along the longest axis of what the field holds."""
+    sh_degree: int = 2
+    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view."""
+    compare: int = 3
+    """Views in which the voxels are compared with the original field; 0 leaves that out."""
+
+    def __post_init__(self) -> None:
+        if self.compare < 0:
+            raise CagefieldError(f"--compare is {self.compare}; give the number of views, 0 or more")
+
+
 Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]
+Baking = tyro.conf.OmitArgPrefixes[BakingOptions]
 Training = tyro.conf.OmitArgPrefixes[TrainingOptions]
 
 

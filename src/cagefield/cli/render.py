@@ -58,7 +58,7 @@ class Render:
     unedited: Flag = False
     """Leave the scene's edits out."""
     exact: Flag = False
-    """The plain reference renderer: every edit exact at every sample; minutes a picture."""
+    """Every edit exact at every sample, of the original NeRF where the scene has one; minutes a picture."""
     fps: float | None = None
     """Pictures a second in a video: 24, or what the camera path says."""
     device: Device = "auto"

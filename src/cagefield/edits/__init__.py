@@ -15,13 +15,14 @@ from cagefield.edits.operations import (
     Shear,
     Translate,
 )
-from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack
+from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack, LatticeError
 
 __all__ = [
     "CanonicalSamples",
     "DeformedPoints",
     "Edit",
     "EditStack",
+    "LatticeError",
     "MoveCorner",
     "MoveCorners",
     "MoveEdge",

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 @runtime_checkable
 class Field(Protocol):
-    """Density and colour of canonical space."""
+    """Density and colour of canonical space.
+
+    A field may also have, for baking: `signed_density(positions, viewdirs)` [N], negative where it is empty,
+    which keeps surfaces sharper than sigma does; and `seen_along(positions [N,3], viewdirs [N,K,3])`, the
+    sigma [N] and rgb [N,K,3] of K directions at once, where that costs less than K calls.
+    """
 
     @property
     def bounds(self) -> NDArray[Any]:

@@ -39,7 +39,7 @@ class Document:
     """The edits in order, the scene's opacity choice, and the camera path's keyframes."""
 
     entries: tuple[Entry, ...] = ()
-    preserve_opacity: bool = False
+    preserve_opacity: bool = True
     keys: tuple[Keyframe, ...] = ()
     loop: bool = False
 
@@ -48,7 +48,7 @@ class Document:
         cls,
         edits: Iterable[Edit],
         *,
-        preserve_opacity: bool = False,
+        preserve_opacity: bool = True,
         keys: tuple[Keyframe, ...] = (),
         loop: bool = False,
     ) -> Document:

@@ -28,7 +28,7 @@ class Shown:
     """What a picture is of: edits (see `values_of`) and the scene's opacity choice."""
 
     edits: tuple[EditValues, ...]
-    preserve_opacity: bool = False
+    preserve_opacity: bool = True
 
 
 @dataclass(frozen=True)

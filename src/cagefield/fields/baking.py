@@ -1,0 +1,254 @@
+"""Baking: any field as a VoxelField, so that it can be edited at interactive speed.
+
+Density is the field's at the vertices: a signed one, negative in empty space, where the field has
+`signed_density`, because a voxel field clamps after it interpolates and so keeps surfaces between vertices
+where they are. A vertex is stored where the field absorbs at least `opacity` over a
+voxel's edge there or at a neighbour; a first pass on every other vertex finds where to look. Colour is
+fitted to the field's, seen along several directions: with C the colours and Y_k the basis along direction k,
+
+    sh = argmin_x sum_k w_k |0.5 + Y_k x - C_k|^2 + ridge |x without its constant|^2
+
+w_k is 1 for directions that meet the front of the density's surface (against its gradient) and `BACK` for
+those that meet its back, which no camera sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield import sh as spherical_harmonics
+from cagefield.errors import FieldError
+from cagefield.fields.contraction import uncontract
+from cagefield.fields.protocol import Field
+from cagefield.fields.voxel import VoxelField
+
+Float32 = NDArray[np.float32]
+Array = NDArray[Any]
+
+BACK = 0.02
+"""Weight of a direction from which a vertex is seen through its own surface."""
+
+RIDGE = 2e-3
+"""Weight of the coefficients' size against a residual's, per direction."""
+
+BLOCK = 1 << 16
+"""Vertices evaluated at a time."""
+
+_STEP = 2  # the first pass looks at every so-many-th vertex along each axis
+
+
+def bake(
+    field: Field,
+    resolution: int = 256,
+    *,
+    bounds: ArrayLike | None = None,
+    sh_degree: int = 2,
+    eyes: ArrayLike | None = None,
+    views: int = 16,
+    opacity: float = 2e-3,
+    contracted: bool = False,
+    seed: int = 0,
+    on_progress: Callable[[float], None] | None = None,
+) -> VoxelField:
+    """The field on a voxel grid with `resolution` vertices along the longest axis of what it holds.
+
+    - bounds: [2,3] the box to look in; the field's own where left out.
+    - eyes: [E,3] where cameras stand, world units: colours are fitted along directions from them, from all
+      around the sphere where left out.
+    - views: directions for each vertex.
+    - opacity: vertices whose voxel absorbs less are empty.
+    - contracted: bake all of space, with `bounds` as the box of interest.
+
+    Raises:
+        FieldError: options outside their range, infinite bounds, a field that is empty in them.
+    """
+    if not 16 <= resolution <= 1024:
+        raise FieldError(f"resolution is {resolution}; it must be from 16 to 1024")
+    if not 1 <= views <= 256 or not 0.0 < opacity < 1.0:
+        raise FieldError(f"views must be 1 to 256 and opacity in (0, 1), got {views} and {opacity}")
+    box = np.array(getattr(field, "bounds", None) if bounds is None else bounds, np.float64)
+    if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
+        raise FieldError(f"bounds must be a finite box [2,3] to bake in, got {box.tolist()}; give bounds=")
+    report = on_progress or (lambda done: None)
+
+    places = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
+    density = _Density(field, None if places is None else places.mean(axis=0))
+    if contracted:
+        grid = _Grid.contracting(box, resolution)
+    else:
+        box = _content(density, box, opacity, lambda done: report(0.1 * done))
+        grid = _Grid.within(box, resolution)
+    least = -np.log1p(-opacity) / grid.edge
+    candidates = _candidates(density, grid, least, lambda done: report(0.1 + 0.2 * done))
+    sigma = np.zeros(grid.shape, np.float32)
+    sigma[candidates] = density(grid.positions(np.argwhere(candidates)))
+    report(0.4)
+    stored = grown(sigma > least)
+    if not stored.any():
+        raise FieldError(f"the field is empty in {box.tolist()}: nothing to bake; give other bounds")
+    vertices = np.argwhere(stored)
+    coefficients = np.zeros((len(vertices), (sh_degree + 1) ** 2, 3), np.float32)
+    chance = np.random.default_rng(seed)
+    front = np.stack(np.gradient(sigma), axis=-1)[stored]
+    for rows in _blocks(len(vertices), max(1, 4 * BLOCK // views)):
+        points = grid.positions(vertices[rows])
+        along = _directions(points, places, views, chance)
+        coefficients[rows] = _fit(_colours(field, points, along), along, front[rows], sh_degree)
+        report(0.4 + 0.6 * rows.stop / len(vertices))
+    nx, ny, nz = grid.shape
+    return VoxelField(
+        bounds=box if contracted else grid.bounds,
+        resolution=(nx, ny, nz),
+        vertices=np.asarray(np.ravel_multi_index(tuple(vertices.T), grid.shape), np.int64),
+        density=sigma[stored],
+        sh=coefficients,
+        contracted=contracted,
+    )
+
+
+class _Grid:
+    """Vertices over a box, evenly `edge` apart: cubes, so the box may grow a little at its upper side.
+
+    `edge` is in world units, inside the box of interest where the grid is contracted.
+    """
+
+    def __init__(
+        self, lower: Array, edge: float, shape: tuple[int, ...], interest: Array | None = None
+    ) -> None:
+        self.lower, self.edge, self.shape, self.interest = lower, edge, shape, interest
+
+    @classmethod
+    def within(cls, box: Array, resolution: int) -> _Grid:
+        size = box[1] - box[0]
+        edge = float(size.max()) / (resolution - 1)
+        return cls(box[0], edge, tuple(max(2, int(np.ceil(s / edge - 1e-6)) + 1) for s in size))
+
+    @classmethod
+    def contracting(cls, interest: Array, resolution: int) -> _Grid:
+        """The grid of all of space, contracted around the box of interest."""
+        edge = 2.0 * float((interest[1] - interest[0]).max()) / (resolution - 1)
+        return cls(np.full(3, -2.0), edge, (resolution,) * 3, interest)
+
+    @property
+    def bounds(self) -> Array:
+        return np.stack([self.lower, self.lower + (np.array(self.shape) - 1) * self.edge])
+
+    def positions(self, vertices: Array) -> Float32:
+        if self.interest is None:
+            return (self.lower + vertices * self.edge).astype(np.float32)
+        cube = -2.0 + 4.0 * vertices / (np.array(self.shape) - 1)
+        middle, half = self.interest.mean(axis=0), 0.5 * (self.interest[1] - self.interest[0])
+        return (middle + half * uncontract(cube)).astype(np.float32)
+
+
+def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """True where a vertex or one of its 26 neighbours is True."""
+    for axis in range(3):
+        ahead, behind = np.zeros_like(mask), np.zeros_like(mask)
+        front = [slice(None)] * 3
+        back = [slice(None)] * 3
+        front[axis], back[axis] = slice(1, None), slice(None, -1)
+        ahead[tuple(front)] = mask[tuple(back)]
+        behind[tuple(back)] = mask[tuple(front)]
+        mask = mask | ahead | behind
+    return mask
+
+
+def _content(density: _Density, box: Array, opacity: float, report: Callable[[float], None]) -> Array:
+    """The part of `box` that holds density, by 96 vertices along its longest axis, widened by one."""
+    grid = _Grid.within(box, 96)
+    sigma = np.concatenate(
+        [density(grid.positions(_plane(grid.shape, index))) for index in _reported(grid.shape[0], report)]
+    ).reshape(grid.shape)
+    found = np.argwhere(sigma > -np.log1p(-opacity) / grid.edge)
+    if len(found) == 0:
+        raise FieldError(f"the field is empty in {box.tolist()}: nothing to bake; give other bounds")
+    lower = grid.lower + (found.min(axis=0) - 1) * grid.edge
+    upper = grid.lower + (found.max(axis=0) + 1) * grid.edge
+    return np.stack([np.maximum(lower, box[0]), np.minimum(upper, box[1])])
+
+
+def _candidates(
+    density: _Density, grid: _Grid, least: float, report: Callable[[float], None]
+) -> NDArray[np.bool_]:
+    """Vertices of the grid around those of every `_STEP`-th that hold density."""
+    shape = tuple(-(-n // _STEP) for n in grid.shape)
+    occupied = np.zeros(shape, bool)
+    for index in _reported(shape[0], report):
+        plane = _plane(shape, index)
+        occupied[index] = (density(grid.positions(_STEP * plane)) > 0.5 * least).reshape(shape[1:])
+    fine = grown(occupied)
+    for axis in range(3):
+        fine = np.repeat(fine, _STEP, axis=axis)
+    found: NDArray[np.bool_] = fine[tuple(slice(n) for n in grid.shape)]
+    return found
+
+
+class _Density:
+    """Density [N] of positions [N,3], seen from where the cameras stand on average, else along -z."""
+
+    def __init__(self, field: Field, eye: Array | None) -> None:
+        self.field, self.eye = field, eye
+        self.signed = getattr(field, "signed_density", None)
+
+    def __call__(self, positions: Float32) -> Float32:
+        sigma = np.empty(len(positions), np.float32)
+        for rows in _blocks(len(positions), BLOCK):
+            part = positions[rows]
+            toward = np.broadcast_to(np.array([0.0, 0.0, -1.0], np.float32), part.shape)
+            if self.eye is not None:
+                away = (part - self.eye).astype(np.float32)
+                toward = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+            sigma[rows] = self.field(part, toward)[0] if self.signed is None else self.signed(part, toward)
+        return sigma
+
+
+def _colours(field: Field, positions: Float32, along: Float32) -> Float32:
+    """rgb [N,K,3] at positions [N,3] along directions [N,K,3]."""
+    seen_along = getattr(field, "seen_along", None)
+    if seen_along is not None:
+        return np.asarray(seen_along(positions, along)[1], np.float32)
+    n, views, _ = along.shape
+    return field(np.repeat(positions, views, axis=0), along.reshape(-1, 3))[1].reshape(n, views, 3)
+
+
+def _directions(points: Float32, eyes: Array | None, views: int, chance: np.random.Generator) -> Float32:
+    """Unit directions [N,K,3] into the scene, from the eyes or from all around."""
+    away = np.asarray(chance.normal(size=(len(points), views, 3)))
+    if eyes is not None:
+        away = np.asarray(points[:, None] - eyes[chance.integers(0, len(eyes), (len(points), views))])
+    return (away / np.linalg.norm(away, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def _fit(colours: Float32, along: Float32, gradient: Float32, degree: int) -> Float32:
+    """Coefficients [N,(degree+1)^2,3] of colours [N,K,3] seen along directions [N,K,3]."""
+    n, views, _ = along.shape
+    basis = spherical_harmonics.basis(along.reshape(-1, 3), degree).reshape(n, views, -1)
+    weight = np.where(np.einsum("nkc,nc->nk", along, gradient) >= 0.0, 1.0, BACK).astype(np.float32)
+    weighted = basis * weight[..., None]
+    ridge = np.full(basis.shape[2], RIDGE * views, np.float32)
+    ridge[0] = 1e-6
+    normal = np.einsum("nki,nkj->nij", weighted, basis) + np.diag(ridge)
+    right = np.einsum("nki,nkc->nic", weighted, colours - 0.5)
+    return np.linalg.solve(normal, right).astype(np.float32)
+
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
+
+
+def _plane(shape: tuple[int, ...], index: int) -> Array:
+    """Vertices [M,3] of plane `index` along the first axis."""
+    j, k = np.meshgrid(np.arange(shape[1]), np.arange(shape[2]), indexing="ij")
+    return np.stack([np.full(j.size, index), j.ravel(), k.ravel()], axis=1)
+
+
+def _reported(count: int, report: Callable[[float], None]) -> Iterator[int]:
+    for index in range(count):
+        yield index
+        report((index + 1) / count)

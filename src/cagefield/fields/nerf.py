@@ -1,0 +1,263 @@
+"""NerfField: the original NeRF, a coarse and a fine MLP over positional encodings.
+
+Notation: gamma_L(x) = (x, sin x, cos x, sin 2x, cos 2x, ..., sin 2^(L-1) x, cos 2^(L-1) x); x is left out of
+networks that were built without it. A network is
+
+    h = relu(W_k h + b_k) along the trunk, from h = gamma(p); a layer with a skip sees (gamma(p), h)
+    sigma = relu(density(h)),  rgb = sigmoid(rgb(relu(view(feature(h), gamma(d)))))
+
+with sigma per unit of the space that the network was trained in. With `ndc`, that space is the normalised
+device coordinates of a forward-facing capture: cameras look along -z, the near plane is z = -1, and
+
+    ndc(p) = (-x / (a z), -y / (b z), 1 + 2/z),   a, b = width/2f, height/2f
+
+so that sigma per world unit along d is the network's times |J_ndc d|, and 0 in front of the near plane.
+
+The arrays are numpy's; PyTorch is imported when the field is first evaluated.
+
+Source: Mildenhall et al., "NeRF" (2020), section 5 and appendix C (NDC).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield.errors import FieldError
+
+if TYPE_CHECKING:
+    from cagefield.fields.nerf_torch import TorchNerf
+
+Float32 = NDArray[np.float32]
+
+MAX_FREQUENCIES = 32
+"""More octaves than float32 can tell apart are a misread shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """An affine layer W x + b: weight [out,in] and bias [out] float32, with a name for messages."""
+
+    weight: Float32
+    bias: Float32
+    name: str = "layer"
+
+    def __post_init__(self) -> None:
+        for attribute, dimensions in (("weight", 2), ("bias", 1)):
+            values = np.array(getattr(self, attribute), np.float32, order="C")
+            if values.ndim != dimensions:
+                raise FieldError(
+                    f"{self.name}.{attribute} must have {dimensions} dimensions, not {list(values.shape)}"
+                )
+            if not np.isfinite(values).all():
+                raise FieldError(f"{self.name}.{attribute} must be finite; its training diverged")
+            values.setflags(write=False)
+            object.__setattr__(self, attribute, values)
+        if self.bias.shape != (self.outputs,):
+            raise FieldError(
+                f"{self.name}.bias must be [{self.outputs}] like the weight, not {list(self.bias.shape)}"
+            )
+
+    @property
+    def inputs(self) -> int:
+        """Number of inputs."""
+        return self.weight.shape[1]
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs."""
+        return self.weight.shape[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Mlp:
+    """One network; its shape is what the weights say.
+
+    Attributes:
+        trunk: layers of any width; a layer whose input is wider than the output before it by the position's
+            encoding sees that too, encoding first.
+        density: one output.
+        rgb: three outputs.
+        feature: between trunk and view branch, None without one.
+        view: layers that see (feature, direction's encoding) first; empty where colour is the trunk's.
+        rectified_feature: True where a ReLU follows `feature`.
+
+    Raises:
+        FieldError: layers that do not fit together; the message names the tensor.
+    """
+
+    trunk: tuple[Linear, ...]
+    density: Linear
+    rgb: Linear
+    feature: Linear | None = None
+    view: tuple[Linear, ...] = ()
+    rectified_feature: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trunk", tuple(self.trunk))
+        object.__setattr__(self, "view", tuple(self.view))
+        if not self.trunk:
+            raise FieldError("a network must have a layer in its trunk")
+        encoded = self.trunk[0].inputs
+        _check_encoding(self.trunk[0], encoded)
+        for before, layer in zip(self.trunk, self.trunk[1:], strict=False):
+            _check_inputs(layer, before.outputs, before.outputs + encoded)
+        hidden = self.trunk[-1].outputs
+        _check_inputs(self.density, hidden)
+        _check_outputs(self.density, 1)
+        if (self.feature is None) != (not self.view):
+            raise FieldError("a view branch needs both a feature layer and view layers")
+        if self.feature is not None:
+            _check_inputs(self.feature, hidden)
+            first = self.view[0]
+            _check_encoding(first, first.inputs - self.feature.outputs)
+            for before, layer in zip(self.view, self.view[1:], strict=False):
+                _check_inputs(layer, before.outputs)
+        _check_inputs(self.rgb, self.view[-1].outputs if self.view else hidden)
+        _check_outputs(self.rgb, 3)
+
+    @property
+    def position_encoding(self) -> tuple[int, bool]:
+        """(octaves, whether the position itself comes first)."""
+        return _encoding(self.trunk[0].inputs)
+
+    @property
+    def view_encoding(self) -> tuple[int, bool] | None:
+        """(octaves, whether the direction itself comes first), or None where colour has no view branch."""
+        return None if self.feature is None else _encoding(self.view[0].inputs - self.feature.outputs)
+
+    @property
+    def skips(self) -> tuple[bool, ...]:
+        """Per trunk layer: whether it sees the position's encoding beside the layer before it."""
+        return (
+            False,
+            *(
+                layer.inputs != before.outputs
+                for before, layer in zip(self.trunk, self.trunk[1:], strict=False)
+            ),
+        )
+
+    def layers(self) -> Iterator[tuple[str, Linear]]:
+        """(name, layer) of all layers: trunk.0, ..., density, feature, view.0, ..., rgb."""
+        for index, layer in enumerate(self.trunk):
+            yield f"trunk.{index}", layer
+        yield "density", self.density
+        if self.feature is not None:
+            yield "feature", self.feature
+        for index, layer in enumerate(self.view):
+            yield f"view.{index}", layer
+        yield "rgb", self.rgb
+
+    def __str__(self) -> str:
+        """Depth, width and octaves, as "8 x 256, 10 + 4 octaves"."""
+        octaves = str(self.position_encoding[0])
+        if self.view_encoding is not None:
+            octaves += f" + {self.view_encoding[0]}"
+        return f"{len(self.trunk)} x {self.trunk[0].outputs}, {octaves} octaves"
+
+
+@dataclass(frozen=True, eq=False)
+class NerfField:
+    """The original NeRF (canonical space, world units), with the way its rays are sampled.
+
+    Attributes:
+        coarse: the network that places the samples; also the field where `fine` is None.
+        fine: the field.
+        bounds: [2,3] the box worth baking and sampling.
+        near, far: depth along the camera's axis at which sampling starts and ends; 0 and 1 with `ndc`.
+        samples: (coarse, further fine ones) on each ray.
+        lindisp: coarse samples even in 1/depth instead of depth.
+        ndc: (width/2f, height/2f) for a network trained in normalised device coordinates.
+
+    Raises:
+        FieldError: impossible bounds, depths or numbers of samples.
+    """
+
+    coarse: Mlp
+    fine: Mlp | None
+    bounds: NDArray[np.float64]
+    near: float = 2.0
+    far: float = 6.0
+    samples: tuple[int, int] = (64, 128)
+    lindisp: bool = False
+    ndc: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        bounds = np.array(self.bounds, np.float64)
+        if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
+            raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
+        bounds.setflags(write=False)
+        object.__setattr__(self, "bounds", bounds)
+        samples = tuple(int(n) for n in self.samples)
+        object.__setattr__(self, "samples", samples)
+        if len(samples) != 2 or samples[0] < 3 or samples[1] < 0:
+            raise FieldError(
+                f"samples must be (coarse from 3, fine from 0) numbers on a ray, got {self.samples}"
+            )
+        if self.ndc is None and not 0.0 <= self.near < self.far < np.inf:
+            raise FieldError(f"near and far must satisfy 0 <= near < far, got {self.near} and {self.far}")
+        if self.ndc is None and self.lindisp and self.near == 0.0:
+            raise FieldError("near must be above 0 where samples are even in 1/depth, got 0")
+        if self.ndc is not None and not min(self.ndc) > 0:
+            raise FieldError(f"ndc must be two ratios width/2f, height/2f above 0, got {self.ndc}")
+
+    @cached_property
+    def torch(self) -> TorchNerf:
+        """The same field in PyTorch, on the compute device.
+
+        Raises:
+            FieldError: PyTorch is not installed.
+        """
+        try:
+            from cagefield.fields.nerf_torch import TorchNerf
+        except ImportError as error:
+            raise FieldError(
+                "this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
+            ) from error
+        return TorchNerf(self)
+
+    def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+        """(sigma [N] per world unit, rgb [N,3]) at canonical positions [N,3] along unit viewdirs [N,3]."""
+        return self.torch.numpy(positions, viewdirs)
+
+    def signed_density(self, positions: ArrayLike, viewdirs: ArrayLike) -> Float32:
+        """Density [N] per world unit before its ReLU: negative where space is empty, 0 at surfaces."""
+        return self.torch.numpy_signed(positions, viewdirs)
+
+    def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+        """(sigma [N], rgb [N,K,3]) at positions [N,3] along K directions each, viewdirs [N,K,3].
+
+        The trunk runs once for each position; sigma (which with `ndc` depends on direction) is the mean.
+        """
+        return self.torch.numpy_views(positions, viewdirs)
+
+
+def _encoding(size: int) -> tuple[int, bool]:
+    """(octaves, input included) of an encoding of three coordinates with so many values."""
+    return size // 6, size % 6 == 3
+
+
+def _check_encoding(layer: Linear, size: int) -> None:
+    if size < 3 or size % 3 or size // 6 > MAX_FREQUENCIES:
+        raise FieldError(
+            f"{layer.name}.weight is {list(layer.weight.shape)}: {size} of its inputs would be an encoding, "
+            "which has 3 + 6 L or 6 L values"
+        )
+
+
+def _check_inputs(layer: Linear, *allowed: int) -> None:
+    if layer.inputs not in allowed:
+        expected = " or ".join(f"[{layer.outputs}, {n}]" for n in allowed)
+        raise FieldError(f"{layer.name}.weight is {list(layer.weight.shape)}, expected {expected}")
+
+
+def _check_outputs(layer: Linear, outputs: int) -> None:
+    if layer.outputs != outputs:
+        raise FieldError(
+            f"{layer.name}.weight is {list(layer.weight.shape)}, expected [{outputs}, {layer.inputs}]"
+        )

@@ -1,0 +1,94 @@
+"""A NerfField as a safetensors file: the weights by name, the rest as JSON in the header."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from cagefield.errors import FieldError
+from cagefield.fields.nerf import Linear, Mlp, NerfField
+
+KIND = "NerfField"
+FORMAT_VERSION = "1"
+
+_OPTIONS = ("near", "far", "samples", "lindisp", "ndc")
+
+
+def save_nerf(field: NerfField, path: str | Path) -> None:
+    """Writes the field to a safetensors file (float32); the folder must exist."""
+    from safetensors.numpy import save_file
+
+    networks = {"coarse": field.coarse, "fine": field.fine}
+    state = {}
+    for part, network in networks.items():
+        for name, layer in [] if network is None else network.layers():
+            state[f"{part}.{name}.weight"] = layer.weight
+            state[f"{part}.{name}.bias"] = layer.bias
+    options = {name: getattr(field, name) for name in _OPTIONS}
+    options["bounds"] = field.bounds.tolist()
+    options["rectified_feature"] = [n.rectified_feature for n in networks.values() if n is not None]
+    metadata = {"kind": KIND, "version": FORMAT_VERSION, "options": json.dumps(options)}
+    save_file(state, str(path), metadata=metadata)
+
+
+def load_nerf(path: str | Path) -> NerfField:
+    """The field in a safetensors file; PyTorch is not needed to read it.
+
+    Raises:
+        FieldError: the file is missing, truncated, of another kind or newer than this version, or its tensors
+            do not fit together.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    if not Path(path).is_file():
+        raise FieldError(f"{path}: no such field file; copy it back or import the checkpoint again")
+    try:
+        with safe_open(str(path), framework="numpy") as file:
+            metadata = file.metadata() or {}
+            tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError) as error:
+        raise FieldError(
+            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+        ) from error
+    if metadata.get("kind") != KIND:
+        raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {KIND!r}")
+    if metadata.get("version") != FORMAT_VERSION:
+        raise FieldError(
+            f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
+            f"{FORMAT_VERSION!r}; update cagefield"
+        )
+    try:
+        options = json.loads(metadata["options"])
+        rectified = list(options.pop("rectified_feature"))
+        coarse = _network(tensors, "coarse", bool(rectified[0]))
+        fine = _network(tensors, "fine", bool(rectified[1])) if len(rectified) > 1 else None
+        if options["ndc"] is not None:
+            options["ndc"] = tuple(options["ndc"])
+        return NerfField(coarse, fine, **options)
+    except FieldError as error:
+        raise FieldError(f"{path}: {error}") from error
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise FieldError(f"{path}: damaged header ({error}); write the field again") from error
+
+
+def _network(tensors: dict[str, Any], part: str, rectified: bool) -> Mlp:
+    def take(name: str) -> Linear:
+        missing = [k for k in ("weight", "bias") if f"{part}.{name}.{k}" not in tensors]
+        if missing:
+            raise FieldError(f"tensor missing: {part}.{name}.{missing[0]}")
+        return Linear(tensors[f"{part}.{name}.weight"], tensors[f"{part}.{name}.bias"], f"{part}.{name}")
+
+    def count(prefix: str) -> int:
+        pattern = re.compile(rf"{part}\.{prefix}\.(\d+)\.")
+        return max((int(m.group(1)) + 1 for m in map(pattern.match, tensors) if m), default=0)
+
+    return Mlp(
+        trunk=tuple(take(f"trunk.{index}") for index in range(max(1, count("trunk")))),
+        density=take("density"),
+        rgb=take("rgb"),
+        feature=take("feature") if f"{part}.feature.weight" in tensors else None,
+        view=tuple(take(f"view.{index}") for index in range(count("view"))),
+        rectified_feature=rectified,
+    )

@@ -1,0 +1,222 @@
+"""Checkpoints of the two nerf-pytorch projects, as networks of a `NerfField`.
+
+yenchenlin/nerf-pytorch, `.tar`: "network_fn_state_dict" and "network_fine_state_dict" with pts_linears.N,
+views_linears.N, feature_linear, alpha_linear, rgb_linear, or pts_linears.N and output_linear for a network
+without view directions (which keeps an unused views_linears.0).
+
+krrish94/nerf-pytorch, `.ckpt`: "model_coarse_state_dict" and "model_fine_state_dict" with layer1,
+layers_xyz.N, fc_feat, fc_alpha, layers_dir.N, fc_rgb. Its forward pass has no ReLU after layer1, which makes
+one affine layer of layer1 and layers_xyz.0; one after fc_feat; and skips that put the encoding last.
+
+Depth, width, skips and octaves are what the tensors' shapes say; a config's are ignored.
+"""
+
+from __future__ import annotations
+
+import pickle
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import FieldError
+from cagefield.fields.nerf import Linear, Mlp
+
+YENCHENLIN = ("network_fn_state_dict", "network_fine_state_dict")
+KRRISH94 = ("model_coarse_state_dict", "model_fine_state_dict")
+
+_NAMED = 6  # tensors named in a message, at most
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The networks of a checkpoint, the project that wrote it, and its training step (None if not told)."""
+
+    coarse: Mlp
+    fine: Mlp | None
+    project: str
+    step: int | None
+
+
+def read_checkpoint(path: Path | str) -> Checkpoint:
+    """The networks in a checkpoint of either nerf-pytorch.
+
+    Raises:
+        FieldError: no such file, PyTorch is not installed, a file that is no checkpoint or holds more than
+            tensors and plain values (it is not unpickled), tensors that are missing, unknown or misshapen.
+    """
+    path = Path(path)
+    content = _unpickled(path)
+    for project, names, read in (
+        ("yenchenlin/nerf-pytorch", YENCHENLIN, _yenchenlin),
+        ("krrish94/nerf-pytorch", KRRISH94, _krrish94),
+    ):
+        if names[0] not in content:
+            continue
+        try:
+            coarse = read(_State(content[names[0]], names[0]))
+            second = content.get(names[1])
+            fine = None if second is None else read(_State(second, names[1]))
+        except FieldError as error:
+            raise FieldError(f"{path}: {error}") from None
+        step = content.get("global_step", content.get("iter"))
+        return Checkpoint(coarse, fine, project, int(step) if isinstance(step, (int, float)) else None)
+    raise FieldError(
+        f"{path}: no nerf-pytorch checkpoint: it holds {_listed(content)}; expected {YENCHENLIN[0]!r} or "
+        f"{KRRISH94[0]!r}"
+    )
+
+
+def _unpickled(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise FieldError(f"{path}: no such checkpoint; give the .tar or .ckpt file that nerf-pytorch wrote")
+    try:
+        import torch
+    except ImportError as error:
+        raise FieldError(
+            f"{path}: reading a checkpoint needs PyTorch, which is not installed; "
+            "pip install 'cagefield[nerf]'"
+        ) from error
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except pickle.UnpicklingError as error:
+        found = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
+        what = f" ({found.group(1)})" if found else ""
+        raise FieldError(
+            f"{path}: holds Python objects beside tensors{what}, or is no checkpoint; unpickling those can "
+            "run any code, so it is refused; save the two state dicts alone with torch.save and read that"
+        ) from error
+    except (RuntimeError, EOFError, OSError, ValueError, KeyError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:120]
+        raise FieldError(
+            f"{path}: not a readable checkpoint ({reason}); it may be truncated, copy it again"
+        ) from error
+    if not isinstance(content, dict):
+        raise FieldError(
+            f"{path}: holds a {type(content).__name__}, expected the dict that nerf-pytorch saves"
+        )
+    return content
+
+
+class _State:
+    """A state dict whose tensors are taken by name; what is left over at the end is extra."""
+
+    def __init__(self, tensors: Any, where: str) -> None:
+        if not isinstance(tensors, Mapping) or not all(hasattr(v, "shape") for v in tensors.values()):
+            raise FieldError(f"{where} must be a dict of tensors, got {type(tensors).__name__}")
+        self.where = where
+        # DataParallel puts its own name before every tensor's
+        self.left = {str(name).removeprefix("module."): tensor for name, tensor in tensors.items()}
+        self.missing: list[str] = []
+
+    def count(self, prefix: str) -> int:
+        """How many layers prefix.0, prefix.1, ... there are: up to the last one that is named."""
+        found = [re.match(re.escape(prefix) + r"\.(\d+)\.", name) for name in self.left]
+        return max((int(match.group(1)) + 1 for match in found if match), default=0)
+
+    def take(self, name: str) -> Linear | None:
+        """The layer of that name, or None where a tensor of it is missing."""
+        pair = []
+        for kind in ("weight", "bias"):
+            tensor = self.left.pop(f"{name}.{kind}", None)
+            if tensor is None:
+                self.missing.append(f"{name}.{kind}")
+            else:
+                pair.append(tensor.detach().float().cpu().numpy())
+        return Linear(pair[0], pair[1], f"{self.where}: {name}") if len(pair) == 2 else None
+
+    def layers(self, prefix: str) -> list[Linear | None]:
+        """The layers prefix.0, prefix.1, ..."""
+        return [self.take(f"{prefix}.{index}") for index in range(max(1, self.count(prefix)))]
+
+    def finish(self, *layers: Linear | None) -> list[Linear]:
+        """The layers, all of them there.
+
+        Raises:
+            FieldError: tensors are missing, or there are others.
+        """
+        if self.missing:
+            raise FieldError(f"{self.where}: tensors missing: {_listed(self.missing)}")
+        if self.left:
+            raise FieldError(f"{self.where}: tensors that this network does not have: {_listed(self.left)}")
+        return [layer for layer in layers if layer is not None]
+
+
+def _yenchenlin(state: _State) -> Mlp:
+    trunk = state.layers("pts_linears")
+    if any(name.startswith("output_linear.") for name in state.left):
+        if state.count("views_linears"):
+            state.layers("views_linears")
+        *trunk_layers, output = state.finish(*trunk, state.take("output_linear"))
+        if output.outputs not in (4, 5):
+            raise FieldError(
+                f"{output.name}.weight is {list(output.weight.shape)}, "
+                f"expected [4, {output.inputs}] or [5, {output.inputs}]"
+            )
+        return Mlp(tuple(trunk_layers), density=_rows(output, 3, 4), rgb=_rows(output, 0, 3))
+    view = state.layers("views_linears")
+    heads = [state.take(name) for name in ("feature_linear", "alpha_linear", "rgb_linear")]
+    layers = state.finish(*trunk, *view, *heads)
+    feature, density, rgb = layers[-3:]
+    return Mlp(tuple(layers[: len(trunk)]), density, rgb, feature, tuple(layers[len(trunk) : -3]))
+
+
+def _krrish94(state: _State) -> Mlp:
+    trunk = [state.take("layer1"), *state.layers("layers_xyz")]
+    plain = any(name.startswith("fc_out.") for name in state.left)
+    view = [] if plain else state.layers("layers_dir")
+    names = ("fc_out",) if plain else ("fc_feat", "fc_alpha", "fc_rgb")
+    layers = state.finish(*trunk, *view, *(state.take(name) for name in names))
+    first, second, *rest = layers[: len(trunk)]
+    encoded = first.inputs
+    before = [second, *rest]
+    own = (
+        _merged(first, second),
+        *(_encoding_first(layer, b.outputs, encoded) for b, layer in zip(before, rest, strict=False)),
+    )
+    if plain:
+        output = layers[-1]
+        if output.outputs != 4:
+            raise FieldError(
+                f"{output.name}.weight is {list(output.weight.shape)}, expected [4, {output.inputs}]"
+            )
+        return Mlp(own, density=_rows(output, 3, 4), rgb=_rows(output, 0, 3))
+    feature, density, rgb = layers[-3:]
+    return Mlp(own, density, rgb, feature, tuple(layers[len(trunk) : -3]), rectified_feature=True)
+
+
+def _merged(first: Linear, second: Linear) -> Linear:
+    """The affine layer second(first(x))."""
+    if second.inputs != first.outputs:
+        raise FieldError(
+            f"{second.name}.weight is {list(second.weight.shape)}, "
+            f"expected [{second.outputs}, {first.outputs}]"
+        )
+    weight, bias = second.weight.astype(np.float64), second.bias.astype(np.float64)
+    return Linear(
+        (weight @ first.weight).astype(np.float32),
+        (weight @ first.bias + bias).astype(np.float32),
+        first.name,
+    )
+
+
+def _encoding_first(layer: Linear, hidden: int, encoded: int) -> Linear:
+    """A layer that saw (h, encoding) as one that sees (encoding, h); any other layer as it is."""
+    if layer.inputs != hidden + encoded:
+        return layer
+    weight: NDArray[np.float32] = np.roll(layer.weight, encoded, axis=1)
+    return Linear(weight, layer.bias, layer.name)
+
+
+def _rows(layer: Linear, start: int, stop: int) -> Linear:
+    return Linear(layer.weight[start:stop], layer.bias[start:stop], layer.name)
+
+
+def _listed(names: Any) -> str:
+    found = sorted(str(name) for name in names)
+    more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+    return ", ".join(found[:_NAMED]) + more if found else "nothing"

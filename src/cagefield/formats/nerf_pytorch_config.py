@@ -1,0 +1,106 @@
+"""What the config of a nerf-pytorch checkpoint says about sampling; shapes of networks come from the weights.
+
+yenchenlin/nerf-pytorch writes "key = value" lines (args.txt, config.txt), krrish94/nerf-pytorch YAML
+(config.yml). Both lie beside their checkpoints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cagefield.errors import FieldError
+
+NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a checkpoint's rays are sampled; the defaults are those of the Blender scenes.
+
+    near, far: planar depths; samples: (coarse, fine); ndc: True for a forward-facing capture in normalised
+    device coordinates; white_background: what is behind the photos.
+    """
+
+    near: float = 2.0
+    far: float = 6.0
+    samples: tuple[int, int] = (64, 128)
+    lindisp: bool = False
+    ndc: bool = False
+    white_background: bool = True
+
+
+def find_config(checkpoint: Path) -> Path | None:
+    """The config beside a checkpoint, or None."""
+    return next((checkpoint.parent / name for name in NAMES if (checkpoint.parent / name).is_file()), None)
+
+
+def read_config(path: Path | str) -> Settings:
+    """The settings in a config file of either nerf-pytorch.
+
+    Raises:
+        FieldError: a file that is missing or no such config, values of the wrong kind, or an encoding that
+            `NerfField` does not have.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FieldError(f"{path}: no such config; give args.txt, config.txt or config.yml of the training")
+    try:
+        text = path.read_text(encoding="utf-8")
+        document = yaml.safe_load(text) if path.suffix in (".yml", ".yaml") else None
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise FieldError(f"{path}: not a readable config ({' '.join(str(error).split())[:120]})") from error
+    try:
+        return _krrish94(document) if isinstance(document, dict) else _yenchenlin(text)
+    except FieldError as error:
+        raise FieldError(f"{path}: {error}") from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FieldError(f"{path}: not a nerf-pytorch config ({type(error).__name__}: {error})") from error
+
+
+def _yenchenlin(text: str) -> Settings:
+    values: dict[str, str] = {}
+    for line in text.splitlines():
+        key, equals, value = line.partition("#")[0].partition("=")
+        if equals:
+            values[key.strip()] = value.strip()
+    if not values:
+        raise FieldError('no line "key = value" in it')
+    if values.get("i_embed", "0") not in ("0", "-1"):
+        raise FieldError(
+            f"i_embed = {values['i_embed']}; only positional encodings (0) or none (-1) are read"
+        )
+
+    def flag(name: str) -> bool:
+        return values.get(name, "False").lower() in ("true", "1", "yes")
+
+    # The parser's own default is llff
+    forward = values.get("dataset_type", "llff") == "llff"
+    ndc = forward and not flag("no_ndc")
+    return Settings(
+        near=0.0 if ndc else 2.0,
+        far=1.0 if ndc else 6.0,
+        samples=(int(values.get("N_samples", 64)), int(values.get("N_importance", 0))),
+        lindisp=flag("lindisp"),
+        ndc=ndc,
+        white_background=flag("white_bkgd"),
+    )
+
+
+def _krrish94(document: dict[str, Any]) -> Settings:
+    data, rays = document["dataset"], document["nerf"]["validation"]
+    for part in document.get("models", {}).values():
+        for key in ("log_sampling_xyz", "log_sampling_dir"):
+            if part.get(key, True) is not True:
+                raise FieldError(f"{key} is {part[key]}; only octaves (true) are read")
+    return Settings(
+        near=float(data["near"]),
+        far=float(data["far"]),
+        samples=(int(rays["num_coarse"]), int(rays["num_fine"])),
+        lindisp=bool(rays.get("lindisp", False)),
+        ndc=not data["no_ndc"],
+        white_background=bool(rays.get("white_background", False)),
+    )

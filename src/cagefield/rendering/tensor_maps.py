@@ -1,0 +1,83 @@
+"""The map of an edit stack for tensors: the same kernel, on the device where the tensors are."""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from typing import Any
+
+import numpy as np
+import quadrants as qd
+import torch
+from numpy.typing import NDArray
+
+from cagefield import devices
+from cagefield.warps.device import DeviceStack, PackedStack, map_sample, read3
+
+Table = qd.types.ndarray(dtype=qd.f32, ndim=2)
+Nodes = qd.types.ndarray(dtype=qd.math.vec3, ndim=1)
+
+
+class TensorMap:
+    """An edit stack as a function of tensors.
+
+    On a GPU the kernel reads and writes the tensors where they are. On the CPU it sees them as arrays of the
+    same memory, which it takes faster; `as_tensors` hands it tensors there too.
+    """
+
+    def __init__(
+        self,
+        edits: PackedStack,
+        device: torch.device,
+        *,
+        preserve_opacity: bool = True,
+        as_tensors: bool = False,
+    ) -> None:
+        packed = DeviceStack.from_stack(edits)
+        self.device = device
+        self.preserve_opacity = preserve_opacity
+        self._as_arrays = device.type == "cpu" and not as_tensors
+        self.count, self.flows = packed.n_edits, packed.has_flows
+        self._params = self._argument(packed.params)
+        self._lattice = self._argument(packed.lattice)
+
+    def _argument(self, values: NDArray[np.float32]) -> Any:
+        return values if self._as_arrays else torch.from_numpy(values.copy()).to(self.device)
+
+    def __call__(self, points: Any, viewdirs: Any) -> tuple[Any, Any, Any]:
+        """(canonical points [N,3], unit viewdirs [N,3], gain [N]) of deformed samples [N,3].
+
+        Density is multiplied by the gain: 0 where a sample is emptied, else 1, or |J d| to preserve opacity.
+        """
+        devices.start()
+        samples = torch.cat([points, viewdirs], dim=1).contiguous()
+        out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
+        if len(samples):
+            arguments = [values.numpy() if self._as_arrays else values for values in (samples, out)]
+            _map_tensors(
+                *arguments, self._params, self._lattice, self.count, self.flows, self.preserve_opacity
+            )
+        return out[:, :3], out[:, 3:6], out[:, 6]
+
+
+@qd.kernel
+def _map_tensors(
+    samples: Table,
+    out: Table,
+    params: Table,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
+    preserve_opacity: qd.template(),
+):
+    for i in range(samples.shape[0]):
+        d = read3(samples, i, 3)
+        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+        length = qd.max(v.norm(), 1e-20)
+        unchanged = (v - d).norm() == 0.0
+        for a in qd.static(range(3)):
+            out[i, a] = q[a]
+            out[i, 3 + a] = d[a] if unchanged else v[a] / length
+        gain = 1.0 - qd.cast(emptied, qd.f32)
+        if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
+            if not unchanged:
+                gain *= length / qd.max(d.norm(), 1e-20)
+        out[i, 6] = gain

@@ -1,0 +1,323 @@
+"""NerfField: shapes and errors, NDC, hierarchical sampling, exact pictures through edits."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import FieldError
+from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.protocol import Field
+from nerf_networks import affine, gamma, hidden_of, relu, small_field, small_mlp
+
+
+def test_a_nerf_is_a_field_and_needs_no_torch_until_it_is_evaluated() -> None:
+    code = """
+import sys, numpy as np
+sys.modules["torch"] = None
+from nerf_networks import small_field
+field = small_field()
+try:
+    field(np.zeros((1, 3)), np.ones((1, 3)))
+except ValueError as error:
+    print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=__file__.rpartition("/")[0],
+        check=True,
+    )
+    assert done.stdout == ("this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'\n")
+    assert isinstance(small_field(), Field)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"near": 3.0, "far": 2.0}, "near and far must satisfy 0 <= near < far, got 3.0 and 2.0"),
+        ({"near": 0.0, "lindisp": True}, "near must be above 0 where samples are even in 1/depth"),
+        ({"samples": (2, 8)}, r"samples must be \(coarse from 3, fine from 0\)"),
+        ({"ndc": (0.0, 1.0)}, "ndc must be two ratios"),
+    ],
+)
+def test_impossible_sampling_is_refused(options, message) -> None:
+    with pytest.raises(FieldError, match=message):
+        small_field(**options)
+
+
+def test_impossible_bounds_are_refused() -> None:
+    with pytest.raises(FieldError, match=r"bounds must be 2 finite corners"):
+        NerfField(small_mlp(), None, [[0, 0, 0], [1, 1, 0]])
+
+
+def test_networks_that_do_not_fit_together_are_refused() -> None:
+    good = small_mlp()
+    with pytest.raises(FieldError, match="a network must have a layer in its trunk"):
+        Mlp((), good.density, good.rgb)
+    with pytest.raises(FieldError, match="needs both a feature layer and view layers"):
+        Mlp(good.trunk, good.density, good.rgb, good.feature)
+    wide = Linear(np.zeros((8, 16 + 10)), np.zeros(8), "view.0")
+    with pytest.raises(FieldError, match=r"view.0.weight is \[8, 26\]: 10 of its inputs"):
+        Mlp(good.trunk, good.density, good.rgb, good.feature, (wide,))
+
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
+
+from cagefield.fields.nerf_torch import to_ndc  # noqa: E402
+from cagefield.rendering.nerf import Rays, march, render_nerf, sample_pdf, trace  # noqa: E402
+from cagefield.rendering.tensor_maps import TensorMap  # noqa: E402
+
+
+def directions(count: int, seed: int = 0) -> np.ndarray:
+    d = np.random.default_rng(seed).normal(size=(count, 3))
+    return (d / np.linalg.norm(d, axis=1, keepdims=True)).astype(np.float32)
+
+
+def plain(network: Mlp, p: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The network of `small_mlp` in float64, written out."""
+    h = hidden_of(network.trunk, gamma(p.astype(np.float64), 2))
+    seen = np.concatenate([affine(network.feature, h), gamma(d.astype(np.float64), 1)], axis=1)
+    rgb = affine(network.rgb, relu(affine(network.view[0], seen)))
+    return relu(affine(network.density, h))[:, 0], 1.0 / (1.0 + np.exp(-rgb))
+
+
+def test_values_are_those_of_the_network_written_out_in_numpy() -> None:
+    field = small_field()
+    # more than one block of positions
+    p = np.random.default_rng(1).uniform(-1.5, 1.5, (5000, 3)).astype(np.float32)
+    d = directions(5000)
+    sigma, rgb = field(p, d)
+    expected = plain(field.fine, p, d)
+    assert 0.3 < (expected[0] > 0).mean() < 0.7
+    np.testing.assert_allclose(sigma, expected[0], rtol=1e-4, atol=2e-5)
+    np.testing.assert_allclose(rgb, expected[1], rtol=1e-4, atol=2e-5)
+
+
+def test_many_directions_share_one_trunk() -> None:
+    field = small_field()
+    p = np.random.default_rng(1).uniform(-1.5, 1.5, (9, 3)).astype(np.float32)
+    d = directions(9 * 5).reshape(9, 5, 3)
+    sigma, rgb = field.seen_along(p, d)
+    for k in range(5):
+        expected = field(p, d[:, k])
+        np.testing.assert_allclose(sigma, expected[0], rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(rgb[:, k], expected[1], rtol=1e-4, atol=1e-5)
+
+
+def test_ndc_stretch_is_the_length_of_the_finite_difference() -> None:
+    ndc = (0.62, 0.46)
+    rng = np.random.default_rng(2)
+    p = torch.tensor(np.stack([*rng.uniform(-1, 1, (2, 50)), rng.uniform(-6, -1.5, 50)], 1))
+    d = torch.tensor(directions(50).astype(np.float64))
+    own, stretch = to_ndc(p, d, ndc)
+    step = 1e-6
+    difference = (to_ndc(p + step * d, d, ndc)[0] - to_ndc(p - step * d, d, ndc)[0]) / (2 * step)
+    # central differences in float64: error step^2 and rounding 1e-16 / step
+    np.testing.assert_allclose(stretch, difference.norm(dim=1), rtol=1e-7)
+    x, _, z = p.T
+    np.testing.assert_allclose(own[:, 0], -x / (0.62 * z))
+    np.testing.assert_allclose(own[:, 2], 1 + 2 / z)
+
+
+def test_in_front_of_the_near_plane_ndc_is_empty() -> None:
+    field = small_field(ndc=(0.6, 0.6))
+    p = np.random.default_rng(0).uniform(-4, 4, (400, 3))
+    sigma = field(p, np.tile([0.0, 0.0, -1.0], (400, 1)))[0]
+    assert (sigma[p[:, 2] > -0.99] == 0.0).all() and (sigma[p[:, 2] < -1.0] > 0.0).any()
+
+
+def test_fine_samples_are_the_quantiles_of_the_weights() -> None:
+    bins = torch.tensor([[0.0, 1.0, 2.0, 3.0]])
+    found = sample_pdf(bins, torch.tensor([[0.0, 3.0, 1.0]]), 5)
+    # quantiles 0, 1/4, ..., 1 of a density that has 3/4 in [1,2] and 1/4 in [2,3]; weights carry 1e-5 each
+    np.testing.assert_allclose(found[0, 1:], [4 / 3, 5 / 3, 2.0, 3.0], atol=1e-4)
+
+
+def test_random_fine_samples_follow_the_weights() -> None:
+    torch.manual_seed(0)
+    bins = torch.tensor([[0.0, 1.0, 2.0]])
+    found = sample_pdf(bins, torch.tensor([[1.0, 3.0]]), 20_000, random=True)
+    # a share of 3/4 of 20,000 draws has a standard deviation of 0.003
+    assert abs(float((found > 1.0).float().mean()) - 0.75) < 0.015
+
+
+def reference_rays(field: NerfField, origins, directions, cosines) -> tuple[np.ndarray, np.ndarray]:
+    """(rgb, opacity) of nerf-pytorch's render_rays, in float64 numpy: planar depth, last segment endless."""
+    d = directions.astype(np.float64) / cosines[:, None]
+    view = directions.astype(np.float64)
+    z = np.tile(np.linspace(field.near, field.far, field.samples[0]), (len(d), 1))
+
+    def shade(network: Mlp, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        p = origins[:, None] + z[..., None] * d[:, None]
+        v = np.broadcast_to(view[:, None], p.shape)
+        sigma, rgb = plain(network, p.reshape(-1, 3), v.reshape(-1, 3))
+        length = np.concatenate([np.diff(z), np.full((len(z), 1), 1e10)], 1)
+        length = length * np.linalg.norm(d, axis=1)[:, None]
+        alpha = 1 - np.exp(-sigma.reshape(z.shape) * length)
+        weights = alpha * np.cumprod(np.concatenate([np.ones((len(z), 1)), 1 - alpha + 1e-10], 1), 1)[:, :-1]
+        return weights, (weights[..., None] * rgb.reshape(*z.shape, 3)).sum(1)
+
+    weights, _ = shade(field.coarse, z)
+    middles = 0.5 * (z[:, 1:] + z[:, :-1])
+    more = []
+    for row, edges in zip(weights[:, 1:-1] + 1e-5, middles, strict=True):
+        total = np.concatenate([[0], np.cumsum(row / row.sum())])
+        more.append(np.interp(np.linspace(0, 1, field.samples[1]), total, edges))
+    z = np.sort(np.concatenate([z, np.array(more)], 1), 1)
+    weights, rgb = shade(field.fine, z)
+    return rgb, weights.sum(1)
+
+
+def camera(size: int = 8) -> Camera:
+    return turntable((0, 0, 0), 4.0, 3, elevation=0.4, width=size, height=size, fov_x=0.7)[1]
+
+
+def test_pictures_are_those_of_hierarchical_sampling_in_float64() -> None:
+    field = small_field()
+    origins, toward = camera().rays()
+    rgb, opacity = reference_rays(field, origins.astype(np.float64), toward, toward @ camera().forward)
+    frame = render_nerf(field, camera(), background="black", chunk=30)
+    # Fine samples where the coarse weights are almost even amplify rounding of float32: 1e-3 of a pixel
+    np.testing.assert_allclose(frame.rgb.reshape(-1, 3), rgb, atol=1e-3)
+    np.testing.assert_allclose(frame.opacity.ravel(), np.clip(opacity, 0, 1), atol=1e-3)
+    white = render_nerf(field, camera(), background="white")
+    np.testing.assert_allclose(white.rgb, frame.rgb + 1 - frame.opacity[..., None], atol=1e-6)
+
+
+def test_an_ndc_picture_is_the_one_from_ndc_rays() -> None:
+    """The same network, rendered along rays that were taken to NDC first, as nerf-pytorch does."""
+    field = small_field(ndc=(0.5, 0.5), near=0.0, far=1.0)
+    camera = Camera.from_fov(np.eye(4), 6, 6, 2 * np.arctan(0.5))
+    origins, toward = (a.astype(np.float64) for a in camera.rays())
+    start = origins - (1 + origins[:, 2:]) / toward[:, 2:] * toward
+    a, b = field.ndc
+    own = np.stack(
+        [-start[:, 0] / (a * start[:, 2]), -start[:, 1] / (b * start[:, 2]), 1 + 2 / start[:, 2]], 1
+    )
+    own_d = np.stack(
+        [
+            -(toward[:, 0] / toward[:, 2] - start[:, 0] / start[:, 2]) / a,
+            -(toward[:, 1] / toward[:, 2] - start[:, 1] / start[:, 2]) / b,
+            -2 / start[:, 2],
+        ],
+        1,
+    )
+    z = np.tile(np.linspace(0, 1, 12), (36, 1))
+    p = own[:, None] + z[..., None] * own_d[:, None]
+    sigma, rgb = plain(field.coarse, p.reshape(-1, 3), np.repeat(toward, 12, axis=0))
+    length = np.concatenate([np.diff(z), np.full((36, 1), 1e10)], 1) * np.linalg.norm(own_d, axis=1)[:, None]
+    alpha = 1 - np.exp(-sigma.reshape(z.shape) * length)
+    weights = alpha * np.cumprod(np.concatenate([np.ones((36, 1)), 1 - alpha + 1e-10], 1), 1)[:, :-1]
+    expected = (weights[..., None] * rgb.reshape(36, 12, 3)).sum(1)
+    coarse, _ = march(field.torch, Rays.of(camera, torch.device("cpu")))
+    # float32 positions up to 1e6 away; the last sample stops 1e-6 before infinity
+    np.testing.assert_allclose(coarse.premultiplied.numpy(), expected, atol=1e-4)
+
+
+def test_rays_away_from_a_forward_facing_capture_see_nothing() -> None:
+    field = small_field(ndc=(0.5, 0.5), near=0.0, far=1.0)
+    back = Camera.from_fov(np.diag([-1.0, 1.0, -1.0, 1.0]), 4, 4, 0.5)
+    frame = render_nerf(field, back, background="white")
+    np.testing.assert_array_equal(frame.rgb, 1.0)
+    assert np.isinf(frame.depth).all()
+
+
+def box_edit(**options) -> Edit:
+    return Edit(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.2), **options)
+
+
+STACKS = {
+    "move": EditStack([box_edit(adjustment="discrete").translate((0.4, 0.1, 0.0)).rotate((0, 0, 0.4))]),
+    "delete": EditStack([Edit.delete(Cage.box((0.2, 0, 0), 0.4))]),
+    "flow": EditStack([box_edit().rotate((0.2, 0.1, 0.6)).scale(0.8)]),
+    "trilinear, then move": EditStack(
+        [
+            box_edit(shell="trilinear").scale((1.2, 0.9, 1.1)),
+            box_edit(adjustment="discrete").translate((0, 0.5, 0)),
+        ]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STACKS)
+def test_tensors_go_through_edits_as_the_reference_takes_them(name) -> None:
+    stack = STACKS[name]
+    p = np.random.default_rng(3).uniform(-1.3, 1.3, (600, 3)).astype(np.float32)
+    d = directions(600)
+    expected = stack.to_canonical(p, d)
+    q, v, gain = TensorMap(stack, torch.device("cpu"))(torch.from_numpy(p), torch.from_numpy(d))
+    np.testing.assert_array_equal(gain.numpy() == 0.0, expected.emptied)
+    kept = ~expected.emptied
+    assert expected.stretch is not None
+    np.testing.assert_allclose(gain.numpy()[kept], expected.stretch[kept], rtol=5e-3)
+    plain = TensorMap(stack, torch.device("cpu"), preserve_opacity=False)
+    ones = plain(torch.from_numpy(p), torch.from_numpy(d))[2]
+    np.testing.assert_array_equal(ones.numpy(), kept.astype(np.float32))
+    # float32 against float64; a flow's integration steps differ by up to 1e-4 of the scene
+    np.testing.assert_allclose(q.numpy()[kept], expected.points[kept], atol=3e-4)
+    np.testing.assert_allclose(v.numpy()[kept], expected.viewdirs[kept], atol=2e-3)
+    np.testing.assert_allclose(np.linalg.norm(v.numpy(), axis=1), 1.0, atol=1e-5)
+
+
+def test_kernels_take_tensors_themselves() -> None:
+    """What happens on a GPU, where samples stay tensors: here with tensors on the CPU."""
+    stack = STACKS["flow"]
+    p, d = torch.rand(50, 3) - 0.5, torch.from_numpy(directions(50))
+    by_array = TensorMap(stack, torch.device("cpu"))(p, d)
+    by_tensor = TensorMap(stack, torch.device("cpu"), as_tensors=True)(p, d)
+    for one, other in zip(by_array, by_tensor, strict=True):
+        np.testing.assert_array_equal(one.numpy(), other.numpy())
+
+
+def test_moving_everything_with_the_camera_gives_the_same_picture() -> None:
+    """All of the field moved rigidly inside one cage, and the camera with it."""
+    field = small_field(samples=(24, 32))
+    shift = np.array([0.7, -0.3, 0.2])
+    turn = 0.5
+    # the cage holds all that the camera's rays meet between near and far
+    edit = Edit(Cage.box((0, 0, 0), 40.0), adjustment="discrete").rotate((0, 0, turn)).translate(shift)
+    R = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = R, shift
+    before = camera(6)
+    after = before.with_c2w(pose @ before.c2w)
+    one = render_nerf(field, before)
+    other = render_nerf(field, after, edits=EditStack([edit]))
+    # the same samples up to rounding, which fine sampling amplifies as above
+    np.testing.assert_allclose(other.rgb, one.rgb, atol=2e-3)
+    near = one.opacity > 0.01
+    np.testing.assert_allclose(other.depth[near], one.depth[near], atol=1e-2)
+    assert np.abs(render_nerf(field, after).rgb - one.rgb).max() > 0.05
+
+
+def test_emptied_samples_have_no_density() -> None:
+    field = small_field()
+    everything = EditStack([Edit.delete(Cage.box((0, 0, 0), 40.0))])
+    frame = render_nerf(field, camera(), edits=everything, background="none")
+    np.testing.assert_array_equal(frame.opacity, 0.0)
+
+
+def test_pixels_may_be_chosen() -> None:
+    field = small_field()
+    pixels = np.array([[3, 1], [0, 7]])
+    rgb, opacity, depth = trace(field.torch, Rays.of(camera(), torch.device("cpu"), pixels))
+    whole = render_nerf(field, camera(), background="black")
+    np.testing.assert_allclose(rgb.numpy(), [whole.rgb[1, 3], whole.rgb[7, 0]], atol=1e-6)
+    np.testing.assert_allclose(depth.numpy(), [whole.depth[1, 3], whole.depth[7, 0]], rtol=1e-5)
+    assert opacity.shape == (2,)
+
+
+def test_lindisp_samples_are_even_in_disparity() -> None:
+    from cagefield.rendering.nerf import _stratified
+
+    field = small_field(lindisp=True, near=1.0, far=4.0, samples=(4, 0))
+    s = _stratified(field, Rays.of(camera(1), torch.device("cpu")), 4, None)
+    np.testing.assert_allclose(1 / s[0], [1.0, 0.75, 0.5, 0.25], rtol=1e-6)

@@ -1,0 +1,172 @@
+"""The NeRF trainer: it learns, resumes to the same field, crops first, and refuses what it cannot train."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cagefield import Scene, load_dataset
+from cagefield.datasets.procedural import make_scene
+from cagefield.errors import CagefieldError
+from commands import printed, refused
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
+
+from cagefield.training import nerf as training  # noqa: E402
+from cagefield.training.nerf import NerfConfig, evaluate_nerf, initial_network, train_nerf  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory) -> Path:
+    return make_scene("microphone", tmp_path_factory.mktemp("photos") / "m", views=8, size=24, test_views=2)
+
+
+SMALL = NerfConfig.small
+
+
+def tiny(**options) -> NerfConfig:
+    small = {"width": 24, "depth": 3, "samples": (12, 12), "batch_rays": 64, "octaves": (4, 2), "precrop": 3}
+    return SMALL(**{**small, **options})
+
+
+def test_it_learns(photos) -> None:
+    dataset = load_dataset(photos)
+    before = train_nerf(dataset, tiny(steps=1))
+    after = train_nerf(dataset, tiny(steps=150))
+    assert after.finished and after.steps == 150
+    # an untrained network shows grey fog; 150 steps find the background and the shape
+    assert after.train_psnr > before.train_psnr + 5.0
+    assert after.test_psnr > before.test_psnr + 4.0
+
+
+def test_a_resumed_run_ends_where_an_uninterrupted_one_does(photos, tmp_path) -> None:
+    dataset = load_dataset(photos)
+    config = tiny(steps=12)
+
+    whole = training._Run(dataset, config)
+    first = training._Run(dataset, config)
+    for _ in range(12):
+        # torch's chance is that of the step, so that a pause changes nothing
+        torch.manual_seed(whole.step)
+        whole.advance()
+    for _ in range(5):
+        torch.manual_seed(first.step)
+        first.advance()
+    first.store(tmp_path / "state")
+    second = training._Run(dataset, config)
+    second.restore(tmp_path / "state")
+    for _ in range(7):
+        torch.manual_seed(second.step)
+        second.advance()
+    # the learning rate and the photos' rays depend on the step alone; Adam's moments are carried over
+    for one, other in zip(second.field().coarse.layers(), whole.field().coarse.layers(), strict=True):
+        np.testing.assert_allclose(one[1].weight, other[1].weight, atol=1e-6)
+    assert second.step == 12
+
+
+def test_a_checkpoint_of_other_options_is_refused(photos, tmp_path) -> None:
+    dataset = load_dataset(photos)
+    training._Run(dataset, tiny()).store(tmp_path / "state")
+    with pytest.raises(CagefieldError, match="was written with other options or photos"):
+        train_nerf(dataset, tiny(width=20, steps=1), checkpoint=tmp_path / "state", resume=True)
+    with pytest.raises(CagefieldError, match=r"no checkpoint at .* to resume from"):
+        train_nerf(dataset, tiny(), checkpoint=tmp_path / "none", resume=True)
+    (tmp_path / "state").write_bytes(b"hello")
+    with pytest.raises(CagefieldError, match="is no checkpoint of this training"):
+        train_nerf(dataset, tiny(), checkpoint=tmp_path / "state", resume=True)
+
+
+def test_warm_up_rays_come_from_the_middle(photos) -> None:
+    run = training._Run(load_dataset(photos), tiny(batch_rays=400))
+
+    def edge_cosine() -> float:
+        return float(run._batch()[0].cosines.min())
+
+    early = edge_cosine()
+    run.step = 3
+    assert edge_cosine() < early
+    # a quarter of the picture's width off its axis, against half of it
+    camera = run.dataset.train[0].camera
+    quarter = np.cos(np.arctan(np.hypot(camera.width / 4, camera.height / 4) / camera.fx))
+    assert early > quarter - 1e-3
+
+
+def test_targets_are_the_photos_colours_on_white(photos) -> None:
+    dataset = load_dataset(photos)
+    run = training._Run(dataset, tiny(batch_rays=50))
+    rays, target = run._batch()
+    origin = rays.origins[0].numpy()
+    (view,) = [v for v in dataset.train if np.allclose(v.camera.origin, origin, atol=1e-5)]
+    pixels = view.camera.project(origin + 2.0 * rays.directions.numpy())[0].astype(int)
+    photo = view.load().astype(np.float64) / 255
+    shown = photo[pixels[:, 1], pixels[:, 0]]
+    np.testing.assert_allclose(target.numpy(), shown[:, :3] * shown[:, 3:] + 1 - shown[:, 3:], atol=1e-5)
+
+
+def test_presets_have_the_papers_networks_and_small_ones() -> None:
+    chance = np.random.default_rng(0)
+    paper = initial_network(NerfConfig(), chance)
+    assert str(paper) == "8 x 256, 10 + 4 octaves" and paper.skips.index(True) == 5
+    assert sum(layer.weight.size + layer.bias.size for _, layer in paper.layers()) == 595_844
+    assert str(initial_network(NerfConfig.small(), chance)) == "4 x 128, 8 + 3 octaves"
+
+
+def test_a_field_without_fine_samples_has_one_network(photos) -> None:
+    result = train_nerf(load_dataset(photos), tiny(steps=2, samples=(8, 0)))
+    assert result.field.fine is None
+
+
+def test_near_and_far_hold_the_box(photos) -> None:
+    dataset = load_dataset(photos)
+    near, far = training._depths(dataset)
+    box = dataset.bounds
+    rng = np.random.default_rng(0)
+    points = rng.uniform(box[0], box[1], (500, 3))
+    for view in dataset.train:
+        depth = (points - view.camera.origin) @ view.camera.forward
+        assert near <= depth.min() and depth.max() <= far
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"steps": 0}, "steps is 0; it must be from 1"),
+        ({"depth": 0}, "depth is 0"),
+        ({"width": 1}, "width is 1"),
+        ({"batch_rays": 0}, "batch_rays is 0"),
+        ({"minutes": -1.0}, "minutes is -1.0; it must be above 0"),
+        ({"rate": 2.0}, "rate is 2.0; it must be between 0 and 1"),
+    ],
+)
+def test_impossible_options_are_refused(options, message) -> None:
+    with pytest.raises(CagefieldError, match=message):
+        NerfConfig(**options)
+
+
+def test_an_unbounded_capture_is_refused(photos) -> None:
+    dataset = dataclasses.replace(load_dataset(photos), unbounded=True)
+    with pytest.raises(CagefieldError, match="is an unbounded capture"):
+        train_nerf(dataset, tiny())
+
+
+def test_no_views_have_no_psnr(photos) -> None:
+    field = train_nerf(load_dataset(photos), tiny(steps=1)).field
+    assert np.isnan(evaluate_nerf(field, ()))
+
+
+def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
+    argv = [photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 60, "--resolution", 24]
+    text = printed(capsys, "train", *argv)
+    assert "60 steps, networks of 3 x 24, 4 + 2 octaves; train PSNR" in text
+    assert "PSNR of the voxels against the original" in text
+    scene = Scene.open(tmp_path / "scene")
+    assert scene.original is not None and scene.original.samples == (12, 12)
+    assert len(scene.cameras["train"]) == 8
+    assert not (tmp_path / "scene.training").exists()
+    monkeypatch.setitem(__import__("sys").modules, "cagefield.training.nerf", None)
+    message = refused(capsys, "train", photos, "-o", tmp_path / "other", "--field", "nerf")
+    assert "--field nerf needs PyTorch" in message
