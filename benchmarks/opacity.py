@@ -1,39 +1,56 @@
-"""Whether stretched content should keep its opacity: both choices against photos of parts that really moved.
+"""Whether stretched content should keep its opacity: both choices against scenes with parts really scaled.
 
-    python benchmarks/opacity.py WORKDIR [-o benchmarks/results/opacity.md]
+    python benchmarks/opacity.py WORKDIR --steps 6000 [-o benchmarks/results/opacity.md]
 
-WORKDIR is the work folder of `cagefield bench edits`; its newest fields are used. Only edits that change
-lengths can tell; of those the built-in cases hold copies scaled down, and the parts below are scaled here.
+WORKDIR is the work folder of `cagefield bench edits`; its fields of that many steps are used, or trained.
+Only edits that change lengths can tell: whole scenes and parts that stand free are scaled, alike on all axes
+and not, and the truth is the scene built so, with the light it was photographed with. The built-in continuous
+edits follow, whose truth is the scene's model through the exact map.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from cagefield import devices
-from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr
+from cagefield.benchmarking.cases import CASES, chosen
+from cagefield.benchmarking.figures import Pictures, changed_pixels, mean_psnr, pooled_psnr
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
+from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cages import Cage
+from cagefield.cameras import Camera
 from cagefield.datasets.procedural import procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.training.voxel import VoxelConfig
 
-SCALED = (
-    ("microphone", "weight", 0.6),
-    ("microphone", "weight", 1.5),
-    ("plant", "pinecone", 0.6),
-    ("plant", "pinecone", 1.3),
-    ("plant", "flower", 0.5),
-    ("plant", "flower", 1.6),
-    ("digger", "cone", 0.6),
-    ("digger", "cone", 1.3),
+Factors = tuple[float, float, float]
+
+WHOLE: tuple[tuple[str, Factors], ...] = tuple(
+    (name, factors)
+    for name in ("digger", "chair", "microphone", "plant")
+    for factors in ((0.5, 0.5, 0.5), (0.7, 0.7, 0.7), (1.0, 1.0, 0.5), (1.15, 1.15, 1.15))
 )
-"""Scene, part, factor."""
+"""Scene, factors along the world's axes: all of it is scaled about its centre."""
+
+STANDING: tuple[tuple[str, str, str, Factors], ...] = (
+    ("digger", "move_cone", "cone", (0.6, 0.6, 0.6)),
+    ("digger", "move_cone", "cone", (1.4, 1.4, 1.4)),
+    ("digger", "move_cone", "cone", (1.0, 1.0, 1.8)),
+    ("plant", "move_pinecone", "pinecone", (0.6, 0.6, 0.6)),
+    ("plant", "move_pinecone", "pinecone", (1.4, 1.4, 1.4)),
+    ("plant", "move_pinecone", "pinecone", (1.0, 1.0, 1.6)),
+    ("chair", "copy_cushion", "cushion", (1.0, 1.0, 1.5)),
+)
+"""Scene, case whose cage is used, part, factors: the part is scaled about the middle of its cage's floor."""
+
+
+CONTINUOUS = "Continuous edits: against the scene's model through the exact map, its density as it is."
 
 
 def main() -> None:
@@ -42,47 +59,112 @@ def main() -> None:
     )
     parser.add_argument("workdir", type=Path)
     parser.add_argument("-o", "--out", type=Path, default=Path("benchmarks/results/opacity.md"))
+    parser.add_argument("--steps", type=int, default=6000, help="of the fields' training")
     parser.add_argument("--views", type=int, default=6)
+    parser.add_argument("--scenes", nargs="*", default=("digger", "chair", "microphone", "plant"))
+    parser.add_argument("--no-continuous", action="store_true", help="leave out the continuous edits")
     options = parser.parse_args()
     devices.start()
-    rows = []
-    for name, part, factor in SCALED:
-        fields = sorted(options.workdir.glob(f"{name}/field-*"), key=lambda path: path.stat().st_mtime)
-        if not fields:
-            print(f"{options.workdir} holds no field of {name}; run `cagefield bench edits --workdir` first")
-            continue
-        scene = Scene.open(fields[-1])
-        cameras = scene.cameras["test"][: options.views]
-        model = procedural_scene(name)
-        center, size = model.part_box(part, 0.015)
-        cage = Cage.box(center, size)
-        edits = EditStack([Edit(cage, adjustment="discrete").scale(factor)])
-        moved = model.move(part, scale=factor, pivot=cage.center)
-        truth = np.stack([moved.photograph(camera, background="white").rgb8() for camera in cameras])
-        before = np.stack([model.photograph(camera, background="white").rgb8() for camera in cameras])
-        there = changed_pixels(before, truth)
-        figures = []
-        for preserve in (False, True):
-            renderer = Renderer(scene.field, edits, preserve_opacity=preserve)
-            shown = np.stack([renderer.render(camera, background="white").rgb8() for camera in cameras])
-            figures += [mean_psnr(shown, truth), pooled_psnr(shown, truth, there)]
-        rows.append((name, part, f"{factor:g}", *map(number, figures), number(figures[2] - figures[0])))
-        print(*rows[-1], flush=True)
-    gain = np.mean([float(row[-1]) for row in rows]) if rows else float("nan")
+    bench = Workbench(Settings(config=VoxelConfig(steps=options.steps)), options.workdir.resolve())
+    rows = [*scaled(bench, options.scenes, options.views)]
+    discrete = len(rows)
+    if not options.no_continuous:
+        rows += continuous(bench, options.scenes)
+    gains = [float(row[-1]) for row in rows]
+    means = [f"scaled parts and scenes: {np.mean(gains[:discrete]):.2f} dB"]
+    means += [f"continuous edits: {np.mean(gains[discrete:]):.2f} dB"] if rows[discrete:] else []
     table = Table(
         "Density as it is, or times |J d|",
-        ("scene", "part", "scale", "PSNR", "there", "PSNR preserved", "there preserved", "gained"),
+        ("scene", "what", "factors", "PSNR", "there", "PSNR preserved", "there preserved", "gained"),
         tuple(rows),
         (
-            f"PSNR (dB) against photos of the scene whose part was really scaled, mean of {options.views} "
-            "test views; there: on the pixels that the edit changes. Preserved: density times |J d|; "
-            f"that keeps the optical depth. Gained on the mean: {gain:.2f} dB.",
+            "Preserved: density times |J d|, which keeps the optical depth along a ray however it is "
+            f"stretched. PSNR (dB): mean of {options.views} test views, against photos of the scene built "
+            "with its parts so scaled and lit as they were; there: on the pixels that the edit changes.",
+            *([] if options.no_continuous else [CONTINUOUS]),
+            f"Gained on average by preserving: {'; '.join(means)}.",
+            f"Fields: {options.steps} steps.",
             f"Machine: {Machine.here()}",
-            f"Command: `python benchmarks/opacity.py {options.workdir.name}`",
+            f"Command: `python benchmarks/opacity.py {options.workdir.name} --steps {options.steps} --views "
+            f"{options.views} --scenes {' '.join(options.scenes)}"
+            f"{' --no-continuous' if options.no_continuous else ''}`",
         ),
-        names=2,
+        names=3,
     )
     write_text(options.out, table.markdown())
+
+
+def scaled(bench: Workbench, scenes: Sequence[str], views: int) -> Iterator[tuple[str, ...]]:
+    """A row for each scaled scene and part."""
+    for name, factors in WHOLE:
+        if name not in scenes:
+            continue
+        model = procedural_scene(name)
+        center, size = model.part_box(model.part_names, 0.05)
+        yield _scaled(bench, views, name, model.part_names, Cage.box(center, size), center, factors)
+    for name, case, part, factors in STANDING:
+        if name not in scenes:
+            continue
+        (edit,) = chosen([name], [case])[0].edits
+        floor = edit.inner.corners[:4].mean(axis=0)
+        yield _scaled(bench, views, name, (part,), edit.inner, floor, factors)
+
+
+def _scaled(
+    bench: Workbench,
+    views: int,
+    name: str,
+    parts: tuple[str, ...],
+    cage: Cage,
+    pivot: np.ndarray,
+    factors: Factors,
+) -> tuple[str, ...]:
+    cameras = bench.scene(name).cameras["test"][:views]
+    model = procedural_scene(name)
+    moved = model.move(parts, scale=factors, pivot=pivot).carrying_light()
+    # The edit scales about the cage's centre; what remains takes that to where scaling about the pivot does.
+    shift = (1.0 - np.array(factors)) * (pivot - cage.center)
+    edit = Edit(cage, adjustment="discrete").scale(factors).translate(shift)
+    truth = np.stack([moved.photograph(camera, background="white").rgb8() for camera in cameras])
+    what = "all" if len(parts) > 1 else parts[0]
+    same = "x".join(f"{f:g}" for f in factors)
+    before = bench.modelled(name, cameras)
+    return _row(bench, name, what, same, EditStack([edit]), cameras, before, truth)
+
+
+def continuous(bench: Workbench, scenes: Sequence[str]) -> Iterator[tuple[str, ...]]:
+    """A row for each continuous edit."""
+    size = bench.settings.exact_size
+    for case in CASES:
+        if case.kind != "continuous" or case.scene not in scenes:
+            continue
+        known = bench.scene(case.scene).cameras["test"][: bench.settings.exact_views]
+        cameras = tuple(camera.resized(size, size) for camera in known)
+        before = bench.mapped(case.scene, None, cameras)
+        truth = bench.mapped(case.scene, case.edits, cameras)
+        name = case.name.replace("_", " ")
+        yield _row(bench, case.scene, name, "continuous", case.edits, cameras, before, truth)
+
+
+def _row(
+    bench: Workbench,
+    name: str,
+    what: str,
+    factors: str,
+    edits: EditStack,
+    cameras: tuple[Camera, ...],
+    before: Pictures,
+    truth: Pictures,
+) -> tuple[str, ...]:
+    there = changed_pixels(before, truth)
+    figures = []
+    for preserve in (False, True):
+        renderer = Renderer(bench.scene(name).field, edits, preserve_opacity=preserve)
+        shown = np.stack([renderer.render(camera, background="white").rgb8() for camera in cameras])
+        figures += [mean_psnr(shown, truth), pooled_psnr(shown, truth, there)]
+    row = (name, what, factors, *map(number, figures), number(figures[2] - figures[0]))
+    print(*row, flush=True)
+    return row
 
 
 if __name__ == "__main__":

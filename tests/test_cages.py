@@ -72,6 +72,7 @@ def test_drags_move_only_their_corners() -> None:
         (box.move_corner(3, (0.1, 0.2, 0.3)), [3]),
         (box.move_edge((5, 1), (0.1, 0.2, 0.3)), [1, 5]),
         (box.move_face("-y", (0.1, 0.2, 0.3)), [0, 1, 4, 5]),
+        (box.move_corners((6, 0, 3), (0.1, 0.2, 0.3)), [0, 3, 6]),
     ):
         expected = box.corners.copy()
         expected[ids] += (0.1, 0.2, 0.3)

@@ -13,7 +13,9 @@ import pytest
 
 import cagefield
 from cagefield import Scene, load_edits
+from cagefield.cages import Cage
 from cagefield.cli import main
+from cagefield.edits import Edit, EditStack
 from commands import printed, refused
 from scenes import ball_scene, files_of
 
@@ -55,7 +57,8 @@ start = time.perf_counter()
 from cagefield.cli import main
 code = main(["--help"])
 print("seconds", time.perf_counter() - start)
-print("loaded", *sorted({"quadrants", "torch", "scipy"} & set(sys.modules)))
+heavy = {"quadrants", "torch", "scipy", "starlette", "uvicorn", "pydantic"}
+print("loaded", *sorted(heavy & set(sys.modules)))
 sys.exit(code)
 """
     done = subprocess.run(
@@ -65,7 +68,7 @@ sys.exit(code)
     assert lines[-1] == "loaded"
     # measured 0.4 s on a quiet machine; 2 s is room for a busy one
     assert float(lines[-2].split()[1]) < 2.0
-    for command in ("demo", "make-scene", "train", "edit", "render", "info", "bench"):
+    for command in ("demo", "make-scene", "train", "view", "edit", "render", "info", "bench"):
         assert command in done.stdout
 
 
@@ -139,6 +142,17 @@ def test_info_says_what_is_there(capsys: pytest.CaptureFixture[str], scene: Path
         '2. "gone": delete',
     ):
         assert fact in text
+
+
+def test_info_says_how_many_voxels_a_lattice_is_off(capsys: pytest.CaptureFixture[str], scene: Path) -> None:
+    edit = Edit(Cage.box((0, 0, 0), 0.5), Cage.box((0, 0, 0), 1.5), lattice=12).rotate((0, 0, 0.6))
+    edited = Scene.open(scene).with_edits(EditStack([edit]))
+    edited.save(scene, overwrite=True)
+    (error,) = edited.lattice_errors()
+    worst, mean = edit.lattice_error()
+    assert (error.worst, error.mean) == pytest.approx((worst / 0.125, mean / 0.125))  # 16 voxels across 2
+    off = f"the lattice is off by {error.mean:.2g} voxels on average, {error.worst:.2g} at most\n"
+    assert off in printed(capsys, "info", scene)
 
 
 def test_info_shows_the_brightness_of_the_photos(capsys: pytest.CaptureFixture[str], scene: Path) -> None:

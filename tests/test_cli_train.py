@@ -104,6 +104,7 @@ def test_demo_runs_the_whole_chain(tmp_path: Path, capsys: pytest.CaptureFixture
     assert main(argv) == 0
     text = capsys.readouterr().out
     assert "training: " in text and f"{out}/before_after.png" in text
+    assert text.rstrip().endswith(f"edit it by hand, in the browser: cagefield view {out}/edited")
     assert sorted(entry.name for entry in out.iterdir()) == [
         "after.png", "before.png", "before_after.png", "edited", "edits.yaml", "photos", "scene",
         "turntable.mp4",

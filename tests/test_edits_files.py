@@ -11,7 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cagefield.cages import Cage
-from cagefield.edits import Edit, EditStack, Rotate, dump_edits, files, load_edits, parse_edits, save_edits
+from cagefield.edits import (
+    Edit,
+    EditStack,
+    MoveCorners,
+    Rotate,
+    dump_edits,
+    files,
+    load_edits,
+    parse_edits,
+    save_edits,
+)
 from cagefield.errors import EditFileError
 from random_cages import edits, examples, seeds
 
@@ -30,7 +40,7 @@ edits:
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     text = textwrap.dedent((files.__doc__ or "").split("\n\n")[1])
     first, second = parse_edits(text)
-    assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 7
+    assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8
     assert second.deleted and second.inner == Cage.box((2, 0, 0), 0.5)
 
 
@@ -48,6 +58,7 @@ def test_every_key() -> None:
             - shear: {zx: 1e-1, axes: cage}
             - move_edge: {edge: [1, 0], by: [0, 0, -0.1]}
             - move_face: {face: "-z", by: [0, 0, -1]}
+            - move_corners: {corners: [0, 7], by: [0, 0, 0.1]}
         """
     )
     inner = Cage(Cage.box((1, 2, 3), (1, 2, 3), (0, 0, np.radians(30))).corners, pivot=np.array((1.0, 2, 0)))
@@ -58,8 +69,10 @@ def test_every_key() -> None:
         .shear(zx=0.1, axes="cage")
         .move_edge((1, 0), (0, 0, -0.1))
         .move_face("-z", (0, 0, -1))
+        .then(MoveCorners((0, 7), (0.0, 0.0, 0.1)))
     )
     assert edit == expected
+    assert parse_edits(dump_edits(EditStack([expected]))) == EditStack([expected])
     (cornered,) = parse_edits(f"edits: [{{inner: {{corners: {INNER.corners.tolist()}}}, delete: true}}]")
     assert cornered == Edit.delete(Cage(INNER.corners))
 
@@ -200,6 +213,14 @@ def test_edits_that_cannot_be_evaluated_are_errors_unless_asked_for(tmp_path: Pa
             r"edge \(0, 3\) is not an edge",
         ),
         (("translate: [0, 0, 0.1]", "move_face: {face: up, by: [0, 0, 0]}"), 'face "up" is not a face'),
+        (
+            ("translate: [0, 0, 0.1]", "move_corners: {corners: [], by: [0, 0, 0]}"),
+            "name one or more corners",
+        ),
+        (
+            ("translate: [0, 0, 0.1]", "move_corners: {corners: [2, 2], by: [0, 0, 0]}"),
+            r"each once, got \[2, 2\]",
+        ),
         (
             ("translate: [0, 0, 0.1]", "translate: [0, 0, 0]\n        scale: 2"),
             "got translate and scale: start each",

@@ -12,6 +12,7 @@ from hypothesis import given
 
 from cagefield import devices
 from cagefield.edits import Edit, EditStack
+from cagefield.errors import DeviceError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps.continuous import ContinuousWarp
 from random_cages import examples, unit_vectors
@@ -165,3 +166,32 @@ assert numpy.isnan(reference[1]), rows
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_lattice_errors_of_a_stack_are_in_voxels() -> None:
+    lattice = EDITS["turn of 90"].replace(lattice=12, name="turn")
+    stack = EditStack([EDITS["shear"], lattice, lattice.replace(enabled=False), Edit.delete(INNER)])
+    (error,) = stack.lattice_errors(0.02, samples=2000)
+    assert (error.number, error.name, error.resolution) == (1, "turn", 12)
+    worst, mean = lattice.lattice_error(samples=2000)
+    assert error.worst == pytest.approx(worst / 0.02) and error.mean == pytest.approx(mean / 0.02)
+    assert error.worst > 3.0 * error.mean > 0.0
+    with pytest.raises(EditError, match="voxel_size must be positive, the edge of a voxel, got 0"):
+        stack.lattice_errors(0)
+
+
+def test_the_reference_takes_the_kernels_lattice(monkeypatch: pytest.MonkeyPatch) -> None:
+    edit = EDITS["turn of 90"].replace(lattice=9)
+    warp = edit.warp
+    assert isinstance(warp, ContinuousWarp) and warp.lattice is not None
+    nodes, expected = nodes_and_reference(edit, 9)
+    assert np.array_equal(warp.lattice.displacement.reshape(-1, 3), nodes)
+    monkeypatch.setattr(devices, "_started", None)
+
+    def broken(_device: str = "auto") -> str:
+        raise DeviceError("no device here")
+
+    monkeypatch.setattr(devices, "start", broken)
+    slow = edit.replace(name="without a device").warp
+    assert isinstance(slow, ContinuousWarp) and slow.lattice is not None
+    np.testing.assert_allclose(slow.lattice.displacement.reshape(-1, 3), expected, atol=1e-12)

@@ -142,6 +142,16 @@ def test_lpips_says_what_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert distance is None and "weights (alexnet-owt-7be5be79.pth) are not in torch's cache" in reason
 
 
+def test_lpips_is_left_out_where_a_package_is_broken(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(name: str) -> ModuleType:
+        raise RuntimeError("operator torchvision::nms does not exist")
+
+    monkeypatch.setattr(perceptual, "find_spec", lambda name: object())
+    monkeypatch.setattr(perceptual, "import_module", broken)
+    reason = "LPIPS is left out; it cannot be imported: operator torchvision::nms does not exist"
+    assert perceptual.lpips() == (None, reason)
+
+
 def test_lpips_of_equal_pictures_is_zero() -> None:
     distance, reason = perceptual.lpips()
     if distance is None:

@@ -253,9 +253,14 @@ def test_tensors_go_through_edits_as_the_reference_takes_them(name) -> None:
     p = np.random.default_rng(3).uniform(-1.3, 1.3, (600, 3)).astype(np.float32)
     d = directions(600)
     expected = stack.to_canonical(p, d)
-    q, v, emptied = TensorMap(stack, torch.device("cpu"))(torch.from_numpy(p), torch.from_numpy(d))
-    np.testing.assert_array_equal(emptied.numpy(), expected.emptied)
+    q, v, gain = TensorMap(stack, torch.device("cpu"))(torch.from_numpy(p), torch.from_numpy(d))
+    np.testing.assert_array_equal(gain.numpy() == 0.0, expected.emptied)
     kept = ~expected.emptied
+    assert expected.stretch is not None
+    np.testing.assert_allclose(gain.numpy()[kept], expected.stretch[kept], rtol=5e-3)
+    plain = TensorMap(stack, torch.device("cpu"), preserve_opacity=False)
+    ones = plain(torch.from_numpy(p), torch.from_numpy(d))[2]
+    np.testing.assert_array_equal(ones.numpy(), kept.astype(np.float32))
     # float32 against float64; a flow's integration steps differ by up to 1e-4 of the scene
     np.testing.assert_allclose(q.numpy()[kept], expected.points[kept], atol=3e-4)
     np.testing.assert_allclose(v.numpy()[kept], expected.viewdirs[kept], atol=2e-3)

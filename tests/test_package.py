@@ -88,4 +88,4 @@ def test_checks_run_what_the_readme_says() -> None:
     checks = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace("step ", "").splitlines()
     assert "pip install . && cagefield demo" in readme and "pip install ." in checks
     assert "pip install '.[test]' && python -m pytest" in readme
-    assert checks[-2:] == ["pip install '.[test]'", "python -m pytest"]
+    assert "pip install '.[test]'" in checks and checks[-1] == "python -m pytest"

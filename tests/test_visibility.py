@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cagefield.benchmarking.visibility import unseen
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets.procedural.parts import Part, Primitive, place
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.shapes import Box
 from cagefield.datasets.procedural.textures import Plain
-from cagefield.datasets.procedural.visibility import unseen
 
 GREY = Plain(np.array([0.5, 0.5, 0.5]))
 
@@ -56,3 +56,17 @@ def test_only_pixels_of_the_mask_are_looked_at() -> None:
     where[:, :40] = True
     everywhere = unseen(moved, above(), scene, photos())
     np.testing.assert_array_equal(unseen(moved, above(), scene, photos(), where), everywhere & where)
+
+
+def test_ground_seen_through_a_hair_thin_gap_is_unseen() -> None:
+    # low cameras see far under a box that hovers; a gap of 0.004 is under a pixel, one of 0.1 is not
+    low = turntable((0, 0, 0), 4.0, 24, elevation=np.radians(4.0), width=32, height=32, fov_x=0.7)
+    shares = {}
+    for gap in (0.004, 0.1):
+        hovering = box_on_plate().move("box", translate=(0.0, 0.0, gap))
+        gone = hovering.remove("box")
+        shares[gap] = unseen(gone, above(), hovering, (*photos(), *low)).mean()
+    foot = 0.4**2 / (8 * np.tan(0.25)) ** 2
+    # the foot less a rim of the box's rounding and a voxel, 0.02 wide on every side
+    assert 0.75 * foot < shares[0.004] < 1.15 * foot
+    assert shares[0.1] < 0.2 * foot

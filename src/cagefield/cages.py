@@ -7,6 +7,7 @@ Angles are radians, lengths world units.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -227,6 +228,13 @@ class Cage:
         if face not in FACES:
             raise CageError(f'face "{face}" is not a face of a cage: the faces are {", ".join(FACES)}')
         return self._move(FACES[face], vector(by, "move_face"))
+
+    def move_corners(self, corners: Iterable[int], by: ArrayLike) -> Cage:
+        """The cage with some of its corners, each named once, moved by one vector [3]; the pivot stays."""
+        chosen = tuple(_corner_number(corner) for corner in corners)
+        if not chosen or len(set(chosen)) < len(chosen):
+            raise CageError(f"corners must name one or more corners, each once, got {list(chosen)}")
+        return self._move(chosen, vector(by, "move_corners"))
 
     def _linear(self, M: Array, axes: Axes, own: bool = False) -> Cage:
         if axes not in ("world", "cage"):

@@ -81,7 +81,7 @@ def orbit(cameras: Sequence[Camera], n: int, *, width: int, height: int) -> tupl
     if n < 1:
         raise CameraError(f"an orbit has {n} cameras; give at least 1")
     poses = np.stack([camera.c2w for camera in cameras])
-    up = _shared_up(poses)
+    up = shared_up(poses)
     center = _common_target(poses)
     offsets = poses[:, :3, 3] - center
     heights = offsets @ up
@@ -163,8 +163,8 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
     return 24.0
 
 
-def _shared_up(poses: Floats) -> Floats:
-    """The unit up direction of the cameras; exactly +z where it is within 10 degrees of it.
+def shared_up(poses: Floats) -> Floats:
+    """The unit up direction of cameras with these poses [N,4,4]; exactly +z where it is within 10 degrees.
 
     A camera that is not rolled has its +x axis level, so up is the direction most normal to all +x axes: the
     last eigenvector of Σ x xᵀ. Cameras that all share one +x axis leave it open; then it is their mean +y.

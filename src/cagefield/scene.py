@@ -6,7 +6,8 @@
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
-                          "gains": [[r, g, b], ...] if photos were brighter or darker than the field}
+                          "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
+                          "preserve_opacity": false if edits leave density as it is}
 
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
@@ -17,6 +18,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import secrets
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +26,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
 from cagefield.cameras import Camera
-from cagefield.edits import EditStack
+from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.nerf import NerfField
@@ -54,6 +56,7 @@ class Scene:
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
     the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
     the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
+    `preserve_opacity` multiplies density by |J d| where an edit moved it.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -67,6 +70,7 @@ class Scene:
     version: int = VERSION
     gains: tuple[tuple[float, float, float], ...] = ()
     original: NerfField | None = None
+    preserve_opacity: bool = True
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -102,7 +106,7 @@ class Scene:
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        background, gains = _read_manifest(folder)
+        background, gains, preserve_opacity = _read_manifest(folder)
         for name in (_FIELD, _CAMERAS, _EDITS):
             if not (folder / name).is_file():
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
@@ -111,7 +115,15 @@ class Scene:
         field = VoxelField.load(folder / _FIELD)
         original = load_nerf(folder / _ORIGINAL) if (folder / _ORIGINAL).is_file() else None
         try:
-            return cls(field, edits, cameras, background, gains=gains, original=original)
+            return cls(
+                field,
+                edits,
+                cameras,
+                background,
+                gains=gains,
+                original=original,
+                preserve_opacity=preserve_opacity,
+            )
         except SceneError as error:
             raise SceneError(f"{folder / _MANIFEST}: {error}") from None
 
@@ -134,16 +146,35 @@ class Scene:
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
                 draft / _CAMERAS,
             )
-            manifest = {"format": FORMAT, "version": self.version, "background": self.background}
-            if self.gains:
-                manifest["gains"] = self.gains
-            _write_json(manifest, draft / _MANIFEST)
+            self.save_manifest(draft)
+
+    def save_manifest(self, folder: Path) -> None:
+        """Writes the scene's manifest into a folder that holds its other files, complete or not at all."""
+        manifest: dict[str, object] = {
+            "format": FORMAT,
+            "version": self.version,
+            "background": self.background,
+        }
+        if self.gains:
+            manifest["gains"] = self.gains
+        if not self.preserve_opacity:
+            manifest["preserve_opacity"] = False
+        draft = folder / f".{_MANIFEST}.{secrets.token_hex(4)}"
+        _write_json(manifest, draft)
+        draft.replace(folder / _MANIFEST)
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack."""
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
         return scene
+
+    def lattice_errors(self) -> tuple[LatticeError, ...]:
+        """How far the edits' lattices are off their exact maps, in voxels of the field (its smallest edge).
+
+        An unbounded field's voxels are those in the middle of its box of interest.
+        """
+        return self.edits.lattice_errors(float(min(self.field.voxel_size)))
 
     def render(
         self,
@@ -186,6 +217,7 @@ class Scene:
             background=background,
             edits=EditStack(edit.replace(lattice=None) for edit in self.edits),
             normals=normals,
+            preserve_opacity=self.preserve_opacity,
         )
 
     def _render_original(
@@ -197,7 +229,9 @@ class Scene:
         from cagefield.rendering.nerf import render_nerf
 
         edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
-        return render_nerf(original, camera, edits=edits, background=background)
+        return render_nerf(
+            original, camera, edits=edits, background=background, preserve_opacity=self.preserve_opacity
+        )
 
     @cached_property
     def renderer(self) -> Renderer:
@@ -205,7 +239,9 @@ class Scene:
         from cagefield.rendering.renderer import Renderer
 
         origin: Renderer | None = self.__dict__.get("_origin")
-        return Renderer(self.field, self.edits) if origin is None else origin.with_edits(self.edits)
+        if origin is None:
+            return Renderer(self.field, self.edits, preserve_opacity=self.preserve_opacity)
+        return origin.with_edits(self.edits, preserve_opacity=self.preserve_opacity)
 
 
 def check_destination(path: Path | str, overwrite: bool) -> Path:
@@ -253,8 +289,8 @@ def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
     return gains
 
 
-def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any]:
-    """Background and gains, the latter unchecked."""
+def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool]:
+    """Background, gains, unchecked, and the opacity choice."""
     path = folder / _MANIFEST
     if not path.is_file():
         raise SceneError(
@@ -272,8 +308,11 @@ def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any
         raise SceneError(
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
+    opacity = document.get("preserve_opacity", True)
+    if not isinstance(opacity, bool):
+        raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
     try:
-        return background_rgb(document.get("background")), document.get("gains", ())
+        return background_rgb(document.get("background")), document.get("gains", ()), opacity
     except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
 

@@ -19,7 +19,7 @@ from cagefield.edits.files import parse_edits
 from cagefield.errors import CagefieldError
 
 WEIGHT_CENTER = (-0.6493, 0.0, 0.142)
-PINECONE_CENTER = (0.419, -0.3, -0.2035)
+PINECONE_CENTER = (0.419, -0.3, -0.211)
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ CASES = (
     Case("chair", "lean_back"),
     Case("chair", "higher_crest"),
     Case("chair", "move_arm_rest", lambda s: s.move("arm rest left", translate=(0, 0.3, 0))),
-    Case("chair", "copy_cushion", lambda s: s.duplicate("cushion", translate=(0, 0, 0.156))),
+    Case("chair", "copy_cushion", lambda s: s.duplicate("cushion", translate=(0, 0, 0.146))),
     Case("chair", "delete_back", lambda s: s.remove("back")),
     Case("microphone", "bigger_head"),
     Case("microphone", "push_head"),
@@ -88,7 +88,7 @@ CASES = (
     Case(
         "plant",
         "copy_pinecone",
-        lambda s: s.duplicate("pinecone", translate=(0.05, 0.68, -0.0611), scale=0.75, pivot=PINECONE_CENTER),
+        lambda s: s.duplicate("pinecone", translate=(0.05, 0.68, -0.0593), scale=0.75, pivot=PINECONE_CENTER),
     ),
     Case("plant", "delete_flower", lambda s: s.remove("flower")),
 )

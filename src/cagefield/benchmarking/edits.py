@@ -24,7 +24,7 @@ from cagefield.datasets.procedural.writer import FOV_X
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
 
-_TIMED_VIEWS, _ROUNDS = 3, 5
+_TIMED_VIEWS, _ROUNDS = 2, 3
 
 _EYES = {
     "digger": (1.6, -3.5, 1.3),
@@ -93,6 +93,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             truth, before = "exact map", bench.mapped(name, None, cameras)
             after = bench.mapped(name, case.edits, cameras)
         else:
+            cameras = cameras[: bench.settings.discrete_views]
             truth, before = "photos", bench.modelled(name, cameras)
             after = bench.moved(case, cameras)
         if truth not in unedited:
@@ -151,8 +152,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "There: on the pixels that the edit changes in truth, and a margin of a 100th of the width; if left: "
         "what the field without the edit would reach there; carried: against parts that keep the light they "
         "had, as an edited field does (where a part was turned).",
-        "Unseen: pixels that show a surface that no training photo showed, such as the ground under a part "
-        "that is moved away; lost, seen: the PSNR lost on all other pixels.",
+        "Unseen: pixels that show a surface that no training photo showed, or only through a gap under a "
+        "voxel, such as the ground under a part that is moved; lost, seen: the PSNR lost on all others.",
         "Frame time: edited over unedited, median of frames taken in turn.",
         "Min det J: least volume ratio over the shell of a continuous edit, of its map or the inverse; max "
         "stretch: largest factor by which a length grows or shrinks; map time: for a million points, in the "

@@ -27,11 +27,15 @@ def lpips() -> tuple[Distance | None, str]:
     missing = [name for name in ("torch", "torchvision", "lpips") if find_spec(name) is None]
     if missing:
         return None, f"LPIPS is left out; not installed: {', '.join(missing)}"
-    torch = import_module("torch")
-    path = Path(torch.hub.get_dir()) / "checkpoints" / WEIGHTS
-    if not path.is_file():
-        return None, f"LPIPS is left out; AlexNet's weights ({WEIGHTS}) are not in torch's cache"
-    network = import_module("lpips").LPIPS(net="alex", verbose=False).eval()
+    try:
+        torch = import_module("torch")
+        path = Path(torch.hub.get_dir()) / "checkpoints" / WEIGHTS
+        if not path.is_file():
+            return None, f"LPIPS is left out; AlexNet's weights ({WEIGHTS}) are not in torch's cache"
+        network = import_module("lpips").LPIPS(net="alex", verbose=False).eval()
+    except (ImportError, OSError, RuntimeError) as error:
+        # A torchvision that was built for another torch says so: "operator torchvision::nms does not exist".
+        return None, f"LPIPS is left out; it cannot be imported: {error}"
 
     def distance(pictures: Pictures, truth: Pictures) -> float:
         pairs: Sequence[tuple[Any, Any]] = list(zip(pictures, truth, strict=True))

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 import cagefield
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
+from cagefield.benchmarking.visibility import unseen
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
-from cagefield.datasets.procedural.visibility import unseen
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
@@ -57,7 +57,8 @@ class Settings:
 
     Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
     the first `exact_views` test cameras, with `exact_samples` samples a ray; that of the methods that are
-    compared at compared_size x compared_size for the first `compared_views`.
+    compared at compared_size x compared_size for the first `compared_views`. Discrete edits are measured on
+    the first `discrete_views` test photos, None for all.
 
     Raises:
         CagefieldError: sizes and numbers that are too small.
@@ -72,6 +73,7 @@ class Settings:
     exact_samples: int = 768
     compared_size: int = 64
     compared_views: int = 3
+    discrete_views: int | None = None
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -83,9 +85,10 @@ class Settings:
             ("exact_samples", 1),
             ("compared_size", 16),
             ("compared_views", 1),
+            ("discrete_views", 1),
         ):
             value = getattr(self, name)
-            if value < least:
+            if value is not None and value < least:
                 raise CagefieldError(f"{name} is {value}; it must be at least {least}")
 
 
@@ -184,7 +187,7 @@ class Workbench:
         moved, photos = case.moved(scene), self.scene(case.scene).cameras["train"]
         key = digest(
             ["unseen", case.scene, case.name, _poses(cameras), _poses(photos)],
-            (*_MODELLED, "benchmarking/cases.py"),
+            (*_MODELLED, "benchmarking/cases.py", "benchmarking/visibility.py"),
         )
         masks = (
             unseen(moved, camera, scene, photos, mask).astype(np.uint8)

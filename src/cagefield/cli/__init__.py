@@ -68,6 +68,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.make_scene import MakeScene
     from cagefield.cli.render import Render
     from cagefield.cli.train import Train
+    from cagefield.cli.view import View
 
     commands = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
@@ -75,6 +76,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[Train, tyro.conf.subcommand("train")]
         | Annotated[ImportNerf, tyro.conf.subcommand("import")]
         | Annotated[Bake, tyro.conf.subcommand("bake")]
+        | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]

@@ -58,6 +58,8 @@ class BenchEdits:
     """Number of pictures of continuous edits."""
     exact_samples: int = 768
     """Samples a ray in the truth of continuous edits."""
+    discrete_views: int | None = None
+    """Number of test photos that discrete edits are measured on; left out, all."""
     methods: tuple[str, ...] = ()
     """Compare only these ways to fill the shell: flow, "flow 64", trilinear, "trilinear 64", "trilinear 128",
     "trilinear 256", "mean value", harmonic; left out, all."""
@@ -114,6 +116,7 @@ class BenchEdits:
             self.exact_samples,
             self.compared_size,
             self.compared_views,
+            self.discrete_views,
         )
         devices.start(self.device)
         with _work_folder(self.workdir) as folder:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,7 +33,7 @@ class Demo:
     """Number of training photos."""
     size: int = 320
     """Width and height of the photos in pixels."""
-    steps: int = 800
+    steps: int = 1200
     """Number of training steps."""
     resolution: int = 160
     """Voxels along the longest axis at the end."""
@@ -67,6 +68,20 @@ class Demo:
             ("photos/", "what the field was trained on"),
         ):
             print(f"  {self.out}/{name:24} {what}")
+        self._offer()
+
+    def _offer(self) -> None:
+        """Says how the result is edited by hand and, in a terminal, offers to begin."""
+        from cagefield.cli.view import View
+
+        scene = self.out / "edited"
+        print(f"edit it by hand, in the browser: cagefield view {scene}", flush=True)
+        if (
+            sys.stdin.isatty()
+            and sys.stdout.isatty()
+            and input("open it now? [y/N] ").strip().lower() in ("y", "yes")
+        ):
+            View(scene, device=self.device).run()
 
     def _photograph(self, folder: Path) -> None:
         from cagefield.datasets.procedural import make_scene

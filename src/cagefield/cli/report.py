@@ -25,10 +25,10 @@ def describe_edits(edits: Iterable[Edit], field: VoxelField) -> list[str]:
     The shares are of the field's stored voxels inside the canonical inner cage and in the shell around it. An
     edit that cannot be evaluated says why.
     """
-    positions = _vertex_positions(field)
+    positions, voxel = _vertex_positions(field), float(min(field.voxel_size))
     lines: list[str] = []
     for number, edit in enumerate(edits, start=1):
-        lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, positions))]
+        lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, positions, voxel))]
     return lines or ["no edits"]
 
 
@@ -45,7 +45,7 @@ def _title(edit: Edit) -> str:
     return f"{name}{kind}{hidden}"
 
 
-def _details(edit: Edit, positions: Array) -> Iterable[str]:
+def _details(edit: Edit, positions: Array, voxel: float) -> Iterable[str]:
     inside = edit.inner.contains(positions)
     share = float(inside.mean()) if len(positions) else 0.0
     if edit.deleted:
@@ -73,7 +73,7 @@ def _details(edit: Edit, positions: Array) -> Iterable[str]:
         yield f"{gives:.1%} of them give way; the shell {state} (least volume ratio {ratio:.3f})"
         if edit.lattice is not None:
             worst, mean = edit.lattice_error()
-            yield f"the lattice is off by {mean:.2g} on average, {worst:.2g} at most (world units)"
+            yield f"the lattice is off by {mean / voxel:.2g} voxels on average, {worst / voxel:.2g} at most"
 
 
 def _volume(cage: Cage) -> float:

@@ -6,6 +6,7 @@ from cagefield.edits.edit import Edit
 from cagefield.edits.files import dump_edits, load_edits, parse_edits, save_edits
 from cagefield.edits.operations import (
     MoveCorner,
+    MoveCorners,
     MoveEdge,
     MoveFace,
     Operation,
@@ -14,14 +15,16 @@ from cagefield.edits.operations import (
     Shear,
     Translate,
 )
-from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack
+from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack, LatticeError
 
 __all__ = [
     "CanonicalSamples",
     "DeformedPoints",
     "Edit",
     "EditStack",
+    "LatticeError",
     "MoveCorner",
+    "MoveCorners",
     "MoveEdge",
     "MoveFace",
     "Operation",

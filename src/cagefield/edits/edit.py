@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
@@ -14,7 +15,7 @@ from cagefield.cages import Axes, Cage, format_vector, outside_by
 from cagefield.edits import operations as ops
 from cagefield.edits.limits import flow_reach
 from cagefield.edits.operations import Operation
-from cagefield.errors import CageError, EditError
+from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import FALLOFFS, SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp, lattice_error
@@ -159,10 +160,19 @@ class Edit:
 
     @cached_property
     def warp(self) -> Warp:
-        """The map of this edit, through its lattice if it has one. Raises `EditError` as `check` does."""
+        """The map of this edit, through its lattice if it has one. Raises `EditError` as `check` does.
+
+        The lattice of a flow shell is the kernel's, in float32, where a device starts: in float64 it takes
+        minutes.
+        """
         exact = self.exact_warp
         if self.lattice is None or not isinstance(exact, ContinuousWarp):
             return exact
+        if isinstance(exact.shell, FlowShell):
+            from cagefield.warps.device import flow_lattice_of
+
+            with suppress(DeviceError):
+                return replace(exact, lattice=flow_lattice_of(self))
         lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, exact.outer, self.lattice)
         return replace(exact, lattice=lattice)
 

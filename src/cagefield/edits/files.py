@@ -13,6 +13,7 @@
           - move_corner: {corner: 7, by: [0.1, 0, 0]}
           - move_edge: {edge: [0, 1], by: [0, 0, 0.1]}
           - move_face: {face: +x, by: [0.2, 0, 0]}
+          - move_corners: {corners: [0, 3, 5], by: [0.1, 0, 0]}
         adjustment: continuous                # or discrete
         shell: flow                           # or trilinear; flow if left out
         falloff: smooth                       # of the flow shell: smooth (if left out) or linear
@@ -192,7 +193,16 @@ def _outer(node: Node, inner: Cage) -> Cage:
 
 
 def _operation(node: Node) -> Operation:
-    names = ("translate", "rotate_deg", "scale", "shear", "move_corner", "move_edge", "move_face")
+    names = (
+        "translate",
+        "rotate_deg",
+        "scale",
+        "shear",
+        "move_corner",
+        "move_edge",
+        "move_face",
+        "move_corners",
+    )
     keys = node.mapping(optional=names)
     if len(keys) != 1:
         raise node.error(
@@ -219,6 +229,10 @@ def _operation(node: Node) -> Operation:
         parts = value.mapping(required=("edge", "by"))
         i, j = (end.integer(0, 7) for end in parts["edge"].items(2))
         return operations.MoveEdge((i, j), parts["by"].vector())
+    if name == "move_corners":
+        parts = value.mapping(required=("corners", "by"))
+        corners = tuple(corner.integer(0, 7) for corner in parts["corners"].items())
+        return operations.MoveCorners(corners, parts["by"].vector())
     parts = value.mapping(required=("face", "by"))
     return operations.MoveFace(parts["face"].text(), parts["by"].vector())
 
@@ -292,6 +306,9 @@ def _from_operation(operation: Operation) -> dict[str, Any]:
         return {"move_corner": {"corner": int(operation.corner), "by": list(operation.by)}}
     if isinstance(operation, operations.MoveEdge):
         return {"move_edge": {"edge": [int(k) for k in operation.edge], "by": list(operation.by)}}
+    if isinstance(operation, operations.MoveCorners):
+        corners = [int(k) for k in operation.corners]
+        return {"move_corners": {"corners": corners, "by": list(operation.by)}}
     return {"move_face": {"face": operation.face, "by": list(operation.by)}}
 
 

@@ -204,7 +204,27 @@ class MoveFace:
         return f"of face {self.face} by {_show(self.by)}"
 
 
-Operation: TypeAlias = Translate | Rotate | Scale | Shear | MoveCorner | MoveEdge | MoveFace
+@dataclass(frozen=True)
+class MoveCorners:
+    """Move any corners together by a vector; the pivot stays."""
+
+    corners: tuple[int, ...]
+    by: Triple
+    noun: ClassVar[str] = "move of corners"
+
+    def apply(self, cage: Cage) -> Cage:
+        """The deformed cage."""
+        return cage.move_corners(self.corners, self.by)
+
+    def part(self, t: float) -> MoveCorners:
+        """The share t of the move."""
+        return MoveCorners(self.corners, _times(self.by, t))
+
+    def __str__(self) -> str:
+        return f"{', '.join(map(str, self.corners))} by {_show(self.by)}"
+
+
+Operation: TypeAlias = Translate | Rotate | Scale | Shear | MoveCorner | MoveEdge | MoveFace | MoveCorners
 
 
 def displacement(by: ArrayLike, name: str) -> Triple:

@@ -44,6 +44,20 @@ class DeformedPoints:
 
 
 @dataclass(frozen=True)
+class LatticeError:
+    """How far an edit's lattice is off its exact map, in voxels: at most, and on average over the shell.
+
+    `number` is the edit's place in its stack, from 0.
+    """
+
+    number: int
+    name: str
+    resolution: int
+    worst: float
+    mean: float
+
+
+@dataclass(frozen=True)
 class EditStack:
     """Edits e_1 ... e_n: the deformed field of e_k is the canonical field of e_(k+1).
 
@@ -108,6 +122,40 @@ class EditStack:
         """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
         return bounds_of(self.boxes)
 
+    def changed_boxes(self, before: EditStack) -> Array:
+        """Boxes [B,2,3] (min, max) outside all of which this stack maps points as another one does.
+
+        They are those of the edits that the stacks do not share, in deformed space, and of the later edits
+        that take points there.
+        """
+        old, new = before.active, self.active
+        least = min(len(old), len(new))
+        first = next((n for n in range(least) if old[n] != new[n]), least)
+        shared = next((n for n in range(least - first) if old[-1 - n] != new[-1 - n]), least - first)
+        replaced = (*old[first : len(old) - shared], *new[first : len(new) - shared])
+        changed = np.concatenate([np.zeros((0, 2, 3)), *(edit.boxes for edit in replaced)])
+        for edit in new[len(new) - shared :]:
+            if _meet(np.concatenate([edit.boxes, edit.inner.aabb[None]]), changed):
+                changed = np.concatenate([changed, edit.boxes])
+        return changed
+
+    def lattice_errors(self, voxel_size: float, *, samples: int = 20_000) -> tuple[LatticeError, ...]:
+        """The errors of the active edits that have a lattice, in voxels of an edge in world units.
+
+        Measured at that many random points of each shell, between the inner and the outer cage. Raises
+        `EditError` for an edit that cannot be evaluated, or a voxel size that is not positive.
+        """
+        if not voxel_size > 0.0:
+            raise EditError(f"voxel_size must be positive, the edge of a voxel, got {voxel_size!r}")
+        errors = []
+        for number, edit in enumerate(self.edits):
+            if edit.lattice is None or edit.adjustment == "discrete":
+                continue
+            if edit.enabled and edit.changes_anything:
+                worst, mean = (error / voxel_size for error in edit.lattice_error(samples=samples))
+                errors.append(LatticeError(number, edit.name, edit.lattice, worst, mean))
+        return tuple(errors)
+
     def check(self) -> None:
         """Raise `EditError` for the first active edit that cannot be evaluated."""
         for edit in self.active:
@@ -149,6 +197,12 @@ class EditStack:
             mapped = edit.warp.to_deformed(p[rows])
             p[rows], J[rows], hidden[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
         return DeformedPoints(p, J, hidden)
+
+
+def _meet(boxes: Array, others: Array) -> bool:
+    """True where one of the boxes [B,2,3] meets one of the others."""
+    a, b = boxes[:, None], others[None]
+    return bool(((a[:, :, 0] <= b[:, :, 1]) & (b[:, :, 0] <= a[:, :, 1])).all(axis=2).any())
 
 
 def _in_any(boxes: Array, p: Array) -> Mask:

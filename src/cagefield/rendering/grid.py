@@ -8,11 +8,13 @@ lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slo
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import quadrants as qd
 from numpy.typing import NDArray
 
+from cagefield import devices
 from cagefield.fields.voxel import VoxelField
 
 BRICK = 4
@@ -45,6 +47,13 @@ def to_device(values: NDArray[np.generic]) -> qd.ndarray:
     array = qd.ndarray(dtype=kinds[flat.dtype], shape=(flat.size,))
     array.from_numpy(flat)
     return array
+
+
+def for_kernels(values: NDArray[np.generic]) -> Any:
+    """A flat array to hand to kernels: the numpy array itself on the CPU, else one on the device."""
+    if devices.current() != "cpu" or values.size == 0:
+        return to_device(values)
+    return np.ascontiguousarray(values).reshape(-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -80,28 +80,28 @@ def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
         Image.fromarray(pixels).save(temporary, format="PNG")
 
 
-def write_video(
-    path: str | os.PathLike[str], frames: Iterable[NDArray[Any]], fps: float = 24.0, *, quality: int = 18
-) -> None:
-    """Writes RGB frames [H,W,3] (uint8 or float) as H.264 in yuv420p, which every player shows.
+@contextmanager
+def video_writer(
+    path: str | os.PathLike[str], shape: tuple[int, int], fps: float = 24.0, *, quality: int = 18
+) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """A function that adds one RGB frame [H,W,3] (uint8 or float) of `shape` (H, W) to an H.264 file.
 
-    Odd sizes are extended by repeating the last row or column. `quality` is x264's CRF, 0 (lossless) to 51.
-    Raises CagefieldError for no frames, frames of different sizes, or a suffix other than .mp4.
+    The file is there once the context ends, and not at all where it ends with an error. Odd sizes are
+    extended by repeating the last row or column: yuv420p, which every player shows, has even ones. `quality`
+    is x264's CRF, 0 (lossless) to 51.
+
+    Raises CagefieldError for a suffix other than .mp4, and for frames of another size.
     """
     import imageio_ffmpeg
 
     path = Path(path)
     if path.suffix.lower() != ".mp4":
-        raise CagefieldError(f"{path}: write_video writes .mp4 files")
+        raise CagefieldError(f"{path}: a video's name ends in .mp4")
     if not fps > 0 or not 0 <= quality <= 51:
         raise CagefieldError(f"fps must be positive and quality in [0, 51], not fps={fps}, quality={quality}")
-    source = iter(frames)
-    first = next(source, None)
-    if first is None:
-        raise CagefieldError(f"{path}: a video needs at least one frame")
-    first = _pixels(first, (3,))
-    height, width = first.shape[:2]
+    height, width = shape
     pad = ((0, height % 2), (0, width % 2), (0, 0))
+    count = 0
     with replaced_whole(path) as temporary:
         writer = imageio_ffmpeg.write_frames(
             str(temporary),
@@ -114,17 +114,39 @@ def write_video(
             output_params=["-crf", str(quality), "-movflags", "+faststart"],
         )
         writer.send(None)
+
+        def add(frame: NDArray[Any]) -> None:
+            nonlocal count
+            pixels = _pixels(frame, (3,))
+            if pixels.shape[:2] != shape:
+                raise CagefieldError(
+                    f"frame {count} is {list(pixels.shape)}; all frames must be {[height, width, 3]}"
+                )
+            writer.send(np.pad(pixels, pad, mode="edge").tobytes())
+            count += 1
+
         try:
-            writer.send(np.pad(first, pad, mode="edge").tobytes())
-            for index, frame in enumerate(source, start=1):
-                pixels = _pixels(frame, (3,))
-                if pixels.shape != first.shape:
-                    raise CagefieldError(
-                        f"frame {index} is {list(pixels.shape)}; all frames must be {list(first.shape)}"
-                    )
-                writer.send(np.pad(pixels, pad, mode="edge").tobytes())
+            yield add
         finally:
             writer.close()
+
+
+def write_video(
+    path: str | os.PathLike[str], frames: Iterable[NDArray[Any]], fps: float = 24.0, *, quality: int = 18
+) -> None:
+    """Writes RGB frames [H,W,3] (uint8 or float) as a video; see `video_writer`.
+
+    Raises CagefieldError for no frames, frames of different sizes, or a suffix other than .mp4.
+    """
+    source = iter(frames)
+    first = next(source, None)
+    if first is None:
+        raise CagefieldError(f"{path}: a video needs at least one frame")
+    height, width = _pixels(first, (3,)).shape[:2]
+    with video_writer(path, (height, width), fps, quality=quality) as add:
+        add(first)
+        for frame in source:
+            add(frame)
 
 
 def side_by_side(*images: NDArray[Any], gap: int = 4) -> UInt8:

@@ -27,6 +27,7 @@ from cagefield.rendering.traverse import is_occupied, look_ahead, safe_inverse, 
 from cagefield.warps.device import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
+ivec2 = qd.types.vector(2, qd.i32)
 TILE = 8
 
 
@@ -34,10 +35,11 @@ TILE = 8
 def march_tiles(
     out: F32,
     directions: F32,
-    first_tile: qd.i32,
-    tiles: qd.i32,
+    first_row: qd.i32,
+    rows: qd.i32,
+    corner: ivec2,
+    size: ivec2,
     width: qd.i32,
-    height: qd.i32,
     rotation: mat3,
     origin: vec3,
     codes: I32,
@@ -65,24 +67,25 @@ def march_tiles(
     edited: qd.template(),
     flows: qd.template(),
 ):
-    """Marches the pixels of tiles [first_tile, first_tile + tiles), 8 x 8 pixels each, row-major.
+    """Marches rows of tiles, 8 x 8 pixels each, of a rectangle of a picture that is `width` pixels wide.
 
-    out: [height * width, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
-    directions: [height * width, 3] camera-space. Grid coordinates are (p - lower) * scale, or, when
-    contracted, `lower` is the centre, `scale` 1 / half size, and the result is contracted.
+    The rectangle has its top left pixel at `corner` (column, row) and `size` (columns, rows).
+    out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
+    directions: camera-space, one for each pixel of the picture. Grid coordinates are (p - lower) * scale, or,
+    when contracted, `lower` is the centre, `scale` 1 / half size, and the result is contracted.
 
     boxes: [n_boxes, 2, 3], the deformed-space boxes outside which no edit changes anything. The part of a ray
     that may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `codes`
     are those of the deformed field.
     """
-    across = (width + TILE - 1) // TILE
+    across = (size.x + TILE - 1) // TILE
     qd.loop_config(block_dim=64)
-    for n in range(tiles * TILE * TILE):
-        tile = first_tile + n // (TILE * TILE)
-        i = (tile % across) * TILE + n % TILE
-        j = (tile // across) * TILE + (n // TILE) % TILE
-        if i < width and j < height:
-            pixel = j * width + i
+    for n in range(across * rows * TILE * TILE):
+        tile = n // (TILE * TILE)
+        x = (tile % across) * TILE + n % TILE
+        y = (first_row + tile // across) * TILE + (n // TILE) % TILE
+        if x < size.x and y < size.y:
+            pixel = (corner.y + y) * width + corner.x + x
             d = rotation @ vec3(directions[3 * pixel], directions[3 * pixel + 1], directions[3 * pixel + 2])
             basis = sh_basis(d, K)
             go = (origin - lower) * scale
@@ -179,7 +182,7 @@ def march_tiles(
                                             )
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
-            at = 8 * pixel
+            at = 8 * (y * size.x + x)
             for a in qd.static(range(3)):
                 out[at + a] = rgb[a]
                 out[at + 5 + a] = normal[a]

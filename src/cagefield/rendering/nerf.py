@@ -79,11 +79,15 @@ def render_nerf(
     edits: Any = None,
     background: Background = "white",
     chunk: int = 2048,
+    preserve_opacity: bool = True,
 ) -> Frame:
-    """Frame of a NerfField seen by a camera through an edit stack, `chunk` rays at a time."""
+    """Frame of a NerfField seen by a camera through an edit stack, `chunk` rays at a time.
+
+    `preserve_opacity` multiplies sigma by |J d|, which keeps optical depth under the edits' stretch.
+    """
+    rays = Rays.of(camera, field.torch.device)
     premultiplied, opacity, depth = (
-        values.cpu().numpy()
-        for values in trace(field.torch, Rays.of(camera, field.torch.device), edits, chunk)
+        values.cpu().numpy() for values in trace(field.torch, rays, edits, chunk, preserve_opacity)
     )
     shape = (camera.height, camera.width)
     return Frame.from_premultiplied(
@@ -92,10 +96,12 @@ def render_nerf(
 
 
 def trace(
-    field: TorchNerf, rays: Rays, edits: Any = None, chunk: int = 2048
+    field: TorchNerf, rays: Rays, edits: Any = None, chunk: int = 2048, preserve_opacity: bool = True
 ) -> tuple[Tensor, Tensor, Tensor]:
     """(premultiplied colour [N,3], opacity [N], depth [N]) of rays; depth is inf at opacity 0."""
-    mapped = TensorMap(edits, field.device) if edits is not None and len(edits.active) else None
+    mapped = None
+    if edits is not None and len(edits.active):
+        mapped = TensorMap(edits, field.device, preserve_opacity=preserve_opacity)
     parts = []
     with torch.no_grad():
         for start in range(0, len(rays.origins), chunk):
@@ -185,12 +191,12 @@ def _integrate(
     t, rate, seen = _along(field.field, rays, s)
     points = (rays.origins[:, None] + t[..., None] * rays.directions[:, None]).reshape(-1, 3)
     viewdirs = rays.directions[:, None].expand(*s.shape, 3).reshape(-1, 3)
-    emptied = None
+    gain = None
     if mapped is not None:
-        points, viewdirs, emptied = mapped(points, viewdirs)
+        points, viewdirs, gain = mapped(points, viewdirs)
     sigma, rgb = field(points, viewdirs, network, 0.0 if jitter is None else jitter.noise)
-    if emptied is not None:
-        sigma = torch.where(emptied, torch.zeros_like(sigma), sigma)
+    if gain is not None:
+        sigma = sigma * gain
     sigma = torch.where(seen[:, None], sigma.reshape(s.shape), torch.zeros_like(s))
     delta = torch.cat([s[:, 1:] - s[:, :-1], torch.full_like(s[:, :1], ENDLESS)], dim=1) * rate
     alpha = 1.0 - torch.exp(-sigma * delta)

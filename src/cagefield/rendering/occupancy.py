@@ -21,6 +21,8 @@ from cagefield.fields.voxel import VoxelField
 
 BRICK = 4
 MAX_LEAP = 16
+FEW = 4
+"""Leaps up to which distances are found by growing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,23 +41,46 @@ class Occupancy:
     codes: NDArray[np.int32]
 
     @classmethod
-    def from_blocks(cls, origin: NDArray[np.int64], blocks: NDArray[np.bool_]) -> Occupancy:
-        """The occupancy with these sub-blocks occupied."""
-        return cls(origin, blocks, encode(blocks))
+    def from_blocks(
+        cls, origin: NDArray[np.int64], blocks: NDArray[np.bool_], leap: int = MAX_LEAP
+    ) -> Occupancy:
+        """The occupancy with these sub-blocks occupied; rays leap over at most `leap` bricks at a time."""
+        return cls(origin, blocks, encode(blocks, leap))
 
 
-def encode(blocks: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Brick codes [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz]."""
+def encode(blocks: NDArray[np.bool_], leap: int = MAX_LEAP) -> NDArray[np.int32]:
+    """Brick codes [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz], D at most `leap`."""
     bx, by, bz = (n // 2 for n in blocks.shape)
     split = blocks.reshape(bx, 2, by, 2, bz, 2)
-    mask = np.zeros((bx, by, bz), np.int32)
+    mask = np.zeros((bx, by, bz), np.uint8)
     for bit in range(8):
-        mask |= split[:, bit >> 2 & 1, :, bit >> 1 & 1, :, bit & 1].astype(np.int32) << bit
+        mask |= split[:, bit >> 2 & 1, :, bit >> 1 & 1, :, bit & 1].view(np.uint8) << bit
     empty = mask == 0
     if empty.all():
-        return np.full(mask.shape, 256 * MAX_LEAP, np.int32)
-    distance = np.minimum(ndimage.distance_transform_cdt(empty, metric="chessboard"), MAX_LEAP)
+        return np.full(mask.shape, 256 * leap, np.int32)
+    distance = _few_distances(empty, leap) if leap <= FEW else _distances(empty, leap)
     return np.where(empty, 256 * distance, mask).astype(np.int32)
+
+
+def _distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
+    """Chebyshev distances to what is not empty, at most `most`."""
+    return np.minimum(ndimage.distance_transform_cdt(empty, metric="chessboard"), most).astype(np.int32)
+
+
+def _few_distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
+    """The same by growing what is not empty, brick by brick: sooner for a `most` of a few."""
+    distance = np.ones(empty.shape, np.int32)
+    near = ~empty
+    for _ in range(1, most):
+        for axis in range(3):
+            grown = near.copy()
+            to, off = [slice(None)] * 3, [slice(None)] * 3
+            to[axis], off[axis] = slice(1, None), slice(None, -1)
+            grown[tuple(to)] |= near[tuple(off)]
+            grown[tuple(off)] |= near[tuple(to)]
+            near = grown
+        distance += ~near
+    return np.where(empty, distance, 0)
 
 
 def of_field(field: VoxelField, threshold: float = 0.0) -> Occupancy:

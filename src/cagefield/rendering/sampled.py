@@ -82,7 +82,7 @@ def render_sampled(
     near: float = 0.0,
     far: float | None = None,
     normals: bool = False,
-    preserve_opacity: bool = False,
+    preserve_opacity: bool = True,
     chunk: int = 1 << 19,
 ) -> Frame:
     """Frame of a field seen by a camera, from `samples` midpoints on each ray's piece inside the bounds.
@@ -90,7 +90,8 @@ def render_sampled(
     The piece is the ray's intersection with field.bounds (united with edits.bounds), cut to [near, far].
     A field without `bounds` needs `far`. Normals are minus the normalised gradient of sigma by central
     differences in deformed space, weighted like the colour. `preserve_opacity` multiplies sigma by |J d|,
-    which keeps optical depth under the edits' stretch. `chunk` is the number of samples held at a time.
+    which keeps optical depth under the edits' stretch; without it (the paper) a surface that is pressed
+    together lets light through. `chunk` is the number of samples held at a time.
     The error falls with the square of the step for smooth fields, with the step where sigma jumps.
 
     Raises FieldError when neither bounds nor far is known, or the field returns wrong shapes.

@@ -23,9 +23,17 @@ class TensorMap:
     same memory, which it takes faster; `as_tensors` hands it tensors there too.
     """
 
-    def __init__(self, edits: PackedStack, device: torch.device, *, as_tensors: bool = False) -> None:
+    def __init__(
+        self,
+        edits: PackedStack,
+        device: torch.device,
+        *,
+        preserve_opacity: bool = True,
+        as_tensors: bool = False,
+    ) -> None:
         packed = DeviceStack.from_stack(edits)
         self.device = device
+        self.preserve_opacity = preserve_opacity
         self._as_arrays = device.type == "cpu" and not as_tensors
         self.count, self.flows = packed.n_edits, packed.has_flows
         self._params = self._argument(packed.params)
@@ -35,19 +43,30 @@ class TensorMap:
         return values if self._as_arrays else torch.from_numpy(values.copy()).to(self.device)
 
     def __call__(self, points: Any, viewdirs: Any) -> tuple[Any, Any, Any]:
-        """(canonical points [N,3], unit viewdirs [N,3], emptied [N]) of deformed samples [N,3]."""
+        """(canonical points [N,3], unit viewdirs [N,3], gain [N]) of deformed samples [N,3].
+
+        Density is multiplied by the gain: 0 where a sample is emptied, else 1, or |J d| to preserve opacity.
+        """
         devices.start()
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
         if len(samples):
             arguments = [values.numpy() if self._as_arrays else values for values in (samples, out)]
-            _map_tensors(*arguments, self._params, self._lattice, self.count, self.flows)
-        return out[:, :3], out[:, 3:6], out[:, 6] > 0.5
+            _map_tensors(
+                *arguments, self._params, self._lattice, self.count, self.flows, self.preserve_opacity
+            )
+        return out[:, :3], out[:, 3:6], out[:, 6]
 
 
 @qd.kernel
 def _map_tensors(
-    samples: Table, out: Table, params: Table, lattice: Nodes, n_edits: qd.i32, flows: qd.template()
+    samples: Table,
+    out: Table,
+    params: Table,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
+    preserve_opacity: qd.template(),
 ):
     for i in range(samples.shape[0]):
         d = read3(samples, i, 3)
@@ -57,4 +76,8 @@ def _map_tensors(
         for a in qd.static(range(3)):
             out[i, a] = q[a]
             out[i, 3 + a] = d[a] if unchanged else v[a] / length
-        out[i, 6] = qd.cast(emptied, qd.f32)
+        gain = 1.0 - qd.cast(emptied, qd.f32)
+        if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
+            if not unchanged:
+                gain *= length / qd.max(d.norm(), 1e-20)
+        out[i, 6] = gain

@@ -4,7 +4,7 @@ A run is a sequence of stages. Each stage is a grid: the stored vertices of the 
 largest weight they got in any training ray, cropped to what is left (bounded scenes) and refined. Within a
 stage, batches of pixel patches are marched (`kernels.march_batch`) and every voxel that they met is updated
 (`kernels.gauss_newton`). Patches that meet no occupied block any more are left out of the batches: their
-gradients are zero.
+gradients are zero. At the end, specks are taken out of a bounded scene's field.
 
 On a CPU a run of given `steps` gives the same field for the same seed and number of threads.
 """
@@ -33,6 +33,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress, Snapshots
+from cagefield.training.specks import without_specks
 
 if TYPE_CHECKING:
     from cagefield.training.grid_state import GridState
@@ -161,14 +162,14 @@ def train_voxel(
             if on_progress is not None:
                 on_progress(run.progress())
             if snapshots is not None and snapshots.due(before, (run.step, run.seconds)):
-                snapshots.on_field(run.progress(), run.grid.to_field())
+                snapshots.on_field(run.progress(), run.field())
             if checkpoint is not None and run.seconds - saved > 60.0:
                 run.store(checkpoint)
                 saved = run.seconds
         finished = run.done >= 1.0
         if checkpoint is not None and not finished:
             run.store(checkpoint)
-    field = run.grid.to_field()
+    field = run.field()
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
@@ -490,6 +491,11 @@ class _Run:
         return np.asarray(gains / gains.mean(axis=0), np.float32)
 
     # -- reports and checkpoints ------------------------------------------------------------------------
+
+    def field(self) -> VoxelField:
+        """The field as it is now; that of a bounded scene without specks."""
+        field = self.grid.to_field()
+        return field if self.contracted else without_specks(field)
 
     def progress(self) -> Progress:
         """Where the run stands."""

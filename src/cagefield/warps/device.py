@@ -118,17 +118,12 @@ class DeviceStack:
         offset = 0
         for number, edit in enumerate(edits):
             row = params[number]
-            _pack(row, edit)
+            row[:] = _kept(_rows, edit, partial(_packed, edit))
             warp = edit.exact_warp
-            if edit.lattice is not None and isinstance(warp, ContinuousWarp):
+            if row[RESOLUTION] > 0.0:
                 nodes = _lattice(edit, row)
-                row[RESOLUTION] = edit.lattice
-                row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
-                row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
-                row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
             elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
                 nodes = _kept(_tables, edit, partial(flow_device.table, warp.shell))
-                row[RESOLUTION] = FLOW
             else:
                 continue
             row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
@@ -139,7 +134,7 @@ class DeviceStack:
             nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
-        boxes = np.concatenate([np.zeros((0, 2, 3))] + [_widened(edit.boxes) for edit in edits])
+        boxes = np.concatenate([np.zeros((0, 2, 3))] + [widened(edit.boxes) for edit in edits])
         packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
             array.setflags(write=False)
@@ -476,6 +471,7 @@ def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, fra
 _Kept: TypeAlias = "WeakKeyDictionary[Any, NDArray[np.float32]]"
 _lattices: _Kept = WeakKeyDictionary()
 _tables: _Kept = WeakKeyDictionary()
+_rows: _Kept = WeakKeyDictionary()
 
 
 def _kept(kept: _Kept, edit: PackedEdit, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:
@@ -489,8 +485,25 @@ def _kept(kept: _Kept, edit: PackedEdit, make: Callable[[], NDArray[np.float32]]
 
 
 def _lattice(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The nodes [R^3,3] of a continuous edit's lattice, from its packed row with resolution 0."""
+    """The nodes [R^3,3] of a continuous edit's lattice, from its packed row.
+
+    The row is not looked at for a flow shell.
+    """
     return _kept(_lattices, edit, lambda: _sampled(edit, row))
+
+
+def flow_lattice_of(edit: PackedEdit) -> Lattice:
+    """The lattice of an edit with a flow shell, by the kernel, for the float64 reference.
+
+    Raises `DeviceError` where no device starts, `EditError` for other edits.
+    """
+    warp = edit.exact_warp
+    if not (isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell)) or edit.lattice is None:
+        raise EditError("only an edit with a flow shell and a lattice has a flow lattice")
+    nodes = _lattice(edit, np.zeros(WIDTH, dtype=np.float32))
+    origin, frame = warp.outer.frame
+    R = edit.lattice
+    return Lattice(origin, frame, nodes.reshape(R, R, R, 3).astype(np.float64))
 
 
 def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -498,14 +511,15 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     if not isinstance(warp, ContinuousWarp) or resolution is None:
         raise EditError("only a continuous edit has a lattice")
     devices.start()
-    origin, frame = warp.outer.frame
-    nodes = np.empty((resolution**3, 3), dtype=np.float32)
-    place = (vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
-    params = np.ascontiguousarray(row[None])
     if isinstance(warp.shell, FlowShell):
         strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
         return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
-    elif not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
+    origin, frame = warp.outer.frame
+    nodes = np.empty((resolution**3, 3), dtype=np.float32)
+    place = (vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    params = row[None].copy()
+    params[0, [RESOLUTION, SIMPLE]] = 0.0
+    if not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
         nodes[:] = lattice.displacement.reshape(-1, 3)
     else:
@@ -513,10 +527,25 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     return nodes
 
 
+def _packed(edit: PackedEdit) -> NDArray[np.float32]:
+    """The row of an edit, but for what depends on the others in its stack."""
+    row = np.zeros(WIDTH, dtype=np.float32)
+    _pack(row, edit)
+    warp = edit.exact_warp
+    if edit.lattice is not None and isinstance(warp, ContinuousWarp):
+        row[RESOLUTION] = edit.lattice
+        row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
+        row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
+        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
+    elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+        row[RESOLUTION] = FLOW
+    return row
+
+
 def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
     """Write an edit into its row of `params`, with its shell exact."""
     boxes = edit.boxes
-    row[BOX : BOX + 6] = _widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
     warp = edit.exact_warp
     if isinstance(warp, DiscreteWarp):
         row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.keep_source else 2
@@ -565,7 +594,8 @@ def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
     return bool(meets.all(axis=1).any())
 
 
-def _widened(boxes: Array) -> Array:
+def widened(boxes: Array) -> Array:
+    """Boxes [B,2,3] made larger by what float32 samples may be off."""
     rounding = 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)
     slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + rounding[:, None]
     return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)

@@ -62,10 +62,10 @@ class Extended:
         """x [N,3] of coordinates xi [N,3]."""
         return self.centre + (xi + bend(self.bend, xi.clip(-1.0, 1.0))) @ self.frame.T
 
-    def coordinates(self, points: Array, start: Array | None = None) -> Array:
-        """xi [N,3] of points [N,3], by Newton's method from xi = start."""
+    def coordinates(self, points: Array, start: Array | None = None, enough: float = 1e-14) -> Array:
+        """xi [N,3] of points [N,3], by Newton's method from xi = start; see `straighten`."""
         y = (points - self.centre) @ self.inverse.T
-        return y if self.is_affine else straighten(self.bend, y, start)
+        return y if self.is_affine else straighten(self.bend, y, start, enough)
 
     def gradient(self, xi: Array) -> Array:
         """dxi/dx [N,3,3] at xi [N,3]; at a kink that of the side towards the cage's inside."""
@@ -126,13 +126,16 @@ def straightened_slope(K: Array, xi: Array) -> Array:
     return np.eye(3) + bend_slope(K, xi.clip(-1.0, 1.0)) * inside[:, None, :]
 
 
-def straighten(K: Array, y: Array, start: Array | None = None) -> Array:
-    """xi [N,3] with xi + B(clamp(xi)) = y [N,3], by a damped Newton's method from `start` (else from y)."""
+def straighten(K: Array, y: Array, start: Array | None = None, enough: float = 1e-14) -> Array:
+    """xi [N,3] with xi + B(clamp(xi)) = y [N,3], by a damped Newton's method from `start` (else from y).
+
+    It ends where what is left is `enough`, as a share of 1 + |y|.
+    """
     target = np.ascontiguousarray(y.T)  # components first: numpy's inner loops are long
     xi = target.copy() if start is None else start.T.copy()
     residual = _residual(K, xi, target)
     size = np.abs(residual).max(axis=0)
-    arrived = 1e-14 * (1.0 + np.abs(target).max(axis=0))
+    arrived = enough * (1.0 + np.abs(target).max(axis=0))
     rows = np.flatnonzero(size > arrived)
     for _ in range(60):
         if len(rows) == 0:

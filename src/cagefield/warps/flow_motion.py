@@ -173,7 +173,7 @@ class Motion:
         c, F, *_ = self.frames(t, shrink)
         xi = SIGNS if self.confines.is_affine else _SURFACE[:26]
         x = c[:, None] + self._straightened(t, xi) @ np.transpose(F, (0, 2, 1))
-        z = self.confines.coordinates(x.reshape(-1, 3))
+        z = self.confines.coordinates(x.reshape(-1, 3), enough=1e-7)
         return 1.0 - np.abs(z).max(axis=1).reshape(x.shape[:2]).max(axis=1)
 
     @cached_property
@@ -203,7 +203,7 @@ def gaps(corners: Array, confines: Extended, points: int = 124) -> Array:
     Exact in an affine outer cage, where the corners are nearest; else at 124 points of the faces, or 8.
     """
     x = corners if confines.is_affine or points == 8 else _WEIGHTS @ corners
-    z = confines.coordinates(x.reshape(-1, 3))
+    z = confines.coordinates(x.reshape(-1, 3), enough=1e-7)
     return 1.0 - np.abs(z).max(axis=1).reshape(x.shape[:2]).max(axis=1)
 
 

@@ -106,7 +106,7 @@ class FlowShell:
     @cached_property
     def _strained(self) -> tuple[Array, Array]:
         """(times, strain up to each of them)."""
-        t = np.linspace(0.0, 1.0, 65 if self.motion.confines.is_affine else 33)
+        t = np.linspace(0.0, 1.0, 65 if self.motion.confines.is_affine else 17)
         z, dz = self.motion.surface(t)
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)

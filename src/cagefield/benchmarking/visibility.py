@@ -15,7 +15,8 @@ from cagefield.datasets.procedural.tracing import trace
 Mask = NDArray[np.bool_]
 
 REACH = 0.008
-"""A surface counts as shown where a photo's ray ends within this distance of it, in world units: a voxel."""
+"""A photo's ray may end within this distance of a surface, in world units: a voxel. It is followed to a point
+so far above it: what is seen through a gap narrower than that, a pixel or less, no photo resolves."""
 
 
 def unseen(
@@ -28,7 +29,8 @@ def unseen(
     """Pixels [H,W] of `moved` whose surface none of the photos of `photographed` showed.
 
     `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
-    centre is followed to its surface, and that point of its part back to where the photos were taken.
+    centre is followed to its surface, and that point of its part back to where the photos were taken. A photo
+    shows it where its ray comes to REACH above it.
     Only pixels of the mask `where` [H,W] are looked at; others, and those without a surface, are False.
     """
     shape = (camera.height, camera.width)
@@ -37,10 +39,16 @@ def unseen(
     hits = trace(moved.placed, camera.origin, directions)
     met = np.flatnonzero(hits.primitive >= 0)
     points = camera.origin[:, None] + hits.t[met] * directions[:, met].astype(np.float64)
+    normals = np.zeros_like(points)
     for index, placed in enumerate(moved.placed):
         rows = np.flatnonzero(hits.primitive[met] == index)
+        instance = hits.instance[met[rows]]
+        local = placed.local(np.ascontiguousarray(points[:, rows], np.float32), instance)
+        normals[:, rows] = placed.world_gradient(placed.local_gradient(local, instance), instance)
         back = _original(placed.part, photographed).motion @ np.linalg.inv(placed.part.motion)
         points[:, rows] = back[:3, :3] @ points[:, rows] + back[:3, 3:]
+        normals[:, rows] = np.linalg.inv(back[:3, :3]).T @ normals[:, rows]
+    points += REACH * normals / np.maximum(np.linalg.norm(normals, axis=0), 1e-12)
     hidden = np.ones(len(met), bool)
     for photo in photos:
         rows = np.flatnonzero(hidden)

@@ -1,0 +1,184 @@
+"""Keyframed camera paths: cameras with a time between them, and how far each edit has gone at each.
+
+Between keys the eye runs on a natural cubic spline, the direction on a rotation spline, and the field of view
+and the edits' parts on monotone cubics, which never leave the range of the keys beside them. A loop goes from
+the last key back to the first one, smoothly. The files are nerfstudio's camera paths, keyframes included; the
+edits' parts and a key's seconds stand in them under names that nerfstudio passes over.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from cagefield.cameras import Camera
+from cagefield.errors import CameraError
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """A camera (c2w [16] row by row, vertical field of view), the seconds to the next one, the edits' parts.
+
+    `parts` names edits by their number in the list from 1; those that are not named have gone all the way, 1.
+    """
+
+    c2w: tuple[float, ...]
+    fov_y_deg: float
+    seconds: float = 2.0
+    parts: Mapping[int, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
+        if len(self.c2w) != 16 or not all(map(math.isfinite, self.c2w)):
+            raise CameraError("a keyframe's c2w must hold 16 finite numbers, row by row")
+        if not 0.0 < self.fov_y_deg < 180.0:
+            raise CameraError(f"a keyframe's field of view is {self.fov_y_deg}; give 0 to 180 degrees")
+        if not self.seconds > 0.0:
+            raise CameraError(f"a keyframe's seconds are {self.seconds}; give a number above 0")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Keyframe, (self.c2w, self.fov_y_deg, self.seconds, dict(self.parts))
+
+    @property
+    def pose(self) -> Floats:
+        """c2w [4,4]."""
+        return np.array(self.c2w).reshape(4, 4)
+
+
+@dataclass(frozen=True)
+class Still:
+    """One picture of a path: its camera, and the part of each named edit."""
+
+    camera: Camera
+    parts: dict[int, float]
+
+
+def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, height: int) -> tuple[Still, ...]:
+    """The pictures of a path at `fps`, from the first key to the last, or all round with `loop`.
+
+    Raises:
+        CameraError: fewer than one key, or more than 100,000 pictures.
+    """
+    if not keys:
+        raise CameraError("a camera path needs at least one keyframe; record one")
+    if len(keys) == 1:
+        return (_still(keys[0].pose, keys[0].fov_y_deg, dict(keys[0].parts), width, height),)
+    ring = [*keys, keys[0]] if loop else list(keys)
+    times = np.concatenate([[0.0], np.cumsum([key.seconds for key in ring[:-1]])])
+    count = max(2, round(float(times[-1]) * fps) + (0 if loop else 1))
+    if count > 100_000:
+        raise CameraError(f"the camera path has {count} pictures; make it shorter or lower its fps")
+    at = np.linspace(0.0, times[-1], count, endpoint=not loop)
+    eyes = CubicSpline(times, [key.pose[:3, 3] for key in ring], bc_type="periodic" if loop else "natural")(
+        at
+    )
+    turns = _turns([key.pose[:3, :3] for key in ring], times, loop)(at).as_matrix()
+    fovs = PchipInterpolator(times, [key.fov_y_deg for key in ring])(at)
+    names = sorted({name for key in keys for name in key.parts})
+    parts = {
+        name: np.clip(PchipInterpolator(times, [key.parts.get(name, 1.0) for key in ring])(at), 0.0, 1.0)
+        for name in names
+    }
+    found = []
+    for n in range(count):
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = turns[n], eyes[n]
+        here = {name: float(values[n]) for name, values in parts.items()}
+        found.append(_still(pose, float(fovs[n]), here, width, height))
+    return tuple(found)
+
+
+def _turns(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
+    """The rotation spline; a loop is gone round three times, so that its seam is as smooth as the rest."""
+    if not loop:
+        return RotationSpline(times, Rotation.from_matrix(np.stack(matrices)))
+    once, period = np.stack(matrices[:-1]), times[-1]
+    around = np.concatenate([times[:-1] - period, times[:-1], times[:-1] + period, [2.0 * period]])
+    return RotationSpline(around, Rotation.from_matrix(np.concatenate([once, once, once, once[:1]])))
+
+
+def _still(pose: Floats, fov_y_deg: float, parts: dict[int, float], width: int, height: int) -> Still:
+    focal = 0.5 * height / math.tan(0.5 * math.radians(fov_y_deg))
+    return Still(Camera(pose, width, height, focal, focal, 0.5 * width, 0.5 * height), parts)
+
+
+def dump_path(
+    keys: Sequence[Keyframe], *, loop: bool, fps: float = 24.0, width: int = 800, height: int = 800
+) -> str:
+    """The text of a nerfstudio camera-path file: its keyframes, and a camera for each picture."""
+    pictures = stills(keys, loop=loop, fps=fps, width=width, height=height) if keys else ()
+    aspect = width / height
+    document = {
+        "camera_type": "perspective",
+        "render_height": height,
+        "render_width": width,
+        "fps": fps,
+        "seconds": len(pictures) / fps,
+        "is_cycle": loop,
+        "smoothness_value": 0.0,
+        "default_fov": keys[0].fov_y_deg if keys else 50.0,
+        "default_transition_sec": 2.0,
+        "keyframes": [
+            {
+                "matrix": list(key.c2w),
+                "fov": key.fov_y_deg,
+                "aspect": aspect,
+                "override_transition_enabled": True,
+                # nerfstudio's is the time from the key before; the first key's, that of a loop's last leg.
+                "override_transition_sec": keys[n - 1].seconds,
+                "cagefield_parts": {str(name): part for name, part in key.parts.items()},
+            }
+            for n, key in enumerate(keys)
+        ],
+        "camera_path": [
+            {
+                "camera_to_world": still.camera.c2w.reshape(-1).tolist(),
+                "fov": math.degrees(2.0 * math.atan(0.5 * height / still.camera.fy)),
+                "aspect": aspect,
+            }
+            for still in pictures
+        ],
+    }
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
+    """(keyframes, loop) of a nerfstudio camera-path file. Raises CameraError where it holds none."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        given = document["keyframes"]
+        usual = float(document.get("default_transition_sec", 2.0))
+        keys = tuple(
+            Keyframe(
+                tuple(float(value) for value in key["matrix"]),
+                float(key["fov"]),
+                _seconds(given[(n + 1) % len(given)], usual),
+                {int(name): float(part) for name, part in key.get("cagefield_parts", {}).items()},
+            )
+            for n, key in enumerate(given)
+        )
+        return keys, bool(document.get("is_cycle", False))
+    except CameraError as error:
+        raise CameraError(f"{path}: {error}") from None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise CameraError(
+            f"{path} holds no camera path's keyframes ({error}); remove it or write it again"
+        ) from None
+
+
+def _seconds(key: dict[str, Any], usual: float) -> float:
+    """The time from the key before to this one."""
+    own = key.get("override_transition_sec")
+    return usual if own is None or not key.get("override_transition_enabled", True) else float(own)

@@ -1,0 +1,139 @@
+"""Between what is said on the socket and what is edited: operations, cages, keyframes, the state."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import operations as ops
+from cagefield.edits.operations import Operation
+from cagefield.hexahedron import Array
+from cagefield.keyframes import Keyframe
+from cagefield.server import protocol
+from cagefield.server.document import Entry
+from cagefield.server.kinds import kind_of
+from cagefield.server.moving import Moved, move_corners
+from cagefield.server.protocol import Corners, Vec3
+from cagefield.server.session import Session
+
+
+def operation_of(message: protocol.OperationMessage) -> Operation:
+    """The operation that a message states."""
+    if isinstance(message, protocol.TranslateBy):
+        return ops.Translate(message.by)
+    if isinstance(message, protocol.RotateBy):
+        return ops.Rotate(message.rotation_deg, message.axes)
+    if isinstance(message, protocol.ScaleBy):
+        return ops.Scale.of(message.by, message.axes)
+    if isinstance(message, protocol.ShearBy):
+        return ops.Shear(
+            message.xy, message.xz, message.yx, message.yz, message.zx, message.zy, axes=message.axes
+        )
+    return move_corners(tuple(message.corners), message.by)
+
+
+def camera_of(message: protocol.CameraMessage) -> Camera:
+    """The camera that a page looks from. Raises CameraError for a pose that is not rigid."""
+    focal = 0.5 * message.height / float(np.tan(0.5 * np.radians(message.fov_y_deg)))
+    return Camera(
+        np.array(message.c2w).reshape(4, 4),
+        message.width, message.height, focal, focal, 0.5 * message.width, 0.5 * message.height,
+    )  # fmt: skip
+
+
+def key_of(message: protocol.Key) -> Keyframe:
+    """The keyframe that a message states."""
+    return Keyframe(tuple(message.c2w), message.fov_y_deg, message.seconds, dict(message.parts))
+
+
+def vec3(value: Array) -> Vec3:
+    """A point as a message has it."""
+    x, y, z = value.tolist()
+    return x, y, z
+
+
+def corners(cage: Cage) -> Corners:
+    """A cage as a message has it."""
+    return cast(Corners, tuple(vec3(corner) for corner in cage.corners))
+
+
+def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | None) -> protocol.EditState:
+    """One edit as pages show it; `error` is its lattice's, in voxels."""
+    edit = entry.edit
+    return protocol.EditState(
+        id=entry.id,
+        name=edit.name,
+        colour=entry.colour,
+        enabled=edit.enabled,
+        locked=entry.locked,
+        kind=kind_of(edit),
+        shell=cast(Any, edit.shell),
+        falloff=cast(Any, edit.falloff),
+        width=edit.width,
+        lattice=edit.lattice or 0,
+        lattice_error=error,
+        inner=corners(edit.inner),
+        deformed=corners(edit.deformed),
+        outer=None if edit.outer is None else corners(edit.outer),
+        pivot=vec3(edit.deformed.pivot),
+        inner_pivot=vec3(edit.inner.pivot),
+        outer_pivot=None if edit.outer is None else vec3(edit.outer.pivot),
+        operations=[f"{operation.noun} {operation}" for operation in edit.operations],
+        problem=problem,
+    )
+
+
+def state_of(
+    session: Session, path: str, errors: dict[int, tuple[float, float]] | None = None
+) -> protocol.State:
+    """Everything that pages show of the edits, drags included."""
+    document = session.shown
+    measured = errors or {}
+    return protocol.State(
+        revision=session.revision,
+        edits=[
+            edit_state(entry, session.problem(entry.edit), measured.get(entry.id))
+            for entry in document.entries
+        ],
+        selected=session.selected,
+        history=list(session.history.names),
+        entry=session.history.entry,
+        saved=session.saved,
+        path=path,
+        preserve_opacity=document.preserve_opacity,
+        keys=[
+            protocol.Key(
+                c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts)
+            )
+            for key in document.keys
+        ],
+        loop=document.loop,
+    )
+
+
+def dragged_of(drag: int, seq: int, moved: Moved) -> protocol.Dragged:
+    """What became of a drag."""
+    edit = moved.edit
+    return protocol.Dragged(
+        drag=drag,
+        seq=seq,
+        part=moved.part,
+        why=moved.why,
+        inner=corners(edit.inner),
+        deformed=corners(edit.deformed),
+        outer=None if edit.outer is None else corners(edit.outer),
+    )
+
+
+def view_height(camera: Camera, distance: float) -> float:
+    """Height of what a picture shows at a distance from its camera."""
+    return camera.height / camera.fy * distance
+
+
+def cage_of(corners: Corners, pivot: Array | None = None) -> Cage:
+    """The cage with these corners."""
+    values = np.array(corners)
+    return Cage(values) if pivot is None else Cage(values, pivot=pivot)

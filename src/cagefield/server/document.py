@@ -1,0 +1,109 @@
+"""Document: what an editor's user makes, as one immutable value, so that undo is going back to an old one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.operations import Operation
+from cagefield.errors import EditError
+from cagefield.keyframes import Keyframe
+
+COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
+"""Colours of cage pairs, given out in turn."""
+
+
+@dataclass(frozen=True)
+class Spare:
+    """What an edit of another kind cannot have, kept for when the kind is changed back."""
+
+    operations: tuple[Operation, ...] = ()
+    falloff: str = "smooth"
+    width: float = 1.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An edit in the list: its number (never given out twice), the edit, and how the editor treats it."""
+
+    id: int
+    edit: Edit
+    colour: str
+    locked: bool = False
+    spare: Spare = Spare()
+
+
+@dataclass(frozen=True)
+class Document:
+    """The edits in order, the scene's opacity choice, and the camera path's keyframes."""
+
+    entries: tuple[Entry, ...] = ()
+    preserve_opacity: bool = True
+    keys: tuple[Keyframe, ...] = ()
+    loop: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        edits: Iterable[Edit],
+        *,
+        preserve_opacity: bool = True,
+        keys: tuple[Keyframe, ...] = (),
+        loop: bool = False,
+    ) -> Document:
+        """The document of an edit stack, its edits numbered from 1."""
+        entries = tuple(
+            Entry(number, edit, COLOURS[(number - 1) % len(COLOURS)])
+            for number, edit in enumerate(edits, start=1)
+        )
+        return cls(entries, preserve_opacity, keys, loop)
+
+    @property
+    def stack(self) -> EditStack:
+        """The edits as a stack."""
+        return EditStack(entry.edit for entry in self.entries)
+
+    @property
+    def placed_keys(self) -> tuple[Keyframe, ...]:
+        """The keyframes with edits named by their place in the list from 1, as files have them."""
+        places = {entry.id: place for place, entry in enumerate(self.entries, start=1)}
+        return tuple(
+            replace(key, parts={places[name]: part for name, part in key.parts.items() if name in places})
+            for key in self.keys
+        )
+
+    def place(self, number: int) -> int:
+        """Where in the list the edit of that number is. Raises EditError where it is not there any more."""
+        for at, entry in enumerate(self.entries):
+            if entry.id == number:
+                return at
+        raise EditError(f"edit {number} is not there any more; choose another in the list")
+
+    def entry(self, number: int) -> Entry:
+        """The entry of that number. Raises EditError where it is not there any more."""
+        return self.entries[self.place(number)]
+
+    def has(self, number: int | None) -> bool:
+        """True where there is an edit of that number."""
+        return any(entry.id == number for entry in self.entries)
+
+    def put(self, entry: Entry) -> Document:
+        """The document with an entry replaced by one of the same number."""
+        at = self.place(entry.id)
+        return replace(self, entries=(*self.entries[:at], entry, *self.entries[at + 1 :]))
+
+    def insert(self, entry: Entry, at: int | None = None) -> Document:
+        """The document with one more entry, at a place in the list or its end."""
+        at = len(self.entries) if at is None else at
+        return replace(self, entries=(*self.entries[:at], entry, *self.entries[at:]))
+
+    def without(self, number: int) -> Document:
+        """The document without an entry."""
+        at = self.place(number)
+        return replace(self, entries=self.entries[:at] + self.entries[at + 1 :])
+
+    def moved(self, number: int, to: int) -> Document:
+        """The document with an entry at another place in the list, 0 first."""
+        entry = self.entry(number)
+        return self.without(number).insert(entry, min(to, len(self.entries) - 1))

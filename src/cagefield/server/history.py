@@ -1,0 +1,45 @@
+"""History: every state that was, in order, and where in it we are. Nothing is ever thrown away but what a new
+entry replaces: the entries that had been undone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class History(Generic[T]):
+    """Named states, oldest first, and the number of the present one; entry 0 is the beginning."""
+
+    names: tuple[str, ...]
+    states: tuple[T, ...]
+    entry: int = 0
+
+    @classmethod
+    def begin(cls, state: T, name: str = "Open") -> History[T]:
+        """A history of one state."""
+        return cls((name,), (state,))
+
+    @property
+    def state(self) -> T:
+        """The present state."""
+        return self.states[self.entry]
+
+    def push(self, name: str, state: T) -> History[T]:
+        """One entry more after the present one; what had been undone is gone."""
+        keep = self.entry + 1
+        return History((*self.names[:keep], name), (*self.states[:keep], state), keep)
+
+    def undo(self) -> History[T]:
+        """One entry back; the same at the beginning."""
+        return self.go_to(self.entry - 1)
+
+    def redo(self) -> History[T]:
+        """One entry on; the same at the end."""
+        return self.go_to(self.entry + 1)
+
+    def go_to(self, entry: int) -> History[T]:
+        """The entry of that number, or the nearest there is."""
+        return History(self.names, self.states, min(max(entry, 0), len(self.states) - 1))

@@ -1,0 +1,215 @@
+"""Hub: one session, several pages, one rendering process. Says what is rendered, and to whom it goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from cagefield.cameras import Camera
+from cagefield.server import protocol
+from cagefield.server.chores import Chores
+from cagefield.server.converting import state_of
+from cagefield.server.desk import Chore, Desk, Level, Stamp
+from cagefield.server.keeping import Keeper
+from cagefield.server.outbox import Outbox
+from cagefield.server.scheduler import Look, Request
+from cagefield.server.session import Session
+from cagefield.server.tasks import PictureDone, PictureTask, Shown, Task, values_of
+
+
+@dataclass
+class Page:
+    """An open page: what it looks at and what waits to be sent to it."""
+
+    number: int
+    outbox: Outbox = field(default_factory=Outbox)
+    camera: Camera | None = None
+    look: Look = field(default_factory=Look)
+    drag: int = 0
+    seq: int = 0
+
+    def notice(self, level: Level, text: str) -> None:
+        """A line for this page's user."""
+        self.outbox.put(protocol.Notice(level=level, text=" ".join(text.split())))
+
+
+class Hub:
+    """See the module."""
+
+    def __init__(self, session: Session, keeper: Keeper, device: str = "auto") -> None:
+        self.session = session
+        self.keeper = keeper
+        self.pages: dict[int, Page] = {}
+        self.desk = Desk(str(keeper.origin), device, self)
+        self.chores = Chores(session, keeper, self._measured, self.broadcast)
+        self.greeting: str | None = None
+        """A line for the pages that come."""
+        self._pages = 0
+        self._shown = self._what_is_shown()
+        self._pictures = 0
+        self._trouble: str | None = None
+
+    # ---- pages ----
+
+    def join(self, hello: protocol.Hello) -> Page:
+        """A new page, told what there is."""
+        self._pages += 1
+        page = Page(self._pages)
+        self.pages[page.number] = page
+        self.desk.scheduler.join(page.number)
+        page.outbox.put(hello.model_copy(update={"page": page.number}))
+        page.outbox.put(self.state())
+        if self.greeting is not None:
+            page.notice("info", self.greeting)
+        for job in self.chores.jobs():
+            page.outbox.put(job)
+        return page
+
+    def leave(self, page: Page) -> None:
+        """A page is gone; its drag is given up."""
+        self.pages.pop(page.number, None)
+        self.session.drag_cancel(page.number)
+        self.desk.scheduler.leave(page.number)
+        self.changed()
+
+    def look(self, page: Page, look: Look) -> None:
+        """A page shows another view."""
+        page.look = look
+        self.desk.scheduler.look(page.number, look, time.monotonic())
+        self.pump()
+
+    def camera(self, page: Page, camera: Camera, seq: int, moving: bool) -> None:
+        """A page looks from another camera."""
+        page.camera = camera
+        self.desk.scheduler.camera(page.number, seq, camera.width, camera.height, moving, time.monotonic())
+        self.pump()
+
+    def presented(self, page: Page, picture: int) -> None:
+        """A page has shown a picture."""
+        self.desk.scheduler.presented(page.number, picture)
+        self.desk.pump()
+
+    def notice(self, level: Level, text: str) -> None:
+        """A line for every page."""
+        for page in self.pages.values():
+            page.notice(level, text)
+
+    def broadcast(self, message: protocol.ServerMessage, but: Page | None = None) -> None:
+        """A message for every page, but one."""
+        for page in self.pages.values():
+            if page is not but:
+                page.outbox.put(message)
+
+    # ---- the session ----
+
+    def state(self) -> protocol.State:
+        """Everything that pages show of the edits."""
+        return state_of(self.session, str(self.keeper.path), self.chores.errors())
+
+    def changed(self, but: Page | None = None) -> None:
+        """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
+        self.keeper.autosave(self.session)
+        if self.keeper.trouble is not None and self.keeper.trouble != self._trouble:
+            self.notice("warning", self.keeper.trouble)
+        self._trouble = self.keeper.trouble
+        if any(page is not but for page in self.pages.values()):
+            self.broadcast(self.state(), but)
+        self.pump()
+
+    def save(self) -> None:
+        """Saves what is edited where it came from."""
+        self.keeper.save(self.session)
+        self.notice("info", f"saved to {self.keeper.path}")
+
+    def save_as(self, path: str, overwrite: bool) -> None:
+        """Saves the scene with its edits as another folder, which is edited from then on."""
+        self.keeper.save_as(self.session, path, overwrite)
+        self.desk.worker.scene = str(self.keeper.path)
+        self.notice("info", f"saved to {self.keeper.path}")
+
+    # ---- rendering ----
+
+    async def ask(self, make: Callable[[int], Task]) -> Any:
+        """What the rendering process answers to a task. Raises CagefieldError."""
+        self.desk.interrupt()
+        return await self.desk.ask(make)
+
+    def shown(self) -> Shown:
+        """What pictures show now."""
+        return self._what_is_shown()
+
+    def pump(self) -> None:
+        """Has rendered what is new to see."""
+        shown = self._what_is_shown()
+        if shown != self._shown:
+            self._shown = shown
+            self._pictures += 1
+        self.desk.scheduler.edits(self._pictures, bool(self.session.drags), time.monotonic())
+        if not self.desk.scheduler.idle():
+            self.desk.interrupt()
+        self.desk.pump()
+
+    def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
+        """The task of a picture that the scheduler wants."""
+        page, region = self.pages[request.page], request.region
+        assert page.camera is not None  # the scheduler asks for pictures of pages with a camera alone
+        camera = page.camera.resized(region.full_width, region.full_height)
+        task = PictureTask(
+            request.number,
+            self._shown,
+            camera,
+            region,
+            request.look,
+            request.moving,
+            request.exact,
+            generation,
+        )
+        drag, seq = (page.drag, page.seq) if page.drag else (0, 0)
+        return task, Stamp(self.session.revision, drag, seq)
+
+    def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
+        """A picture for a page."""
+        page = self.pages.get(request.page)
+        if page is not None:
+            page.outbox.put_picture(_packed(request, stamp, done))
+
+    def chore(self) -> Chore | None:
+        """What may be done now that no page waits for anything."""
+        return self.chores.next(self.desk.scheduler.generation)
+
+    def _measured(self) -> None:
+        self.broadcast(self.state())
+
+    def _what_is_shown(self) -> Shown:
+        return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)
+
+
+def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
+    """The binary message of a picture."""
+    region = request.region
+    header = protocol.PictureHeader(
+        picture=request.number,
+        camera=request.camera,
+        drag=stamp.drag,
+        seq=stamp.seq,
+        revision=stamp.revision,
+        view=request.look.view,
+        x=region.x,
+        y=region.y,
+        width=region.width,
+        height=region.height,
+        full_width=region.full_width,
+        full_height=region.full_height,
+        final=request.final,
+        picture_bytes=len(done.picture),
+        depth_bytes=len(done.depth),
+        depth_width=done.depth_size[0],
+        depth_height=done.depth_size[1],
+        depth_scale=done.depth_scale,
+        render_ms=1e3 * done.render_seconds,
+        encode_ms=1e3 * done.encode_seconds,
+    )
+    text = header.model_dump_json().encode()
+    return len(text).to_bytes(4, "little") + text + done.picture + done.depth

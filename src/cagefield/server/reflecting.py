@@ -1,0 +1,77 @@
+"""Mirrored edits: cages and operations across a plane normal to one of the world's axes.
+
+A mirrored cage would be inside out, so its corners are numbered the other way along the axis of that name:
+corner k of the mirrored cage is the mirror image of corner k ^ (1 << axis). Every operation A becomes F A F,
+F the reflection; in the mirrored cage's own axes F has the same signs, so `axes="cage"` keeps its meaning.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cagefield.cages import FACES, Cage
+from cagefield.edits import Edit
+from cagefield.edits import operations as ops
+from cagefield.edits.operations import Operation, Triple
+from cagefield.hexahedron import Array
+
+
+def mirrored(edit: Edit, axis: int, at: float) -> Edit:
+    """The edit across the plane where coordinate `axis` is `at`."""
+    return edit.replace(
+        inner=mirrored_cage(edit.inner, axis, at),
+        outer=None if edit.outer is None else mirrored_cage(edit.outer, axis, at),
+        operations=tuple(mirrored_operation(operation, axis) for operation in edit.operations),
+    )
+
+
+def mirrored_cage(cage: Cage, axis: int, at: float) -> Cage:
+    """The cage across the plane where coordinate `axis` is `at`."""
+    corners = cage.corners[[k ^ 1 << axis for k in range(8)]].copy()
+    pivot = cage.pivot.copy()
+    corners[:, axis] = 2.0 * at - corners[:, axis]
+    pivot[axis] = 2.0 * at - pivot[axis]
+    return Cage(corners, pivot=pivot)
+
+
+def mirrored_operation(operation: Operation, axis: int) -> Operation:
+    """The operation that does to a mirrored cage what this one does to the cage."""
+    if isinstance(operation, ops.Translate):
+        return ops.Translate(_flipped(operation.by, axis))
+    if isinstance(operation, ops.Rotate):
+        F = _reflection(axis)
+        R = Rotation.from_euler("XYZ", operation.degrees, degrees=True).as_matrix()
+        x, y, z = ops.euler_degrees(Rotation.from_matrix(F @ R @ F)).tolist()
+        return ops.Rotate((x, y, z), operation.axes)
+    if isinstance(operation, ops.Scale):
+        return operation
+    if isinstance(operation, ops.Shear):
+        name = "xyz"[axis]
+        values = {pair: -value if name in pair else value for pair, value in operation.factors.items()}
+        return ops.Shear(**values, axes=operation.axes)
+    by = _flipped(operation.by, axis)
+    if isinstance(operation, ops.MoveCorner):
+        return ops.MoveCorner(operation.corner ^ 1 << axis, by)
+    if isinstance(operation, ops.MoveEdge):
+        i, j = sorted(k ^ 1 << axis for k in operation.edge)
+        return ops.MoveEdge((i, j), by)
+    if isinstance(operation, ops.MoveFace):
+        return ops.MoveFace(_other_face(operation.face, axis), by)
+    return ops.MoveCorners(tuple(k ^ 1 << axis for k in operation.corners), by)
+
+
+def _other_face(face: str, axis: int) -> str:
+    corners = {k ^ 1 << axis for k in FACES[face]}
+    return next(name for name, ids in FACES.items() if set(ids) == corners)
+
+
+def _flipped(by: Triple, axis: int) -> Triple:
+    x, y, z = (-value if n == axis else value for n, value in enumerate(by))
+    return x, y, z
+
+
+def _reflection(axis: int) -> Array:
+    F = np.eye(3)
+    F[axis, axis] = -1.0
+    return F

@@ -1,0 +1,121 @@
+"""Who may talk to the editor: checks of Host, Origin and token, and a limit on how much a page may say.
+
+Pages of other sites can make a browser send requests here, with any path and with our cookies. They cannot
+choose `Origin`; a name of theirs that resolves to this machine (DNS rebinding) shows in `Host`. Both must be
+ours. Other machines reach the server only where it was told to listen to them, and then need the token.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+import socket
+from collections.abc import Mapping
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+def new_token() -> str:
+    """A token that nobody guesses."""
+    return secrets.token_urlsafe(24)
+
+
+def is_loopback(host: str) -> bool:
+    """True for names and addresses of this machine that no other machine reaches."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+@dataclass(frozen=True)
+class Guard:
+    """What is checked of every request. `token` None lets everybody in who passes the other checks."""
+
+    host: str
+    port: int
+    token: str | None = None
+
+    @property
+    def cookie(self) -> str:
+        """The name of the cookie that holds the token; browsers share cookies between ports."""
+        return f"cagefield_{self.port}"
+
+    def refusal(
+        self,
+        headers: Mapping[str, str],
+        cookies: Mapping[str, str],
+        query: Mapping[str, str],
+        *,
+        needs_origin: bool,
+    ) -> str | None:
+        """Why a request is refused, in a line, or None. Headers have lower-case names.
+
+        A socket must say its origin; other requests may, and then it must be ours too.
+        """
+        host = headers.get("host", "")
+        if not self._is_ours(host):
+            return f"this editor does not answer to {host!r}; open the link that `cagefield view` printed"
+        origin = headers.get("origin")
+        if (origin is not None or needs_origin) and not _same_origin(origin, host):
+            return f"the page at {origin!r} may not talk to this editor; open the link that was printed"
+        if self.token is None:
+            return None
+        given = query.get("token") or cookies.get(self.cookie) or ""
+        if not hmac.compare_digest(given.encode(), self.token.encode()):
+            return (
+                "the token is missing or wrong; open the link that `cagefield view` printed, ?token= included"
+            )
+        return None
+
+    def _is_ours(self, host: str) -> bool:
+        try:
+            parts = urlsplit(f"//{host}")
+            name, port = parts.hostname, parts.port
+        except ValueError:
+            return False
+        if name is None or (port is not None and port != self.port):
+            return False
+        if is_loopback(self.host):
+            return is_loopback(name)
+        return name in (*LOOPBACK, self.host.lower(), socket.gethostname().lower()) or _is_address(name)
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _same_origin(origin: str | None, host: str) -> bool:
+    if not origin:
+        return False
+    parts = urlsplit(origin)
+    return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
+
+
+@dataclass
+class Allowance:
+    """A bucket that fills at `rate` messages a second up to `burst`; every message takes one out."""
+
+    rate: float = 400.0
+    burst: float = 800.0
+    level: float = 800.0
+    last: float | None = None
+
+    def take(self, now: float) -> bool:
+        """True where one more message may be heard at this time, seconds of any clock."""
+        if self.last is not None:
+            self.level = min(self.burst, self.level + self.rate * (now - self.last))
+        self.last = now
+        if self.level < 1.0:
+            return False
+        self.level -= 1.0
+        return True

@@ -1,0 +1,297 @@
+"""Scheduler: which picture is rendered next, for which page, how large. A state machine that knows no clock,
+no web and no renderer: it is told what happens and when, and asked for the next picture.
+
+- While anything moves (a camera, a drag) pictures of the whole view come at the resolution that the measured
+  speed allows; each shows the newest input, older input that no picture showed is passed over.
+- At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
+  anything changes.
+- A page is owed a picture only while fewer than two of its pictures are on their way.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+from cagefield.server.protocol import View
+
+MOST_UNSHOWN = 2
+"""Pictures sent and not yet shown, at most, per page."""
+
+MOVING_SECONDS = 0.055
+"""Time that a picture may take while something moves."""
+
+TILE_SECONDS = 0.12
+"""Time that a tile may take at rest."""
+
+SETTLE_SECONDS = 0.12
+"""How long nothing may have changed before the view counts as at rest."""
+
+MOST_TILES = 16
+"""Tiles of a view, at most."""
+
+LEAST_SIDE = 96
+"""Shorter side of the smallest moving picture, pixels."""
+
+SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
+"""Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
+
+FIRST_RATE = 4e5
+"""Rays a second before any was measured."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What of the scene is shown: a view, and where the edits are left out: `before` and `split`."""
+
+    view: View = "colour"
+    before: bool = False
+    split: float | None = None
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of a picture of `full` (width, height), pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+    full_width: int
+    full_height: int
+
+
+@dataclass(frozen=True)
+class Request:
+    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view."""
+
+    number: int
+    page: int
+    camera: int
+    revision: int
+    look: Look
+    region: Region
+    moving: bool
+    exact: bool
+    final: bool
+
+
+@dataclass
+class _Page:
+    """What is known of a page."""
+
+    width: int = 0
+    height: int = 0
+    camera: int = -1
+    moving: bool = False
+    look: Look = field(default_factory=Look)
+    unshown: list[int] = field(default_factory=list)
+    changed: float = -math.inf
+    """When its view changed last."""
+    version: int = 0
+    """Counts changes of the view."""
+    shown_version: int = -1
+    """The version that the last picture of the whole view shows."""
+    tiles: list[Region] | None = None
+    """Tiles of the present version that are still to come; None before they are cut."""
+    tiles_exact: bool = False
+    served: float = -math.inf
+
+
+class Scheduler:
+    """See the module. Times are seconds of any one clock."""
+
+    def __init__(self) -> None:
+        self._pages: dict[int, _Page] = {}
+        self._numbers = 0
+        self._rate = FIRST_RATE
+        self._overhead = 0.0
+        self._dragging = False
+        self._revision = 0
+        self._running: tuple[Request, int] | None = None
+        self.generation = 0
+        """Grows when a tile that is being rendered is no longer wanted."""
+
+    # ---- what happens ----
+
+    def join(self, page: int) -> None:
+        """A page is open."""
+        self._pages[page] = _Page()
+
+    def leave(self, page: int) -> None:
+        """A page is closed."""
+        self._pages.pop(page, None)
+        if self._running is not None and self._running[0].page == page:
+            self.generation += 1
+
+    def camera(self, page: int, seq: int, width: int, height: int, moving: bool, now: float) -> None:
+        """A page looks from another camera, or its camera stops."""
+        p = self._pages[page]
+        if p.camera == seq and (p.width, p.height) == (width, height):
+            p.moving = moving
+            return
+        p.camera, p.width, p.height, p.moving = seq, width, height, moving
+        self._changed(page, now)
+
+    def look(self, page: int, look: Look, now: float) -> None:
+        """A page shows another view."""
+        if self._pages[page].look != look:
+            self._pages[page].look = look
+            self._changed(page, now)
+
+    def edits(self, revision: int, dragging: bool, now: float) -> None:
+        """The edits' picture is another one, or a drag begins or ends.
+
+        Where a drag ends with what is shown already, the whole picture comes at once.
+        """
+        if revision == self._revision and dragging == self._dragging:
+            return
+        let_go = revision == self._revision and not dragging
+        self._revision, self._dragging = revision, dragging
+        for page, p in self._pages.items():
+            was_shown = p.shown_version == p.version
+            self._changed(page, now)
+            if let_go and was_shown:
+                p.shown_version, p.changed = p.version, -math.inf
+
+    def presented(self, page: int, picture: int) -> None:
+        """A page has shown a picture, and all that were sent before it."""
+        p = self._pages.get(page)
+        if p is not None:
+            p.unshown = [number for number in p.unshown if number > picture]
+
+    def finished(self, request: Request, rays: int, seconds: float, overhead: float) -> None:
+        """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
+        self._running = None
+        region = request.region
+        if (region.width, region.height) == (region.full_width, region.full_height):
+            # A tile may be empty, and says nothing of how long the whole picture takes.
+            self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
+        if request.moving:
+            self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
+        page = self._pages.get(request.page)
+        if page is not None:
+            page.unshown.append(request.number)
+
+    def abandoned(self, request: Request, again: bool) -> None:
+        """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
+        running, self._running = self._running, None
+        page = self._pages.get(request.page)
+        if again and page is not None and running is not None and page.version == running[1]:
+            page.tiles, page.shown_version = None, -1
+
+    def refresh(self, now: float) -> None:
+        """Everything is to be rendered anew."""
+        for page in self._pages:
+            self._changed(page, now)
+
+    # ---- what is next ----
+
+    def next(self, now: float) -> Request | None:
+        """The picture to render now; None where nothing is owed, or one is being rendered."""
+        if self._running is not None:
+            return None
+        waiting = sorted(
+            (not self._owes_moving(p), p.served, page)
+            for page, p in self._pages.items()
+            if p.camera >= 0 and len(p.unshown) < MOST_UNSHOWN
+        )
+        for _, _, page in waiting:
+            request = self._request(page, now)
+            if request is not None:
+                self._pages[page].served = now
+                self._running = (request, self._pages[page].version)
+                return request
+        return None
+
+    def wake(self, now: float) -> float | None:
+        """Seconds until `next` may have something without anything happening; None: not before."""
+        if self._running is not None:
+            return None
+        waits = [
+            p.changed + SETTLE_SECONDS - now
+            for p in self._pages.values()
+            if p.camera >= 0 and p.tiles != [] and not p.moving and len(p.unshown) < MOST_UNSHOWN
+        ]
+        return max(0.0, min(waits)) if waits else None
+
+    def unshown(self, page: int) -> int:
+        """How many pictures are on their way to a page."""
+        return len(self._pages[page].unshown)
+
+    def idle(self) -> bool:
+        """True where no page waits for a picture, or can be sent one."""
+        return self._running is None and all(
+            p.camera < 0 or len(p.unshown) >= MOST_UNSHOWN or (p.tiles == [] and not p.moving)
+            for p in self._pages.values()
+        )
+
+    # ---- inside ----
+
+    def _changed(self, page: int, now: float) -> None:
+        p = self._pages[page]
+        p.changed = now
+        p.version += 1
+        p.tiles = None
+        if self._running is not None and not self._running[0].moving and self._running[0].page == page:
+            self.generation += 1
+
+    def _owes_moving(self, p: _Page) -> bool:
+        return p.shown_version != p.version
+
+    def _request(self, page: int, now: float) -> Request | None:
+        p = self._pages[page]
+        if self._owes_moving(p):
+            scale = self._scale(p)
+            if scale < 1.0 or p.moving or self._dragging:
+                p.shown_version = p.version
+                return self._picture(page, scale)
+            p.shown_version = p.version
+            p.tiles, p.tiles_exact = self._tiles(p), True
+        if p.tiles is None:
+            if p.moving or now - p.changed < SETTLE_SECONDS:
+                return None
+            p.tiles, p.tiles_exact = self._tiles(p), not self._dragging
+        if not p.tiles:
+            return None
+        region = p.tiles.pop(0)
+        return self._ask(page, region, moving=False, exact=p.tiles_exact, final=not p.tiles)
+
+    def _picture(self, page: int, scale: float) -> Request:
+        p = self._pages[page]
+        width, height = max(16, round(p.width * scale)), max(16, round(p.height * scale))
+        region = Region(0, 0, width, height, width, height)
+        return self._ask(page, region, moving=True, exact=False, final=False)
+
+    def _ask(self, page: int, region: Region, *, moving: bool, exact: bool, final: bool) -> Request:
+        p = self._pages[page]
+        self._numbers += 1
+        return Request(self._numbers, page, p.camera, self._revision, p.look, region, moving, exact, final)
+
+    def _scale(self, p: _Page) -> float:
+        rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
+        wanted = math.sqrt(rays / (p.width * p.height))
+        least = min(1.0, LEAST_SIDE / min(p.width, p.height))
+        return max(next((s for s in SCALES if s <= wanted), SCALES[-1]), least)
+
+    def _tiles(self, p: _Page) -> list[Region]:
+        """The view cut into tiles of about TILE_SECONDS, the middle ones first."""
+        count = min(max(1.0, p.width * p.height / (self._rate * TILE_SECONDS)), MOST_TILES)
+        side = math.sqrt(p.width * p.height / count)
+        columns, rows = max(1, round(p.width / side)), max(1, round(p.height / side))
+        xs = [8 * round(p.width * n / columns / 8) for n in range(columns)] + [p.width]
+        ys = [8 * round(p.height * n / rows / 8) for n in range(rows)] + [p.height]
+        tiles = [
+            Region(x, y, x1 - x, y1 - y, p.width, p.height)
+            for x, x1 in itertools.pairwise(xs)
+            for y, y1 in itertools.pairwise(ys)
+            if x1 > x and y1 > y
+        ]
+
+        def off_centre(tile: Region) -> float:
+            dx = (tile.x + 0.5 * tile.width) / p.width - 0.5
+            dy = (tile.y + 0.5 * tile.height) / p.height - 0.5
+            return dx * dx + dy * dy
+
+        return sorted(tiles, key=off_centre)

@@ -1,0 +1,126 @@
+"""One WebSocket per page: reads, checks and hands on messages; sends what waits. Knows nothing of editing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections import deque
+
+from pydantic import ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from cagefield.errors import CagefieldError
+from cagefield.server import protocol
+from cagefield.server.hub import Hub, Page
+from cagefield.server.safety import Allowance
+from cagefield.server.speaking import Speaker
+
+TOO_BIG, TOO_MANY = 1009, 1008
+"""Close codes of RFC 6455: message too big, policy violation."""
+
+MOST_REFUSED = 2000
+"""Messages over the rate after which the socket is closed."""
+
+
+class Inbox:
+    """Messages that wait to be done; of two drag or camera messages in a row only the newer one waits."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[protocol.PageMessage] = deque()
+        self._some = asyncio.Event()
+
+    def put(self, message: protocol.PageMessage) -> None:
+        """One message more."""
+        if self._waiting and _replaces(message, self._waiting[-1]):
+            self._waiting.pop()
+        self._waiting.append(message)
+        self._some.set()
+
+    async def get(self) -> protocol.PageMessage:
+        """The next message, waited for."""
+        while not self._waiting:
+            self._some.clear()
+            await self._some.wait()
+        return self._waiting.popleft()
+
+
+def _replaces(new: protocol.PageMessage, old: protocol.PageMessage) -> bool:
+    if isinstance(new, protocol.CameraMessage):
+        return isinstance(old, protocol.CameraMessage)
+    if isinstance(new, (protocol.DragMove, protocol.DragEnd)):
+        return isinstance(old, protocol.DragMove) and old.drag == new.drag
+    return False
+
+
+async def attend(socket: WebSocket, hub: Hub, hello: protocol.Hello) -> None:
+    """Serves one page until it is gone."""
+    await socket.accept()
+    page = hub.join(hello)
+    inbox = Inbox()
+    tasks = [
+        asyncio.ensure_future(work)
+        for work in (_read(socket, page, inbox), _do(Speaker(hub, page), page, inbox), _send(socket, page))
+    ]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        for task in tasks:
+            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
+                await task
+        hub.leave(page)
+
+
+async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
+    allowance, refused = Allowance(), 0
+    while True:
+        received = await socket.receive()
+        if received["type"] == "websocket.disconnect":
+            return
+        text = received.get("text")
+        if text is None:
+            page.notice("error", "a message must be text, one JSON object")
+            continue
+        if len(text.encode()) > protocol.MOST_BYTES:
+            await socket.close(TOO_BIG, "message too big")
+            return
+        if not allowance.take(time.monotonic()):
+            refused += 1
+            if refused == 1:
+                page.notice("error", "too many messages; some were passed over")
+            if refused > MOST_REFUSED:
+                await socket.close(TOO_MANY, "too many messages")
+                return
+            continue
+        try:
+            inbox.put(protocol.page_messages.validate_json(text))
+        except ValidationError as error:
+            page.notice("error", f"malformed message: {_first(error)}")
+
+
+def _first(error: ValidationError) -> str:
+    """The first thing wrong with a message, in a line."""
+    problem = error.errors(include_url=False, include_input=False)[0]
+    where = ".".join(str(part) for part in problem["loc"])
+    return f"{where}: {problem['msg']}" if where else str(problem["msg"])
+
+
+async def _do(speaker: Speaker, page: Page, inbox: Inbox) -> None:
+    while True:
+        message = await inbox.get()
+        try:
+            await speaker.hear(message)
+        except (CagefieldError, OSError) as error:
+            page.notice("error", " ".join(str(error).split()))
+        await asyncio.sleep(0)
+
+
+async def _send(socket: WebSocket, page: Page) -> None:
+    while True:
+        content = await page.outbox.get()
+        if isinstance(content, bytes):
+            await socket.send_bytes(content)
+        else:
+            await socket.send_text(content)

@@ -1,0 +1,204 @@
+"""What each message from a page does: one function per message, looked up by its class."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.errors import CagefieldError
+from cagefield.server import protocol
+from cagefield.server.converting import (
+    cage_of,
+    camera_of,
+    dragged_of,
+    key_of,
+    operation_of,
+    view_height,
+)
+from cagefield.server.hub import Hub, Page
+from cagefield.server.placing import fitted
+from cagefield.server.scheduler import Look
+from cagefield.server.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
+
+
+class Speaker:
+    """Hears one page's messages. Raises CagefieldError where a message cannot be followed."""
+
+    def __init__(self, hub: Hub, page: Page) -> None:
+        self._hub, self._page = hub, page
+        self._session = hub.session
+
+    async def hear(self, message: protocol.PageMessage) -> None:
+        """Does what a message says and tells the pages what came of it."""
+        act: Any = getattr(self, f"_{message.type}")
+        after = act(message)
+        if after is not None:
+            await after
+
+    # ---- seeing ----
+
+    def _camera(self, message: protocol.CameraMessage) -> None:
+        self._hub.camera(self._page, camera_of(message), message.seq, message.moving)
+
+    def _look(self, message: protocol.LookMessage) -> None:
+        self._hub.look(self._page, Look(message.view, message.before, message.split))
+
+    def _presented(self, message: protocol.PresentedMessage) -> None:
+        self._hub.presented(self._page, message.picture)
+
+    async def _ask(self, message: protocol.Ask) -> None:
+        answer = protocol.Answer(request=message.request)
+        if message.what == "edit_text":
+            if message.edit is None:
+                raise CagefieldError("choose an edit to copy")
+            answer = protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
+        elif message.what == "grid":
+            answer = protocol.Answer(request=message.request, grid=await self._grid(message.edit))
+        else:
+            found = await self._surface(message.x, message.y)
+            if found is not None:
+                answer = protocol.Answer(
+                    request=message.request, point=tuple(found[0]), normal=tuple(found[1])
+                )
+        self._page.outbox.put(answer)
+
+    async def _grid(self, number: int | None) -> Any:
+        if number is None:
+            raise CagefieldError("choose an edit to show the grid of")
+        edit = self._session.shown.entry(number).edit
+        if edit.adjustment != "continuous" or self._session.problem(edit) is not None:
+            return []
+        values = values_of((edit,))[0]
+        return await self._hub.ask(lambda task: GridTask(task, values))
+
+    async def _surface(self, x: float, y: float) -> Any:
+        camera = self._page.camera
+        if camera is None:
+            raise CagefieldError("the page has sent no camera yet; try again")
+        shown = self._hub.shown()
+        return await self._hub.ask(lambda number: SurfaceTask(number, shown, camera, x, y))
+
+    # ---- drags ----
+
+    def _drag_begin(self, message: protocol.DragBegin) -> None:
+        self._page.drag, self._page.seq = message.drag, 0
+        self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
+        self._hub.changed()
+
+    def _drag(self, message: protocol.DragMove) -> None:
+        moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
+        self._page.seq = message.seq
+        self._page.outbox.put(dragged_of(message.drag, message.seq, moved))
+        self._hub.changed(but=self._page)
+
+    def _drag_end(self, message: protocol.DragEnd) -> None:
+        self._page.drag = 0
+        try:
+            moved = self._session.drag_end(self._page.number, message.drag, operation_of(message.operation))
+            self._page.outbox.put(dragged_of(message.drag, message.seq, moved))
+        finally:
+            self._hub.changed()
+
+    def _drag_cancel(self, message: protocol.DragCancel) -> None:
+        self._page.drag = 0
+        self._session.drag_cancel(self._page.number)
+        self._hub.changed()
+
+    def _apply(self, message: protocol.Apply) -> None:
+        self._session.apply(message.edit, message.target, operation_of(message.operation))
+        self._hub.changed()
+
+    # ---- cages ----
+
+    def _set_cage(self, message: protocol.SetCage) -> None:
+        self._session.set_cage(message.edit, message.cage, cage_of(message.corners))
+        self._hub.changed()
+
+    async def _place(self, message: protocol.Place) -> None:
+        camera = self._page.camera
+        if camera is None:
+            raise CagefieldError("the page has sent no camera yet; try again")
+        anywhere = message.x is None or message.y is None
+        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
+        found = await self._surface(x, y)
+        if found is None and not anywhere:
+            raise CagefieldError("there is no surface under the mouse; double-click on the object")
+        point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
+        distance = float(np.linalg.norm(point - camera.origin))
+        self._session.place(point, view_height(camera, distance))
+        self._hub.changed()
+
+    async def _fit_inner(self, message: protocol.FitInner) -> None:
+        cage: Cage = self._session.document.entry(message.edit).edit.inner
+        below = Shown(values_of(self._session.below(message.edit)))
+        dense = await self._hub.ask(lambda number: FitTask(number, below, cage))
+        if self._session.document.entry(message.edit).edit.inner == cage:
+            self._session.fit_inner(message.edit, fitted(cage, np.array(dense)))
+        self._hub.changed()
+
+    def _outer_margin(self, message: protocol.OuterMargin) -> None:
+        self._session.outer_margin(message.edit, message.margin)
+        self._hub.changed()
+
+    # ---- options and the list ----
+
+    def _change(self, message: protocol.Change) -> None:
+        named = message.model_dump(exclude={"type", "edit"}, exclude_none=True)
+        if "lattice" in named:
+            named["lattice"] = named["lattice"] or None
+        self._session.change(message.edit, **named)
+        self._hub.changed()
+
+    def _scene_change(self, message: protocol.SceneChange) -> None:
+        self._session.preserve_opacity(message.preserve_opacity)
+        self._hub.changed()
+
+    def _command(self, message: protocol.Command) -> None:
+        session = self._session
+        if message.name == "select":
+            session.select(message.edit)
+        elif message.name in ("undo", "redo"):
+            getattr(session, message.name)()
+        elif message.name == "save":
+            self._hub.save()
+        else:
+            if message.edit is None:
+                raise CagefieldError(f"choose an edit to {message.name.replace('_', ' ')}")
+            getattr(session, message.name)(message.edit)
+        self._hub.changed()
+
+    def _mirror(self, message: protocol.Mirror) -> None:
+        self._session.mirror(message.edit, "xyz".index(message.axis))
+        self._hub.changed()
+
+    def _reorder(self, message: protocol.Reorder) -> None:
+        self._session.reorder(message.edit, message.to)
+        self._hub.changed()
+
+    def _go_to(self, message: protocol.GoTo) -> None:
+        self._session.go_to(message.entry)
+        self._hub.changed()
+
+    # ---- keeping ----
+
+    def _save_as(self, message: protocol.SaveAs) -> None:
+        self._hub.save_as(message.path, message.overwrite)
+        self._hub.changed()
+
+    def _load_edits(self, message: protocol.LoadEdits) -> None:
+        self._session.load_edits(message.text, message.append)
+        self._hub.changed()
+
+    def _set_path(self, message: protocol.SetPath) -> None:
+        self._session.set_path(tuple(map(key_of, message.keys)), message.loop)
+        self._hub.changed()
+
+    def _render(self, message: protocol.RenderJob) -> None:
+        self._hub.chores.render(message)
+        self._hub.pump()
+
+    def _cancel_job(self, message: protocol.CancelJob) -> None:
+        self._hub.chores.cancel(message.job)
+        self._hub.pump()

@@ -1,0 +1,193 @@
+"""Studio: a scene and its renderers, kept ready between pictures. Lives in the rendering process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.rendering.frame import Float32, Frame
+from cagefield.rendering.renderer import Renderer
+from cagefield.scene import Scene
+from cagefield.server import encoding
+from cagefield.server.scheduler import Look, Region
+from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
+
+QUICK_LATTICE = 32
+"""Most lattice nodes along an axis while a cage is dragged."""
+
+MOVING_QUALITY, REST_QUALITY = 85, 95
+"""JPEG qualities."""
+
+KEPT_EDITS = 64
+"""Edits whose maps are kept for when they are shown again."""
+
+MOST_DEPTHS = 120_000
+"""Depths sent with a picture, at most."""
+
+Stop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A renderer that is ready, and what it shows."""
+
+    shown: Shown
+    renderer: Renderer
+
+
+class Studio:
+    """Pictures of one field under any edits."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.plain = Renderer(scene.field)
+        self._edits: list[Edit] = []
+        self._coarse: list[tuple[Edit, Edit]] = []
+        self._exact: list[_Kept] = []
+        self._quick: list[_Kept] = []
+        lower, upper = scene.field.bounds
+        self._middle = 0.5 * (lower + upper)
+        self._radius = 0.5 * float(np.linalg.norm(upper - lower))
+
+    def picture(self, task: PictureTask, stop: Stop) -> PictureDone | Stopped:
+        """The part of a picture that a task asks for, encoded."""
+        began = time.perf_counter()
+        bare = task.look.before and task.look.split is None
+        renderer = self.plain if bare else self.renderer(task.shown, exact=task.exact)
+        mapped = time.perf_counter()
+        if stop():
+            return Stopped(task.number)
+        frame = self._frame(task, renderer, stop)
+        if frame is None:
+            return Stopped(task.number)
+        rendered = time.perf_counter()
+        near, far = self.reach(task.camera)
+        pixels = encoding.picture_of(frame, task.look.view, (near, far))
+        picture = encoding.jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
+        stride = 1 if frame.width * frame.height <= MOST_DEPTHS else 2
+        scale = (far if not self.scene.field.contracted else 16.0 * far) / 65_000.0
+        depth = encoding.depths(frame, scale, stride)
+        return PictureDone(
+            task.number,
+            picture,
+            depth.tobytes(),
+            (depth.shape[1], depth.shape[0]),
+            scale,
+            mapped - began,
+            rendered - began,
+            time.perf_counter() - rendered,
+        )
+
+    def still(self, shown: Shown, camera: Camera, look: Look, stop: Stop | None = None) -> Frame | None:
+        """A whole picture, its edits exact; None where it was stopped."""
+        region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
+        task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
+        return self._frame(task, self.renderer(shown, exact=True), stop or (lambda: False))
+
+    def warm(self, stage: int) -> None:
+        """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
+        voxel = float(max(self.scene.field.voxel_size))
+        inner = Cage.box(self._middle, 8.0 * voxel)
+        edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
+        if stage == 3:
+            edit.lattice_error(samples=64)
+            return
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
+        if stage == 1:
+            size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
+            camera = Camera.look_at(
+                self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
+            )
+            renderer.render(camera)
+
+    def renderer(self, shown: Shown, *, exact: bool) -> Renderer:
+        """The renderer of the edits: one that is ready, else an exact or a quick one made now."""
+        for kept in self._exact if exact else (*self._exact, *self._quick):
+            if kept.shown == shown:
+                return kept.renderer
+        edits = self.edits(shown.edits)
+        if not exact:
+            edits = [self._quickly(edit) for edit in edits]
+        renderer = self.plain.with_edits(
+            EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
+        )
+        if exact:
+            # Two: what pages show, and what a job renders.
+            self._exact = [*self._exact[-1:], _Kept(shown, renderer)]
+        else:
+            self._quick = [_Kept(shown, renderer)]
+        return renderer
+
+    def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
+        """The edits with these fields; those that were there before are the same objects."""
+        found = []
+        for fields in values:
+            edit = Edit(**fields)
+            found.append(next((known for known in self._edits if known == edit), edit))
+        others = [known for known in self._edits if not any(known is edit for edit in found)]
+        self._edits = [*found, *others][:KEPT_EDITS]
+        return found
+
+    def reach(self, camera: Camera) -> tuple[float, float]:
+        """(nearest, farthest) distance of the field's box from a camera."""
+        distance = float(np.linalg.norm(camera.origin - self._middle))
+        return max(0.0, distance - self._radius), distance + self._radius
+
+    def _frame(self, task: PictureTask, edited: Renderer, stop: Stop) -> Frame | None:
+        """The region of the picture; left of a split without the edits."""
+        region, split = task.region, task.look.split
+        if not task.look.before or split is None:
+            return self._part(task, edited, region, stop)
+        left = min(max(round(split * region.full_width) - region.x, 0), region.width)
+        parts: list[Frame] = []
+        for renderer, x, width in ((self.plain, 0, left), (edited, left, region.width - left)):
+            if width > 0:
+                part = self._part(task, renderer, replace(region, x=region.x + x, width=width), stop)
+                if part is None:
+                    return None
+                parts.append(part)
+        return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])
+
+    def _part(self, task: PictureTask, renderer: Renderer, region: Region, stop: Stop) -> Frame | None:
+        return renderer.render(
+            task.camera,
+            background=self.scene.background,
+            normals=task.look.view == "normals",
+            region=(region.x, region.y, region.width, region.height),
+            should_stop=None if task.moving else stop,
+        )
+
+    def _quickly(self, edit: Edit) -> Edit:
+        """The edit with a coarser lattice, kept as long as the edit is."""
+        if edit.adjustment != "continuous" or (edit.lattice or 512) <= QUICK_LATTICE:
+            return edit
+        for known, quick in self._coarse:
+            if known is edit:
+                return quick
+        quick = edit.replace(lattice=QUICK_LATTICE)
+        self._coarse = [*self._coarse[-31:], (edit, quick)]
+        return quick
+
+
+def _beside(left: Frame, right: Frame) -> Frame:
+    """Two frames of the same height as one."""
+
+    def join(a: Float32, b: Float32) -> Float32:
+        return np.concatenate([a, b], axis=1)
+
+    normals = None
+    if left.normals is not None and right.normals is not None:
+        normals = join(left.normals, right.normals)
+    return Frame(
+        join(left.rgb, right.rgb),
+        join(left.opacity, right.opacity),
+        join(left.depth, right.depth),
+        normals,
+        left.background,
+    )

@@ -1,0 +1,160 @@
+"""The editor's page in headless Chromium, as a test drives it: mouse, keys, and what is on the screen."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+PATIENCE = 120.0
+"""Seconds until what does not come is given up: the first pictures wait for kernels to compile."""
+
+Point = tuple[float, float]
+
+
+@dataclass
+class EditorPage:
+    """An open page of the editor."""
+
+    page: Any
+
+    def until(self, condition: str, seconds: float = PATIENCE) -> None:
+        """Waits until an expression in the page is true; its policy forbids waiting inside it."""
+        end = time.monotonic() + seconds
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"never came true: {condition}; {self.page.evaluate(_SUMMARY)}"
+            time.sleep(0.02)
+
+    def ready(self) -> None:
+        """Waits for the server's state and a whole picture."""
+        self.until("Boolean(window.cagefield && window.cagefield.now.state)")
+        self.settle()
+
+    def settle(self) -> None:
+        """Waits for the whole picture of the state; where the field did not change there is no new one."""
+        self.until(
+            "cagefield.settled && (cagefield.picture.revision === cagefield.now.state.revision"
+            " ? cagefield.quiet > 60 : cagefield.quiet > 700)"
+        )
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """The server's state as the page knows it."""
+        return cast(dict[str, Any], self.page.evaluate("cagefield.now.state"))
+
+    @property
+    def edit(self) -> dict[str, Any]:
+        """The selected edit."""
+        state = self.state
+        return next(edit for edit in state["edits"] if edit["id"] == state["selected"])
+
+    def changed(self, action: Any) -> dict[str, Any]:
+        """The state after an action and the server's answer to it."""
+        revision = self.state["revision"]
+        action()
+        self.until(f"cagefield.now.state.revision > {revision}")
+        self.settle()
+        return self.state
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def tools(self, **wanted: str) -> None:
+        """Sets the page's tools by its buttons: tool="rotate", mode="edit", axes="cage", cage="outer"."""
+        for name, value in wanted.items():
+            self.page.click(f".tools .{name}-{value}")
+
+    def part(self, kind: str, index: int, cage: str = "deformed") -> Point:
+        """Where a corner, an edge or a face of the selected edit's cage is in the window."""
+        at = self.page.evaluate(
+            f"cagefield.screen(cagefield.now.state.selected, '{kind}', {index}, '{cage}')"
+        )
+        return at["x"], at["y"]
+
+    def grip(self, axis: str) -> Point:
+        """Where the gizmo's handle is taken hold of."""
+        at = self.page.evaluate(f"cagefield.grip('{axis}')")
+        assert at is not None, f"the gizmo has no handle {axis} that the mouse could reach"
+        return at["x"], at["y"]
+
+    @contextlib.contextmanager
+    def held(self, start: Point, by: Point, steps: int = 4) -> Iterator[None]:
+        """With the left button held: the mouse has moved from `start` by some pixels."""
+        mouse = self.page.mouse
+        mouse.move(*start)
+        mouse.down()
+        for n in range(1, steps + 1):
+            mouse.move(start[0] + by[0] * n / steps, start[1] + by[1] * n / steps)
+        yield
+        mouse.up()
+
+    def drag(self, start: Point, by: Point) -> dict[str, Any]:
+        """The selected edit after a drag."""
+
+        def move() -> None:
+            with self.held(start, by):
+                pass
+
+        self.changed(move)
+        return self.edit
+
+    def pixels(self, cages: bool = False) -> NDArray[np.float64]:
+        """The picture on the screen [H,W,3] in [0,1]; the cages are taken off for it, unless wanted."""
+        if not cages:
+            self.press("o")
+        self.page.mouse.move(2, 2)
+        self.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        image = Image.open(io.BytesIO(self.page.screenshot(clip=self.box)))
+        if not cages:
+            self.press("o")
+        return np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
+
+    @property
+    def box(self) -> dict[str, float]:
+        """The canvas in the window."""
+        return cast(dict[str, float], self.page.locator("canvas").bounding_box())
+
+
+@contextlib.contextmanager
+def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[EditorPage]:
+    """A page of the editor; skips where there is no Chromium. The page's own errors fail the test."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine")
+    complaints: list[str] = []
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": width, "height": height})
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: dialog.accept())
+        page.goto(link)
+        yield EditorPage(page)
+        browser.close()
+    assert complaints == []
+
+
+_SUMMARY = (
+    "JSON.stringify([cagefield.now.connection, cagefield.now.notice, cagefield.now.state?.revision,"
+    " cagefield.picture, cagefield.camera.seq, cagefield.drag, cagefield.quiet])"
+)

@@ -1,0 +1,142 @@
+"""A real editor server in a process of its own, and pages that talk to it as a browser's would."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+PATIENCE = 120.0
+"""Seconds until a message that does not come is given up: the first pictures wait for kernels to compile."""
+
+
+@dataclass
+class EditorServer:
+    """A running `cagefield view`."""
+
+    process: subprocess.Popen[str]
+    link: str
+
+    @property
+    def port(self) -> int:
+        match = re.search(r":(\d+)/", self.link)
+        assert match
+        return int(match.group(1))
+
+    def kill(self) -> None:
+        """Ends it as a crash would."""
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(10)
+
+    def children(self) -> list[int]:
+        """The numbers of the processes that it has started."""
+        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        return [int(pid) for task in tasks for pid in task.read_text().split()]
+
+
+@contextlib.contextmanager
+def editor_server(scene: Path, *options: str) -> Iterator[EditorServer]:
+    """`cagefield view SCENE` on a free port."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cagefield", "view", str(scene), "--port", "0", "--no-browser", *options],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        match = re.search(r"http://\S+", line)
+        assert match, line
+        yield EditorServer(process, match.group(0))
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@dataclass
+class Picture:
+    """A picture as a page gets it."""
+
+    header: dict[str, Any]
+    jpeg: bytes
+    depth: bytes
+
+
+@dataclass
+class PageClient:
+    """An open page: it shows every picture at once, unless told to be slow."""
+
+    socket: ClientConnection
+    slow: bool = False
+    pictures: list[Picture] = field(default_factory=list)
+    messages: list[dict[str, Any]] = field(default_factory=list)
+    joined: dict[str, Any] = field(default_factory=dict)
+    """The state that the page found."""
+
+    def send(self, kind: str, **values: Any) -> None:
+        """One message to the server."""
+        self.socket.send(json.dumps({"type": kind, **values}))
+
+    def take(self, timeout: float) -> Picture | dict[str, Any]:
+        """The next message; TimeoutError where none comes."""
+        content = self.socket.recv(timeout)
+        if isinstance(content, str):
+            self.messages.append(json.loads(content))
+            return self.messages[-1]
+        length = int.from_bytes(content[:4], "little")
+        header = json.loads(content[4 : 4 + length])
+        end = 4 + length + header["picture_bytes"]
+        assert len(content) == end + header["depth_bytes"]
+        self.pictures.append(Picture(header, content[4 + length : end], content[end:]))
+        if not self.slow:
+            self.send("presented", picture=header["picture"])
+        return self.pictures[-1]
+
+    def until(self, wanted: Callable[[dict[str, Any]], bool], timeout: float = PATIENCE) -> dict[str, Any]:
+        """The next message, or header of a picture, that is wanted."""
+        end = time.monotonic() + timeout
+        while True:
+            got = self.take(max(0.0, end - time.monotonic()))
+            content = got.header if isinstance(got, Picture) else got
+            if wanted(content):
+                return content
+
+    def state(self, wanted: Callable[[dict[str, Any]], bool] = lambda state: True) -> dict[str, Any]:
+        """The next state that is wanted."""
+        return self.until(lambda m: m["type"] == "state" and wanted(m))
+
+    def notice(self) -> dict[str, Any]:
+        """The next line for the user."""
+        return self.until(lambda m: m["type"] == "notice")
+
+    def final(self) -> dict[str, Any]:
+        """The header of the next last part of a whole picture."""
+        return self.until(lambda m: m["type"] == "picture" and m["final"])
+
+    def look_from(self, hello: dict[str, Any], side: int = 96, seq: int = 1, moving: bool = False) -> None:
+        """Sends the start camera, its picture `side` pixels wide and high."""
+        camera = hello["start"] | {"width": side, "height": side, "seq": seq, "moving": moving}
+        self.send(**(camera | {"kind": camera.pop("type")}))
+
+
+@contextlib.contextmanager
+def page(server: EditorServer, *, slow: bool = False) -> Iterator[tuple[PageClient, dict[str, Any]]]:
+    """A page that has just been opened, and what it was told first."""
+    origin = f"http://localhost:{server.port}"
+    with connect(f"ws://localhost:{server.port}/socket", origin=origin, max_size=None) as socket:
+        client = PageClient(socket, slow)
+        hello = client.until(lambda m: m["type"] == "hello")
+        client.joined = client.state()
+        yield client, hello

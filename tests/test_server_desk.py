@@ -1,0 +1,239 @@
+"""The desk between the scheduler and the rendering process, with a process that the tests play."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+
+from cagefield.cameras import Camera
+from cagefield.errors import CagefieldError
+from cagefield.server import desk as module
+from cagefield.server.desk import RESTARTS, Chore, Desk, Stamp
+from cagefield.server.scheduler import Request
+from cagefield.server.tasks import (
+    Answered,
+    Failed,
+    PictureDone,
+    PictureTask,
+    Ready,
+    Result,
+    Shown,
+    Stopped,
+    SurfaceTask,
+    Task,
+    WarmTask,
+)
+
+CAMERA = Camera.look_at((0, -3, 0), (0, 0, 0), width=64, height=64, fov_x=0.8)
+
+
+class PlayedWorker:
+    """A rendering process that does nothing by itself."""
+
+    def __init__(self, scene: str, device: str, on_result: Any, on_lost: Any) -> None:
+        self.answer: Callable[[Result], None] = on_result
+        self.lose: Callable[[], None] = on_lost
+        self.tasks: list[Task] = []
+        self.starts = 0
+        self.generation = 0
+
+    def start(self) -> None:
+        self.starts += 1
+
+    def send(self, task: Task) -> None:
+        self.tasks.append(task)
+
+    def abandon(self, generation: int) -> None:
+        self.generation = generation
+
+    def close(self) -> None:
+        self.tasks.clear()
+
+
+class PlayedOffice:
+    """Notes down what the desk tells it."""
+
+    def __init__(self) -> None:
+        self.delivered: list[int] = []
+        self.notices: list[str] = []
+        self.chores: list[Chore] = []
+
+    def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
+        task = PictureTask(
+            request.number,
+            Shown(()),
+            CAMERA,
+            request.region,
+            request.look,
+            request.moving,
+            request.exact,
+            generation,
+        )
+        return task, Stamp(1)
+
+    def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
+        self.delivered.append(request.number)
+
+    def notice(self, level: str, text: str) -> None:
+        self.notices.append(text)
+
+    def chore(self) -> Chore | None:
+        return self.chores.pop(0) if self.chores else None
+
+
+@pytest.fixture
+def office() -> PlayedOffice:
+    return PlayedOffice()
+
+
+def play(
+    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch, script: Callable[[Desk, Any], Awaitable[None]]
+) -> None:
+    """Runs a script with a desk whose rendering process is ready."""
+    monkeypatch.setattr(module, "Worker", PlayedWorker)
+
+    async def run() -> None:
+        desk = Desk("scene", "cpu", office)
+        desk.start()
+        worker: Any = desk.worker
+        worker.answer(Ready())
+        await settle()
+        await script(desk, worker)
+        desk.close()
+
+    asyncio.run(run())
+
+
+async def settle() -> None:
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+def done(task: Task) -> PictureDone:
+    return PictureDone(task.number, b"", b"", (0, 0), 1.0, 0.0, 0.01, 0.0)
+
+
+def surface(number: int) -> SurfaceTask:
+    return SurfaceTask(number, Shown(()), CAMERA, 0.5, 0.5)
+
+
+def test_one_task_at_a_time_and_answers_before_pictures(
+    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        desk.scheduler.join(1)
+        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        desk.pump()
+        (picture,) = worker.tasks
+        asked = asyncio.ensure_future(desk.ask(surface))
+        desk.scheduler.camera(1, 2, 64, 64, True, 0.0)
+        await settle()
+        assert worker.tasks == [picture]
+        worker.answer(done(picture))
+        await settle()
+        assert isinstance(worker.tasks[-1], SurfaceTask) and office.delivered == [picture.number]
+        worker.answer(Answered(worker.tasks[-1].number, "point"))
+        await settle()
+        assert await asked == "point"
+        assert isinstance(worker.tasks[-1], PictureTask) and len(worker.tasks) == 3
+
+    play(office, monkeypatch, script)
+
+
+def test_chores_wait_until_no_page_does(office: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        results: list[Result] = []
+        desk.scheduler.join(1)
+        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        office.chores.append(Chore(lambda number: WarmTask(number, 0), results.append))
+        desk.pump()
+        assert isinstance(worker.tasks[-1], PictureTask)
+        desk.scheduler.camera(1, 1, 64, 64, False, 0.0)
+        worker.answer(done(worker.tasks[-1]))
+        await settle()
+        while isinstance(worker.tasks[-1], PictureTask):
+            desk.scheduler.presented(1, worker.tasks[-1].number)
+            worker.answer(done(worker.tasks[-1]))
+            await settle()
+        chore = worker.tasks[-1]
+        assert isinstance(chore, WarmTask)
+        generation = desk.scheduler.generation
+        desk.interrupt()
+        desk.pump()
+        assert worker.generation == generation + 1
+        worker.answer(Stopped(chore.number))
+        await settle()
+        assert results == [Stopped(chore.number)]
+
+    play(office, monkeypatch, script)
+
+
+def test_a_failure_is_told_to_who_asked(office: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        asked = asyncio.ensure_future(desk.ask(surface))
+        await settle()
+        worker.answer(Failed(worker.tasks[-1].number, "no surface"))
+        with pytest.raises(CagefieldError, match="no surface"):
+            await asked
+        desk.scheduler.join(1)
+        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        desk.pump()
+        worker.answer(Failed(worker.tasks[-1].number, "not possible"))
+        await settle()
+        assert office.notices == ["not possible"] and len(worker.tasks) == 2
+
+    play(office, monkeypatch, script)
+
+
+def test_a_lost_process_is_started_again_and_its_picture_rendered_again(
+    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        desk.scheduler.join(1)
+        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        desk.pump()
+        worker.lose()
+        await settle()
+        assert worker.starts == 2 and "started again" in office.notices[-1]
+        assert len(worker.tasks) == 1  # nothing before it is ready
+        worker.answer(Ready())
+        await settle()
+        assert len(worker.tasks) == 2 and isinstance(worker.tasks[-1], PictureTask)
+
+    play(office, monkeypatch, script)
+
+
+def test_a_process_that_is_lost_again_and_again_is_given_up(
+    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        asked = asyncio.ensure_future(desk.ask(surface))
+        await settle()
+        waiting = asyncio.ensure_future(desk.ask(surface))
+        for _ in range(RESTARTS + 1):
+            worker.lose()
+            await settle()
+        assert worker.starts == RESTARTS + 1
+        assert "ends again and again" in office.notices[-1]
+        with pytest.raises(CagefieldError, match="interrupted; try again"):
+            await asked
+        with pytest.raises(CagefieldError, match="restart the editor"):
+            await waiting
+        with pytest.raises(CagefieldError, match="restart the editor"):
+            await desk.ask(surface)
+
+    play(office, monkeypatch, script)
+
+
+def test_a_scene_that_the_process_cannot_read_is_told(
+    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(desk: Desk, worker: PlayedWorker) -> None:
+        worker.answer(Failed(0, "scene x does not exist"))
+        await settle()
+        assert office.notices == ["scene x does not exist"]
+
+    play(office, monkeypatch, script)

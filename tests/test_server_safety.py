@@ -1,0 +1,76 @@
+"""Who may talk to the editor."""
+
+from __future__ import annotations
+
+import pytest
+
+from cagefield.server.safety import Allowance, Guard, is_loopback, new_token
+
+HOME = Guard("localhost", 8741)
+OPEN = Guard("0.0.0.0", 8741, token="secret-token")
+
+
+def refusal(
+    guard: Guard,
+    host: str = "localhost:8741",
+    origin: str | None = None,
+    *,
+    token: str | None = None,
+    cookie: str | None = None,
+    needs_origin: bool = False,
+) -> str | None:
+    headers = {"host": host} | ({} if origin is None else {"origin": origin})
+    cookies = {} if cookie is None else {guard.cookie: cookie}
+    query = {} if token is None else {"token": token}
+    return guard.refusal(headers, cookies, query, needs_origin=needs_origin)
+
+
+@pytest.mark.parametrize("host", ["localhost:8741", "127.0.0.1:8741", "[::1]:8741", "LOCALHOST:8741"])
+def test_this_machines_names_are_ours(host: str) -> None:
+    assert refusal(HOME, host) is None
+    assert refusal(HOME, host, f"http://{host}", needs_origin=True) is None
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["evil.example:8741", "localhost:80", "localhost.evil.example:8741", "", "[::1", "192.168.0.7:8741"],
+)
+def test_a_name_that_merely_leads_here_is_refused(host: str) -> None:
+    assert "does not answer to" in (refusal(HOME, host) or "")
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://localhost:9999", "null", "file://", ""])
+def test_pages_of_other_origins_are_refused(origin: str) -> None:
+    assert "may not talk to this editor" in (refusal(HOME, origin=origin, needs_origin=True) or "")
+    assert "may not talk to this editor" in (refusal(HOME, origin=origin) or "")
+
+
+def test_a_socket_must_say_its_origin_and_a_request_need_not() -> None:
+    assert "may not talk" in (refusal(HOME, needs_origin=True) or "")
+    assert refusal(HOME) is None
+
+
+def test_other_machines_need_the_token() -> None:
+    host = "192.168.0.7:8741"
+    assert "token is missing or wrong" in (refusal(OPEN, host) or "")
+    assert "token is missing or wrong" in (refusal(OPEN, host, token="guess") or "")
+    assert "token is missing or wrong" in (refusal(OPEN, host, cookie="ünicode") or "")
+    assert refusal(OPEN, host, token="secret-token") is None
+    assert refusal(OPEN, host, cookie="secret-token") is None
+    assert "does not answer to" in (refusal(OPEN, "evil.example:8741", token="secret-token") or "")
+
+
+def test_loopback_addresses() -> None:
+    assert all(map(is_loopback, ("localhost", "127.0.0.1", "127.3.2.1", "::1", "[::1]")))
+    assert not any(map(is_loopback, ("0.0.0.0", "::", "192.168.0.7", "example.org", "")))
+
+
+def test_tokens_differ_and_are_long() -> None:
+    assert new_token() != new_token() and len(new_token()) >= 32
+
+
+def test_an_allowance_is_spent_and_comes_back() -> None:
+    allowance = Allowance(rate=10.0, burst=20.0, level=20.0)
+    assert sum(allowance.take(0.0) for _ in range(50)) == 20
+    assert sum(allowance.take(1.0) for _ in range(50)) == 10
+    assert sum(allowance.take(100.0) for _ in range(50)) == 20

@@ -1,0 +1,305 @@
+"""The scheduler of pictures, with a clock that the tests turn."""
+
+from __future__ import annotations
+
+import pytest
+
+from cagefield.server.scheduler import (
+    MOST_TILES,
+    MOST_UNSHOWN,
+    MOVING_SECONDS,
+    SETTLE_SECONDS,
+    Look,
+    Request,
+    Scheduler,
+)
+
+SIDE = 800
+RATE = 1e6
+
+
+class Bench:
+    """A scheduler with a renderer of RATE rays a second, and pages that show pictures when told to."""
+
+    def __init__(self, rate: float = RATE) -> None:
+        self.scheduler = Scheduler()
+        self.now = 0.0
+        self.rate = rate
+        self.sent: list[Request] = []
+
+    def open(self, page: int, seq: int = 1, side: int = SIDE) -> None:
+        self.scheduler.join(page)
+        self.camera(page, seq, side=side)
+
+    def camera(self, page: int, seq: int, moving: bool = False, side: int = SIDE) -> None:
+        self.scheduler.camera(page, seq, side, side, moving, self.now)
+
+    def render(self, request: Request, overhead: float = 0.0) -> None:
+        rays = request.region.width * request.region.height
+        seconds = rays / self.rate + overhead
+        self.now += seconds
+        self.scheduler.finished(request, rays, seconds, overhead)
+        self.sent.append(request)
+
+    def show(self, page: int) -> None:
+        for request in self.sent:
+            if request.page == page:
+                self.scheduler.presented(page, request.number)
+
+    def step(self, overhead: float = 0.0) -> Request | None:
+        """Renders one picture, if one is owed, and has it shown."""
+        request = self.scheduler.next(self.now)
+        if request is not None:
+            self.render(request, overhead)
+            self.show(request.page)
+        return request
+
+    def settle(self) -> None:
+        self.now += SETTLE_SECONDS + 1e-3
+
+    def finish(self) -> list[Request]:
+        """Everything that is owed, shown as it comes."""
+        found = []
+        while (request := self.step()) is not None:
+            found.append(request)
+        return found
+
+
+def pixels(requests: list[Request]) -> list[tuple[int, int]]:
+    return [
+        (request.region.x + x, request.region.y + y)
+        for request in requests
+        for x in range(request.region.width)
+        for y in range(request.region.height)
+    ]
+
+
+def test_a_new_page_gets_a_quick_picture_and_then_the_whole_one_in_tiles() -> None:
+    b = Bench()
+    b.open(1)
+    first = b.step()
+    assert first is not None and first.moving and first.region.full_width < SIDE
+    assert b.step() is None
+    b.settle()
+    tiles = b.finish()
+    assert all(tile.region.full_width == SIDE and not tile.moving and tile.exact for tile in tiles)
+    assert [tile.final for tile in tiles] == [False] * (len(tiles) - 1) + [True]
+    assert 1 < len(tiles) <= MOST_TILES
+    covered = pixels(tiles)
+    assert len(covered) == SIDE * SIDE == len(set(covered))
+    assert b.scheduler.idle()
+
+
+def test_the_middle_tile_comes_first() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.settle()
+    tile = b.finish()[0].region
+    assert tile.x <= SIDE / 2 <= tile.x + tile.width and tile.y <= SIDE / 2 <= tile.y + tile.height
+
+
+@pytest.mark.parametrize("rate", [2e5, 1e6, 4e6])
+def test_moving_pictures_take_the_time_they_may(rate: float) -> None:
+    b = Bench(rate)
+    b.open(1)
+    seconds = 0.0
+    for seq in range(2, 60):
+        b.camera(1, seq, moving=True)
+        began = b.now
+        assert b.step() is not None
+        seconds = b.now - began
+        b.now += 0.002
+    assert seconds <= MOVING_SECONDS * 1.001
+    # A step of SCALES is at most a factor of 0.78 in the side; LEAST_SIDE keeps the smallest above it.
+    assert seconds >= 0.5 * MOVING_SECONDS
+
+
+def test_time_that_goes_into_the_map_is_taken_off_the_rays() -> None:
+    sides = []
+    for overhead in (0.0, 0.03):
+        b = Bench()
+        b.open(1)
+        for seq in range(2, 40):
+            b.camera(1, seq, moving=True)
+            request = b.step(overhead)
+            assert request is not None
+        sides.append(request.region.width)
+    assert sides[1] < sides[0]
+
+
+def test_a_fast_renderer_skips_the_small_picture() -> None:
+    b = Bench(1e9)
+    b.open(1, side=64)
+    tile = b.step()
+    assert tile is not None and not tile.moving and tile.region.full_width == 64
+
+
+def test_older_input_is_passed_over() -> None:
+    b = Bench()
+    b.open(1)
+    first = b.scheduler.next(b.now)
+    assert first is not None and first.camera == 1
+    for seq in range(2, 9):
+        b.camera(1, seq, moving=True)
+    assert b.scheduler.next(b.now) is None
+    b.render(first)
+    b.show(1)
+    second = b.step()
+    assert second is not None and second.camera == 8
+    assert b.step() is None
+
+
+def test_never_more_than_two_pictures_are_on_their_way() -> None:
+    b = Bench()
+    b.open(1)
+    most = 0
+    for seq in range(2, 200):
+        b.camera(1, seq, moving=True)
+        request = b.scheduler.next(b.now)
+        if request is not None:
+            b.render(request)
+        most = max(most, b.scheduler.unshown(1))
+        if seq % 17 == 0 and b.sent:
+            b.scheduler.presented(1, b.sent[0].number)
+            b.sent.pop(0)
+        b.now += 0.01
+    assert most == MOST_UNSHOWN
+
+
+def test_a_page_that_shows_nothing_gets_two_and_then_what_is_newest() -> None:
+    b = Bench()
+    b.open(1)
+    for seq in range(2, 10):
+        b.camera(1, seq, moving=True)
+        request = b.scheduler.next(b.now)
+        if request is not None:
+            b.render(request)
+    assert len(b.sent) == MOST_UNSHOWN
+    b.show(1)
+    newest = b.step()
+    assert newest is not None and newest.camera == 9
+
+
+def test_a_change_abandons_a_tile_and_starts_over() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.settle()
+    b.step()
+    tile = b.scheduler.next(b.now)
+    assert tile is not None and not tile.moving
+    generation = b.scheduler.generation
+    b.camera(1, 2, moving=True)
+    assert b.scheduler.generation > generation
+    b.scheduler.abandoned(tile, again=True)
+    after = b.step()
+    assert after is not None and after.moving and after.camera == 2
+
+
+def test_a_moving_picture_is_not_abandoned() -> None:
+    b = Bench()
+    b.open(1)
+    picture = b.scheduler.next(b.now)
+    generation = b.scheduler.generation
+    b.camera(1, 2, moving=True)
+    assert picture is not None and picture.moving and b.scheduler.generation == generation
+
+
+def test_a_lost_picture_is_rendered_again_and_an_impossible_one_is_not() -> None:
+    b = Bench()
+    b.open(1)
+    picture = b.scheduler.next(b.now)
+    assert picture is not None
+    b.scheduler.abandoned(picture, again=True)
+    again = b.scheduler.next(b.now)
+    assert again is not None and again.moving
+    b.scheduler.abandoned(again, again=False)
+    assert b.scheduler.next(b.now) is None
+
+
+def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.scheduler.edits(1, True, b.now)
+    picture = b.step()
+    assert picture is not None and picture.moving and not picture.exact and picture.revision == 1
+    b.settle()
+    assert {tile.exact for tile in b.finish()} == {False}
+    b.scheduler.edits(1, False, b.now)
+    tiles = b.finish()
+    assert {(tile.exact, tile.moving) for tile in tiles} == {(True, False)} and tiles[-1].final
+
+
+def test_a_drag_that_ends_with_something_new_shows_it_quickly_first() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.scheduler.edits(1, True, b.now)
+    b.step()
+    b.scheduler.edits(2, False, b.now)
+    picture = b.step()
+    assert picture is not None and picture.moving and picture.revision == 2
+
+
+def test_an_edit_is_shown_on_every_page_and_a_camera_on_its_own() -> None:
+    b = Bench()
+    b.open(1)
+    b.open(2)
+    b.settle()
+    b.finish()
+    b.settle()
+    b.finish()
+    assert b.scheduler.idle()
+    b.scheduler.edits(1, True, b.now)
+    assert {b.step().page, b.step().page} == {1, 2}  # type: ignore[union-attr]
+    b.settle()
+    b.finish()
+    b.camera(2, 9, moving=True)
+    request = b.step()
+    assert request is not None and request.page == 2
+    assert b.step() is None
+
+
+def test_what_moves_goes_before_tiles_of_other_pages() -> None:
+    b = Bench()
+    b.open(1)
+    b.open(2)
+    b.finish()
+    b.settle()
+    b.step()
+    b.camera(2, 2, moving=True)
+    request = b.step()
+    assert request is not None and request.page == 2 and request.moving
+
+
+def test_another_view_is_another_picture() -> None:
+    b = Bench()
+    b.open(1)
+    b.finish()
+    b.scheduler.look(1, Look("depth", True, 0.5), b.now)
+    request = b.step()
+    assert request is not None and request.look == Look("depth", True, 0.5)
+    b.scheduler.look(1, Look("depth", True, 0.5), b.now)
+    assert b.step() is None
+
+
+def test_wake_says_when_the_view_counts_as_at_rest() -> None:
+    b = Bench()
+    b.open(1)
+    b.step()
+    wait = b.scheduler.wake(b.now)
+    assert wait is not None and 0.0 < wait <= SETTLE_SECONDS
+    b.now += wait + 1e-6
+    assert b.scheduler.next(b.now) is not None
+
+
+def test_a_page_that_left_is_not_rendered_for() -> None:
+    b = Bench()
+    b.open(1)
+    request = b.scheduler.next(b.now)
+    assert request is not None
+    b.scheduler.leave(1)
+    b.scheduler.finished(request, 100, 0.1, 0.0)
+    assert b.scheduler.next(b.now) is None and b.scheduler.wake(b.now) is None

@@ -1,0 +1,350 @@
+"""The editor's session: commands, drags, history; no web, no rendering."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit, Rotate, Scale, Translate
+from cagefield.edits import operations as ops
+from cagefield.errors import CageError, EditError
+from cagefield.keyframes import Keyframe
+from cagefield.server.document import Document
+from cagefield.server.history import History
+from cagefield.server.moving import move_corners
+from cagefield.server.session import Session
+
+BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+INNER = Cage.box((0, 0, 0), 0.4)
+ARM = Edit(INNER, INNER.grown(0.3), name="arm", lattice=16)
+CUP = Edit(Cage.box((0.6, 0, 0), 0.2), adjustment="discrete", name="cup")
+
+
+def session(*edits: Edit) -> Session:
+    return Session(Document.of(edits), BOUNDS, 0.01)
+
+
+def test_a_new_session_is_saved_and_at_the_beginning_of_its_history() -> None:
+    s = session(ARM, CUP)
+    assert [entry.id for entry in s.document.entries] == [1, 2]
+    assert s.saved and s.history.names == ("Open",) and s.selected == 2
+
+
+def test_a_drag_shows_every_step_and_is_one_entry_of_the_history() -> None:
+    s = session(ARM)
+    s.drag_begin(7, 1, 1, "field")
+    for x in (0.05, 0.1, 0.15):
+        assert s.drag(7, 1, Translate((x, 0.0, 0.0))).part == 1.0
+    np.testing.assert_allclose(s.shown.entry(1).edit.deformed.pivot, (0.15, 0, 0))
+    assert not s.document.entry(1).edit.operations and s.saved
+    s.drag_end(7, 1, Translate((0.2, 0.0, 0.0)))
+    assert s.document.entry(1).edit.operations == (Translate((0.2, 0.0, 0.0)),)
+    assert s.history.names == ("Open", "Move of arm") and not s.saved and not s.drags
+
+
+def test_a_cancelled_drag_leaves_everything_as_it_was() -> None:
+    s = session(ARM)
+    s.drag_begin(1, 4, 1, "field")
+    s.drag(1, 4, Translate((0.1, 0, 0)))
+    s.drag_cancel(1)
+    assert s.shown == s.document == Document.of([ARM])
+    assert s.history.names == ("Open",)
+
+
+def test_the_outer_cage_stops_a_drag_and_says_why() -> None:
+    s = session(ARM)
+    s.drag_begin(1, 1, 1, "field")
+    moved = s.drag(1, 1, Translate((0.6, 0.0, 0.0)))
+    # The gap is 0.3 of the 0.6 asked for; safe_fraction is good to 1e-3 and never beyond the limit.
+    assert 0.49 < moved.part <= 0.5
+    assert moved.why is not None and "outer cage must contain the inner cage" in moved.why
+    assert moved.edit.outer is not None and moved.edit.outer.contains(moved.edit.deformed.corners).all()
+    s.drag_end(1, 1, Translate((0.6, 0.0, 0.0)))
+    assert s.problem(s.document.entry(1).edit) is None
+
+
+def test_a_drag_that_is_over_says_so() -> None:
+    s = session(ARM)
+    with pytest.raises(EditError, match="this drag is over"):
+        s.drag(1, 1, Translate((0.1, 0, 0)))
+    s.drag_begin(1, 1, 1, "field")
+    s.undo()
+    with pytest.raises(EditError, match="this drag is over"):
+        s.drag_end(1, 1, Translate((0.1, 0, 0)))
+
+
+def test_two_pages_drag_at_once_and_both_drags_are_shown_and_kept() -> None:
+    s = session(ARM, CUP)
+    s.drag_begin(1, 1, 1, "field")
+    s.drag_begin(2, 1, 2, "field")
+    s.drag(1, 1, Translate((0.1, 0, 0)))
+    s.drag(2, 1, Translate((0, 0.2, 0)))
+    pivots = [entry.edit.deformed.pivot for entry in s.shown.entries]
+    np.testing.assert_allclose(pivots, [(0.1, 0, 0), (0.6, 0.2, 0)])
+    s.drag_end(1, 1, Translate((0.1, 0, 0)))
+    s.drag_end(2, 1, Translate((0, 0.2, 0)))
+    assert s.history.names == ("Open", "Move of arm", "Move of cup")
+
+
+def test_a_drag_of_an_edit_that_another_page_removed_is_an_error_and_changes_nothing() -> None:
+    s = session(ARM, CUP)
+    s.drag_begin(1, 1, 2, "field")
+    s.drag(1, 1, Translate((0.1, 0, 0)))
+    s.remove(2)
+    assert [entry.edit.name for entry in s.shown.entries] == ["arm"]
+    with pytest.raises(EditError, match="edit 2 is not there any more"):
+        s.drag_end(1, 1, Translate((0.1, 0, 0)))
+    assert s.history.names[-1] == "Remove of cup" and not s.drags
+
+
+def test_set_mode_moves_cages_and_leaves_the_operations() -> None:
+    s = session(ARM.translate((0.1, 0, 0)))
+    s.apply(1, "both", Translate((0.2, 0.0, 0.0)))
+    edit = s.document.entry(1).edit
+    np.testing.assert_allclose(edit.inner.pivot, (0.2, 0, 0))
+    assert edit.outer is not None
+    np.testing.assert_allclose(edit.outer.center, (0.2, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(edit.deformed.pivot, (0.3, 0, 0))
+    assert edit.operations == (Translate((0.1, 0, 0)),)
+
+
+def test_set_mode_turns_both_cages_about_the_inner_ones_pivot() -> None:
+    outer = Cage.box((0.1, 0.1, 0), 1.4)
+    s = session(Edit(INNER, outer, name="a"))
+    s.apply(1, "both", Rotate((0, 0, 90)))
+    edit = s.document.entry(1).edit
+    assert edit.outer is not None
+    np.testing.assert_allclose(edit.outer.center, (-0.1, 0.1, 0), atol=1e-12)
+
+
+def test_in_set_mode_the_outer_cage_stops_at_the_inner_one() -> None:
+    s = session(ARM)
+    s.drag_begin(1, 1, 1, "outer")
+    moved = s.drag(1, 1, Scale((0.1, 0.1, 0.1)))
+    assert 0.0 < moved.part < 1.0 and moved.why is not None
+    assert moved.edit.outer is not None and moved.edit.outer.contains(INNER.corners).all()
+    assert moved.edit.inner == INNER
+
+
+def test_an_operation_from_numbers_is_done_whole_or_not_at_all() -> None:
+    s = session(ARM)
+    with pytest.raises(EditError, match=r"outer cage must contain.*% of it is possible"):
+        s.apply(1, "field", Translate((0.6, 0, 0)))
+    assert s.document == Document.of([ARM])
+
+
+def test_moves_one_after_the_other_become_one_operation_others_do_not() -> None:
+    s = session(ARM)
+    s.apply(1, "field", Translate((0.1, 0, 0)))
+    s.apply(1, "field", Translate((0.0, 0.05, 0)))
+    s.apply(1, "field", move_corners((3,), (0.01, 0, 0)))
+    s.apply(1, "field", move_corners((3,), (0.01, 0, 0)))
+    s.apply(1, "field", move_corners((2,), (0.01, 0, 0)))
+    s.apply(1, "field", Rotate((0, 0, 5)))
+    s.apply(1, "field", Rotate((0, 0, 5)))
+    assert s.document.entry(1).edit.operations == (
+        Translate((0.1, 0.05, 0.0)),
+        ops.MoveCorner(3, (0.02, 0, 0)),
+        ops.MoveCorner(2, (0.01, 0, 0)),
+        Rotate((0, 0, 5)),
+        Rotate((0, 0, 5)),
+    )
+    assert len(s.history.names) == 8
+
+
+@pytest.mark.parametrize(
+    ("corners", "expected"),
+    [
+        ((5,), ops.MoveCorner(5, (1, 0, 0))),
+        ((1, 0), ops.MoveEdge((0, 1), (1, 0, 0))),
+        ((7, 1, 3, 5), ops.MoveFace("+x", (1, 0, 0))),
+        ((0, 7), ops.MoveCorners((0, 7), (1, 0, 0))),
+    ],
+)
+def test_corners_that_are_an_edge_or_a_face_move_as_one(
+    corners: tuple[int, ...], expected: ops.Operation
+) -> None:
+    assert move_corners(corners, (1, 0, 0)) == expected
+
+
+def test_moved_corners_keep_the_pivot_and_move_no_others() -> None:
+    cage = ops.MoveCorners((0, 7), (0.05, 0, 0)).apply(INNER)
+    shift = np.zeros((8, 3))
+    shift[[0, 7], 0] = 0.05
+    np.testing.assert_array_equal(cage.corners, INNER.corners + shift)
+    np.testing.assert_array_equal(cage.pivot, INNER.pivot)
+    with pytest.raises(CageError, match="each once"):
+        INNER.move_corners((1, 1), (0, 0, 0))
+
+
+def test_undo_and_redo_of_everything() -> None:
+    s = session(ARM)
+    states = [s.document]
+
+    def did() -> None:
+        assert s.document != states[-1]
+        states.append(s.document)
+
+    s.apply(1, "field", Translate((0.1, 0, 0)))
+    did()
+    s.change(1, kind="copy")
+    did()
+    s.change(1, name="leg")
+    did()
+    s.duplicate(1)
+    did()
+    s.mirror(2, 0)
+    did()
+    s.reorder(1, 2)
+    did()
+    s.remove(2)
+    did()
+    s.preserve_opacity(False)
+    did()
+    s.set_path((Keyframe(tuple(np.eye(4).reshape(-1)), 40.0),), True)
+    did()
+    s.place(np.array([0.5, 0.0, 0.0]), 1.0)
+    did()
+    for state in reversed(states[:-1]):
+        s.undo()
+        assert s.document == state
+    s.undo()
+    assert s.document == states[0] and s.saved
+    for state in states[1:]:
+        s.redo()
+        assert s.document == state
+    s.go_to(3)
+    assert s.document == states[3]
+    s.apply(1, "field", Translate((0, 0.1, 0)))
+    assert s.history.names[4:] == ("Move of leg",)
+
+
+def test_history_never_leaves_its_ends() -> None:
+    history = History.begin("a").push("more", "b")
+    assert history.redo().state == "b" and history.undo().undo().state == "a"
+    assert history.undo().push("other", "c").names == ("Open", "other")
+
+
+def test_saved_follows_the_document_through_undo() -> None:
+    s = session(ARM)
+    s.apply(1, "field", Translate((0.1, 0, 0)))
+    s.mark_saved()
+    assert s.saved
+    s.undo()
+    assert not s.saved
+    s.redo()
+    assert s.saved
+
+
+def test_kinds_keep_what_the_other_kinds_cannot_have() -> None:
+    s = session(ARM.replace(falloff="linear", width=0.5).translate((0.1, 0, 0)))
+    s.change(1, kind="delete")
+    edit = s.document.entry(1).edit
+    assert edit.deleted and not edit.operations and edit.width == 1.0
+    s.change(1, kind="copy")
+    edit = s.document.entry(1).edit
+    assert edit.keep_source and edit.operations == (Translate((0.1, 0, 0)),)
+    s.change(1, kind="continuous")
+    edit = s.document.entry(1).edit
+    assert (edit.falloff, edit.width, edit.operations) == ("linear", 0.5, (Translate((0.1, 0, 0)),))
+
+
+def test_a_discrete_edit_that_becomes_continuous_gets_an_outer_cage_it_fits() -> None:
+    s = session(CUP.translate((0, 0.5, 0)))
+    s.change(1, kind="continuous")
+    edit = s.document.entry(1).edit
+    assert s.problem(edit) is None and s.drawn() == (edit,)
+
+
+def test_a_shell_without_falloff_loses_it_and_gets_it_back() -> None:
+    s = session(ARM.replace(width=0.5))
+    s.change(1, shell="trilinear")
+    assert s.document.entry(1).edit.width == 1.0
+    s.change(1, shell="flow")
+    assert s.document.entry(1).edit.width == 0.5
+
+
+def test_an_edit_that_is_impossible_is_left_out_and_says_why() -> None:
+    s = session(ARM, CUP.translate((0, 0.1, 0)))
+    s.set_cage(1, "outer", Cage.box((0, 0, 0), 0.3))
+    edit = s.document.entry(1).edit
+    assert "outer cage must contain the inner cage" in (s.problem(edit.translate((0.01, 0, 0))) or "")
+    s.apply(1, "field", Translate((0.01, 0, 0)))
+    assert [drawn.name for drawn in s.drawn()] == ["cup"]
+
+
+def test_locked_edits_stay_as_they_are() -> None:
+    s = session(ARM)
+    s.change(1, locked=True)
+    for act in (
+        lambda: s.apply(1, "field", Translate((0.1, 0, 0))),
+        lambda: s.drag_begin(1, 1, 1, "inner"),
+        lambda: s.change(1, name="leg"),
+        lambda: s.remove(1),
+        lambda: s.set_cage(1, "inner", INNER),
+        lambda: s.outer_margin(1, 0.1),
+    ):
+        with pytest.raises(EditError, match=r'"arm" is locked; unlock it'):
+            act()
+    s.change(1, enabled=False)
+    s.change(1, locked=False)
+    s.remove(1)
+    assert not s.document.entries and s.selected is None
+
+
+def test_a_deleted_edit_cannot_move() -> None:
+    s = session(Edit.delete(INNER, name="gone"))
+    with pytest.raises(EditError, match="choose move or copy"):
+        s.apply(1, "field", Translate((0.1, 0, 0)))
+
+
+def test_names_stay_apart() -> None:
+    s = session(ARM)
+    s.duplicate(1)
+    s.duplicate(2)
+    s.place(np.zeros(3), 1.0)
+    s.place(np.zeros(3), 1.0)
+    names = [entry.edit.name for entry in s.document.entries]
+    assert names == ["arm", "arm 2", "arm 3", "edit 1", "edit 2"]
+
+
+def test_placed_cages_are_of_a_sensible_size_and_fit_together() -> None:
+    s = session()
+    number = s.place(np.array([0.3, 0.2, 0.1]), view_height=1.5)
+    edit = s.document.entry(number).edit
+    size = np.diff(edit.inner.aabb, axis=0)[0]
+    np.testing.assert_allclose(size, 0.33)  # 22 % of the view's height
+    edit.check()
+    s.place(np.zeros(3), view_height=100.0)
+    far = s.document.entries[-1].edit
+    np.testing.assert_allclose(np.diff(far.inner.aabb, axis=0)[0], 2.0 / 3.0)  # a third of the field
+    s.place(np.zeros(3), view_height=1e-3)
+    near = s.document.entries[-1].edit
+    np.testing.assert_allclose(np.diff(near.inner.aabb, axis=0)[0], 0.08)  # 8 voxels
+
+
+def test_the_outer_margin_holds_the_inner_cage_before_and_after() -> None:
+    s = session(ARM.translate((0.2, 0, 0)))
+    s.outer_margin(1, 0.1)
+    outer = s.document.entry(1).edit.outer
+    assert outer is not None
+    np.testing.assert_allclose(outer.aabb, [[-0.3, -0.3, -0.3], [0.5, 0.3, 0.3]])
+
+
+def test_edit_texts_go_out_and_come_in() -> None:
+    s = session(ARM.translate((0.1, 0, 0)), CUP)
+    text = s.edit_text(1)
+    assert s.load_edits(text, append=True) == 1
+    moved = ARM.translate((0.1, 0, 0))
+    assert [entry.edit for entry in s.document.entries] == [moved, CUP, moved]
+    s.load_edits("edits: []", append=False)
+    assert not s.document.entries
+    with pytest.raises(EditError, match=r"the text, line 1.*unknown key"):
+        s.load_edits("edit: []", append=False)
+
+
+def test_the_space_below_an_edit_is_that_of_the_shown_edits_before_it() -> None:
+    s = session(ARM.translate((0.1, 0, 0)), CUP.replace(enabled=False), CUP)
+    assert s.below(3) == (s.document.entry(1).edit,)
+    assert s.below(1) == ()

@@ -1,0 +1,288 @@
+"""The rendering process' side of the editor, called directly."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cagefield import devices
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import CagefieldError, EditError
+from cagefield.keyframes import Keyframe, Still
+from cagefield.server import jobs
+from cagefield.server.document import Document
+from cagefield.server.grid_lines import grid_lines
+from cagefield.server.placing import PROBES, fitted, probes
+from cagefield.server.scheduler import Look, Region
+from cagefield.server.studio import Studio
+from cagefield.server.tasks import (
+    WARM_STAGES,
+    Answered,
+    EndJobTask,
+    ErrorTask,
+    FitTask,
+    FrameTask,
+    PictureDone,
+    PictureTask,
+    Shown,
+    Stopped,
+    WarmTask,
+    values_of,
+)
+from cagefield.server.working import Working
+from scenes import ball_scene
+
+SIDE = 48
+INNER = Cage.box((0, 0, 0), 1.2)
+MOVED = Edit(INNER, INNER.grown(0.4), name="ball", lattice=24).translate((0.25, 0, 0))
+COPY = Edit(INNER, adjustment="discrete", keep_source=True).translate((0, 0.6, 0.6))
+CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
+WHOLE = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    devices.start("cpu")
+    return Studio(ball_scene())
+
+
+def task(
+    *edits: Edit,
+    region: Region = WHOLE,
+    look: Look = Look(),  # noqa: B008  immutable
+    moving: bool = False,
+    exact: bool = True,
+) -> PictureTask:
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, moving, exact, 0)
+
+
+def picture(studio: Studio, asked: PictureTask) -> np.ndarray[Any, Any]:
+    done = studio.picture(asked, lambda: False)
+    assert isinstance(done, PictureDone)
+    return np.asarray(Image.open(io.BytesIO(done.picture))).astype(float)
+
+
+def test_pictures_are_those_of_the_scene(studio: Studio) -> None:
+    frame = studio.scene.with_edits(EditStack([MOVED])).render(CAMERA)
+    # JPEG at quality 95 with full-resolution colour: errors of a few levels.
+    assert np.abs(picture(studio, task(MOVED)) - frame.rgb8()).mean() < 2.0
+
+
+def test_tiles_put_together_are_the_whole_picture(studio: Studio) -> None:
+    whole = studio._part(task(MOVED), studio.renderer(task(MOVED).shown, exact=True), WHOLE, lambda: False)
+    assert whole is not None
+    joined = np.zeros_like(whole.rgb)
+    for x, width in ((0, 16), (16, 13), (29, 19)):
+        for y, height in ((0, 21), (21, 27)):
+            part = studio._part(
+                task(MOVED),
+                studio.renderer(task(MOVED).shown, exact=True),
+                Region(x, y, width, height, SIDE, SIDE),
+                lambda: False,
+            )
+            assert part is not None
+            joined[y : y + height, x : x + width] = part.rgb
+    np.testing.assert_array_equal(joined, whole.rgb)
+
+
+@pytest.mark.parametrize("edits", [(MOVED,), (COPY,), (MOVED, COPY)], ids=["continuous", "copy", "both"])
+def test_quick_pictures_show_the_same(studio: Studio, edits: tuple[Edit, ...]) -> None:
+    shown = Shown(values_of(edits))
+    quick = studio._part(task(*edits), studio.renderer(shown, exact=False), WHOLE, lambda: False)
+    exact = studio._part(task(*edits), studio.renderer(shown, exact=True), WHOLE, lambda: False)
+    assert quick is not None and exact is not None
+    # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty.
+    np.testing.assert_array_equal(quick.rgb, exact.rgb)
+
+
+def test_a_quick_lattice_is_coarser_and_close(studio: Studio) -> None:
+    fine = MOVED.replace(lattice=96)
+    quick = studio.renderer(Shown(values_of((fine,))), exact=False)
+    assert quick.edits[0].lattice == 32
+    near = studio._part(task(fine), quick, WHOLE, lambda: False)
+    assert near is not None
+    exact = studio.scene.with_edits(EditStack([fine])).render(CAMERA)
+    assert np.abs(near.rgb - exact.rgb).mean() < 0.003
+
+
+def test_before_leaves_the_edits_out_left_of_the_split(studio: Studio) -> None:
+    plain, edited = picture(studio, task()), picture(studio, task(MOVED))
+    assert np.abs(plain - edited).max() > 100
+    half = picture(studio, task(MOVED, look=Look(before=True, split=0.5)))
+    # Blocks of 8 pixels beside the split mix in a JPEG.
+    assert np.abs(half[:, :16] - plain[:, :16]).max() < 12
+    assert np.abs(half[:, 32:] - edited[:, 32:]).max() < 12
+    assert np.abs(picture(studio, task(MOVED, look=Look(before=True))) - plain).max() < 12
+    tile = Region(32, 0, 16, SIDE, SIDE, SIDE)
+    right = picture(studio, task(MOVED, region=tile, look=Look(before=True, split=0.5)))
+    assert np.abs(right - edited[:, 32:]).max() < 12
+
+
+def test_views(studio: Studio) -> None:
+    frame = studio.plain.render(CAMERA, background="white", normals=True)
+    assert frame is not None and frame.normals is not None
+    opacity = picture(studio, task(look=Look("opacity")))
+    assert np.abs(opacity[..., 0] / 255 - frame.opacity).mean() < 0.01
+    normals = picture(studio, task(look=Look("normals"))) / 127.5 - 1.0
+    seen = frame.opacity > 0.99
+    assert np.abs(normals[seen] - frame.normals[seen]).mean() < 0.05
+    depth = picture(studio, task(look=Look("depth")))[..., 0]
+    middle, edge = depth[SIDE // 2, SIDE // 2], depth[SIDE // 2, np.flatnonzero(seen[SIDE // 2])[0]]
+    assert middle > edge > 0 and depth[0, 0] < 5
+
+
+def test_depths_are_distances_along_the_rays(studio: Studio) -> None:
+    done = studio.picture(task(), lambda: False)
+    assert isinstance(done, PictureDone)
+    depth = np.frombuffer(done.depth, "<u2").reshape(SIDE, SIDE)
+    frame = studio.plain.render(CAMERA)
+    assert frame is not None
+    seen = frame.opacity > 0.5
+    assert ((depth == 65535) == ~seen).all()
+    # Rounded down to whole units of the scale.
+    assert np.abs(depth[seen] * done.depth_scale - frame.depth[seen]).max() <= done.depth_scale * 1.01
+
+
+def test_a_tile_nobody_wants_any_more_is_stopped(studio: Studio) -> None:
+    assert isinstance(studio.picture(task(MOVED), lambda: True), Stopped)
+
+
+def test_edits_that_stay_are_not_prepared_again(studio: Studio) -> None:
+    first = studio.edits(values_of((MOVED, COPY)))
+    again = studio.edits(values_of((MOVED, COPY.translate((0.1, 0, 0)))))
+    assert again[0] is first[0] and again[1] is not first[1]
+    shown = Shown(values_of((MOVED,)))
+    assert studio.renderer(shown, exact=True) is studio.renderer(shown, exact=False)
+
+
+def test_an_impossible_edit_is_an_error(studio: Studio) -> None:
+    with pytest.raises(EditError, match="outer cage must contain"):
+        studio.picture(task(MOVED.translate((0.4, 0, 0))), lambda: False)
+
+
+def test_warming_up_is_possible_for_every_stage(studio: Studio) -> None:
+    working = Working(studio)
+    for stage in range(WARM_STAGES):
+        assert isinstance(working.do(WarmTask(1, stage), lambda _: False), Answered)
+
+
+def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(studio: Studio) -> None:
+    working = Working(studio)
+    cage = Cage.box((0, 0, 0), 1.9)
+    low, high = (
+        fitted(cage, np.array(found.value)).aabb
+        for found in (
+            working.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False) for edits in ((), (MOVED,))
+        )
+        if isinstance(found, Answered)
+    )
+    # The ball has radius 0.5, its density fades out over a voxel, 0.125, and probes lie 1.9 / 40 apart.
+    np.testing.assert_allclose(low, [[-0.6] * 3, [0.6] * 3], atol=0.08)
+    np.testing.assert_allclose(high[:, 0], low[:, 0] + 0.25, atol=0.08)
+    with pytest.raises(EditError, match="nothing dense inside"):
+        fitted(cage, np.zeros(PROBES**3, bool))
+
+
+def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
+    cage = Cage.box((0, 0, 0), 2.0, (0.0, 0.0, 0.4))
+    points = probes(cage)
+    dense = np.linalg.norm(points, axis=1) < 0.5
+    dense[0] = True
+    expected = Cage.box((0, 0, 0), 1.0, (0.0, 0.0, 0.4))
+    np.testing.assert_allclose(fitted(cage, dense).corners, expected.corners, atol=0.13)
+
+
+def test_the_grid_bends_with_the_edit() -> None:
+    devices.start("cpu")
+    lines = grid_lines(MOVED.replace(lattice=None))
+    warp = MOVED.replace(lattice=None).warp
+    points = np.concatenate([np.array(line) for line in lines])
+    canonical = warp.to_canonical(points).points
+    assert MOVED.outer is not None
+    origin, frame = MOVED.outer.frame
+    u = (canonical - origin) @ np.linalg.inv(frame).T
+    # Each point lies on a line of the grid in canonical space: two of its coordinates are sixths, one of them
+    # a half. 33 lattice nodes over 2.0 with a map that bends at the cages' faces: 1 % of the outer cage.
+    off = np.sort(np.abs(u * 6 - np.round(u * 6)) / 6, axis=1)
+    assert np.quantile(off[:, 1], 0.95) < 0.012
+    assert np.abs(points - canonical).max() > 0.2
+    assert grid_lines(COPY) == []
+
+
+def test_the_error_of_a_lattice_is_told_in_voxels(studio: Studio) -> None:
+    found = Working(studio).do(ErrorTask(1, values_of((MOVED,))[0]), lambda _: False)
+    assert isinstance(found, Answered)
+    most, mean = MOVED.lattice_error(samples=5_000)
+    np.testing.assert_allclose(found.value, (most / 0.125, mean / 0.125))
+
+
+def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
+    studio: Studio, tmp_path: Path
+) -> None:
+    working = Working(studio)
+    still = Still(CAMERA, {})
+
+    def frame(job: int, index: int, what: Any, out: Path, generation: int = 0) -> FrameTask:
+        return FrameTask(1, job, index, 3, what, str(out), 10.0, Shown(()), still, generation)
+
+    for index in range(3):
+        working.do(frame(1, index, "test_views", tmp_path / "views"), lambda _: False)
+        working.do(frame(2, index, "camera_path", tmp_path / "a.mp4"), lambda _: False)
+        working.do(frame(3, index, "camera_path", tmp_path / "b.mp4"), lambda _: False)
+    assert not (tmp_path / "a.mp4").exists()
+    working.do(EndJobTask(1, 2, keep=True), lambda _: False)
+    working.do(EndJobTask(1, 3, keep=False), lambda _: False)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "views"]
+    shots = sorted((tmp_path / "views").iterdir())
+    assert [file.name for file in shots] == ["0000.png", "0001.png", "0002.png"]
+    expected = studio.scene.render(CAMERA).rgb8()
+    np.testing.assert_array_equal(np.asarray(Image.open(shots[0])), expected)
+    assert isinstance(
+        working.do(frame(4, 0, "test_views", tmp_path / "no", generation=0), lambda wanted: True), Stopped
+    )
+    assert not (tmp_path / "no").exists()
+
+
+KEYS = tuple(
+    Keyframe(tuple(np.eye(4).reshape(-1)), 40.0, 1.0, parts) for parts in ({1: 0.0, 2: 0.0}, {1: 1.0})
+)
+
+
+def test_edits_are_blended_along_a_path() -> None:
+    gone = Edit.delete(Cage.box((0.5, 0, 0), 0.1))
+    document = Document.of([MOVED, gone, MOVED.replace(enabled=False)], keys=KEYS)
+    assert jobs.blended(document, {1: 0.0, 2: 0.0}) == ()
+    half = jobs.blended(document, {1: 0.5, 2: 0.5})
+    np.testing.assert_allclose(half[0].deformed.pivot, (0.125, 0, 0))
+    assert half[1] == gone
+    assert jobs.blended(document, {}) == (MOVED, gone)
+
+
+def test_jobs_refuse_what_they_could_not_write(tmp_path: Path) -> None:
+    document = Document.of([], keys=KEYS)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "a").write_text("")
+    (tmp_path / "a.mp4").write_text("")
+    path = jobs.camera_path
+    with pytest.raises(CagefieldError, match="exists already; give another name"):
+        path(1, document, tmp_path / "a.mp4", (8, 8), 24.0, overwrite=False)
+    with pytest.raises(CagefieldError, match=r"ends in \.mp4"):
+        path(1, document, tmp_path / "a.avi", (8, 8), 24.0, overwrite=False)
+    with pytest.raises(CagefieldError, match="needs at least one keyframe"):
+        path(1, Document(), tmp_path / "b.mp4", (8, 8), 24.0, overwrite=False)
+    with pytest.raises(CagefieldError, match="is not empty"):
+        jobs.test_views(1, document, (CAMERA,), tmp_path / "full", (8, 8), overwrite=False)
+    with pytest.raises(CagefieldError, match="is a file"):
+        jobs.test_views(1, document, (CAMERA,), tmp_path / "a.mp4", (8, 8), overwrite=False)
+    with pytest.raises(CagefieldError, match="no cameras to render from"):
+        jobs.test_views(1, document, (), tmp_path / "new", (8, 8), overwrite=False)
+    assert path(1, document, tmp_path / "a.mp4", (8, 8), 24.0, overwrite=True).total == 25
+    job = jobs.test_views(1, document, (CAMERA,), tmp_path / "full", (24, 96), overwrite=True)
+    assert (job.stills[0].camera.width, job.stills[0].camera.height) == (24, 24)

@@ -1,0 +1,280 @@
+/** The page's parts put together: what arrives is taken in, what is to be seen is drawn. */
+import { Vector3 } from "three";
+import { middle } from "./cage";
+import { CameraFeed } from "./camera_feed";
+import { Connection, socketAddress } from "./connection";
+import { Drag, leading } from "./drag";
+import { Gizmo } from "./gizmo";
+import { Handles } from "./handles";
+import { Latency } from "./latency";
+import { Lines } from "./lines";
+import { Pictures } from "./pictures";
+import { recallCamera, recallTools } from "./remembered";
+import { scenery, shownCages } from "./scenery";
+import { Stage } from "./stage";
+import { Store, obstacle, selected, target } from "./store";
+import { unpack } from "./wire";
+import type { Operation } from "./operations";
+import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, ServerMessage, State, Vec3 } from "./protocol";
+
+export class App {
+  readonly store = new Store(recallTools());
+  readonly stage: Stage;
+  readonly pictures: Pictures;
+  readonly gizmo: Gizmo;
+  readonly camera: CameraFeed;
+  readonly latency = new Latency();
+  drag: Drag | null = null;
+  lastPicture: PictureHeader | null = null;
+  /** When a picture or a state last came. */
+  lastNews = 0;
+  private readonly lines: Lines;
+  private readonly handles: Handles;
+  private readonly connection: Connection;
+  private grid: { key: string; lines: Vec3[][] } = { key: "", lines: [] };
+  private readonly questions = new Map<number, (answer: Answer) => void>();
+  private requests = 0;
+  private drags = 0;
+  private pictureChain: Promise<void> = Promise.resolve();
+  private pending: (() => void)[] = [];
+  private placedAfter: number | null = null;
+
+  constructor(host: HTMLElement) {
+    this.stage = new Stage(host);
+    this.pictures = new Pictures(this.stage);
+    this.lines = new Lines(this.stage, this.pictures);
+    this.handles = new Handles(this.stage);
+    this.gizmo = new Gizmo(this.stage.scene, this.stage.camera);
+    this.camera = new CameraFeed(this.stage, (message) => this.send(message));
+    this.stage.beforeFrame.push(() => this.arrange());
+    this.stage.afterFrame.push((time) => this.framed(time));
+    this.store.listen((now, before) => {
+      if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
+      this.stage.invalidate();
+    });
+    this.store.watch(["grid", "state"], () => this.askGrid());
+    this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
+      opened: () => this.store.set({ connection: "open" }),
+      lost: () => this.lost(),
+      message: (message) => this.take(message),
+      picture: (bytes) => this.takePicture(bytes),
+    });
+  }
+
+  /** Sends a message, or says that nobody is there. */
+  send(message: PageMessage): boolean {
+    return this.connection.send(message);
+  }
+
+  /** Asks the server; the answer comes, or nothing does. */
+  ask(question: Omit<Ask, "type" | "request">): Promise<Answer> {
+    const request = ++this.requests;
+    return new Promise((resolve) => {
+      this.questions.set(request, resolve);
+      this.send({ type: "ask", request, ...question });
+    });
+  }
+
+  say(text: string, level: "info" | "warning" | "error" = "info"): void {
+    this.store.set({ notice: { type: "notice", level, text } });
+  }
+
+  /** Begins a drag of the selected edit; null, and why, where it cannot be dragged. */
+  beginDrag(what = target(this.store.now)): Drag | null {
+    const edit = selected(this.store.now);
+    if (edit === null || this.store.now.connection !== "open") return null;
+    const why = obstacle(edit, this.store.now.mode);
+    if (why !== null) {
+      this.say(why, "warning");
+      return null;
+    }
+    this.drags += 1;
+    this.drag = new Drag(this.drags, edit, what, (message) => this.send(message));
+    this.store.set({ limit: null });
+    return this.drag;
+  }
+
+  /** Moves the drag on; `time` is when the mouse moved. */
+  moveDrag(operation: Operation, time: number): void {
+    if (this.drag === null) return;
+    this.drag.move(operation);
+    this.latency.moved(this.drag.id, this.drag.seq, time);
+    this.store.set({ limit: this.drag.why });
+    this.stage.invalidate();
+  }
+
+  endDrag(): void {
+    this.drag?.end();
+    this.stage.invalidate();
+  }
+
+  cancelDrag(): void {
+    this.drag?.cancel();
+    this.drag = null;
+    this.store.set({ limit: null });
+    this.stage.invalidate();
+  }
+
+  /** After a new edit was asked for: Set mode, as soon as it is there. */
+  expectEdit(): void {
+    this.placedAfter = Math.max(0, ...(this.store.now.state?.edits.map((edit) => edit.id) ?? []));
+  }
+
+  /** Where the gizmo stands: on a pivot, or between the corners that were chosen. */
+  get gizmoAt(): Vector3 | null {
+    const { now } = this.store;
+    const edit = selected(now);
+    if (edit === null || now.corners.length === 0) return null;
+    return new Vector3(...middle(leading(shownCages(edit, this.drag), target(now)).corners, now.corners));
+  }
+
+  /** Puts lines, handles and the gizmo where they belong now. */
+  arrange(): void {
+    const { now } = this.store;
+    const edit = selected(now);
+    const eye = this.stage.camera.position.toArray();
+    const grid = this.drag === null ? this.grid.lines : [];
+    const { segments, dots } = scenery(now, this.drag, grid, eye);
+    this.lines.set(segments);
+    this.handles.set(dots);
+    if (edit === null || !now.cages || obstacle(edit, now.mode) !== null || (now.tool === "select" && now.corners.length === 0)) {
+      this.gizmo.hide();
+      return;
+    }
+    const cage = leading(shownCages(edit, this.drag), target(now));
+    if (this.gizmo.dragging) this.gizmo.settle(this.gizmoAt ?? new Vector3(...cage.pivot));
+    else this.gizmo.show(now.tool, now.axes, cage, this.gizmoAt);
+  }
+
+  private take(message: ServerMessage): void {
+    switch (message.type) {
+      case "hello":
+        this.greeted(message);
+        break;
+      case "state":
+        this.takeState(message);
+        break;
+      case "dragged":
+        this.drag?.answered(message);
+        if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
+        this.stage.invalidate();
+        break;
+      case "answer":
+        this.questions.get(message.request)?.(message);
+        this.questions.delete(message.request);
+        break;
+      case "notice":
+        this.store.set({ notice: message });
+        break;
+      case "job":
+        this.store.set({ jobs: [...this.store.now.jobs.filter((job) => job.job !== message.job), message] });
+        break;
+    }
+  }
+
+  private greeted(hello: Hello): void {
+    const first = this.store.now.hello === null;
+    this.store.set({ hello });
+    this.lines.slack = 1.5 * hello.voxel;
+    if (first) {
+      const [low, high] = hello.bounds;
+      const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
+      this.stage.look(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
+    }
+    this.camera.restate();
+    this.sendLook();
+  }
+
+  private takeState(state: State): void {
+    this.lastNews = performance.now();
+    const placed = state.edits.find((edit) => this.placedAfter !== null && edit.id > this.placedAfter);
+    if (this.drag?.ended) {
+      this.drag = null;
+      this.store.set({ limit: null });
+    }
+    const other = state.selected !== this.store.now.state?.selected;
+    this.store.set({ state, ...(other ? { corners: [], hover: null } : {}) });
+    if (placed) {
+      this.placedAfter = null;
+      this.store.set({ mode: "set", cage: "inner" });
+    }
+  }
+
+  private lost(): void {
+    const dragging = this.drag !== null;
+    this.drag = null;
+    this.questions.clear();
+    this.store.set({ connection: "lost", limit: null });
+    if (dragging) this.say("the server went away in the middle of a drag, which is lost", "warning");
+    this.stage.invalidate();
+  }
+
+  private sendLook(): void {
+    const { view, before, split } = this.store.now;
+    this.send({ type: "look", view, before, split });
+  }
+
+  /** Decodes a picture away from the main thread, and shows pictures in the order in which they came. */
+  private takePicture(bytes: ArrayBuffer): void {
+    const received = performance.now();
+    const { header, picture, depth } = unpack(bytes);
+    const decoding = createImageBitmap(new Blob([picture.slice()]), { colorSpaceConversion: "none" });
+    this.pictureChain = this.pictureChain.then(async () => {
+      try {
+        const image = await decoding;
+        const decoded = performance.now();
+        this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
+        this.lastPicture = header;
+        this.lastNews = performance.now();
+        this.pending.push(() => this.presented(header, received, decoded));
+      } catch {
+        this.say("a picture from the server could not be decoded", "warning");
+        this.send({ type: "presented", picture: header.picture });
+      }
+    });
+  }
+
+  private framed(time: number): void {
+    this.latency.framed(time);
+    const shown = this.pending;
+    this.pending = [];
+    for (const done of shown) done();
+  }
+
+  private presented(header: PictureHeader, received: number, decoded: number): void {
+    const time = performance.now();
+    this.send({ type: "presented", picture: header.picture });
+    const { drag, seq, camera, revision, width, full_width, final, render_ms, encode_ms } = header;
+    this.latency.shown(
+      { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
+      received, decoded, render_ms, encode_ms,
+    ); // prettier-ignore
+    const figures = {
+      perSecond: this.latency.perSecond(time),
+      renderMs: render_ms,
+      encodeMs: encode_ms,
+      width: full_width,
+      height: header.full_height,
+      final,
+    };
+    this.store.set({ figures });
+  }
+
+  private askGrid(): void {
+    const edit = selected(this.store.now);
+    if (!this.store.now.grid || edit === null || edit.kind !== "continuous") return;
+    const key = JSON.stringify([edit.id, edit.deformed, edit.outer, edit.inner, edit.shell, edit.falloff, edit.width]);
+    if (key === this.grid.key) return;
+    this.grid = { key, lines: [] };
+    void this.ask({ what: "grid", edit: edit.id }).then(({ grid }) => {
+      if (this.grid.key !== key) return;
+      this.grid.lines = grid;
+      this.stage.invalidate();
+    });
+  }
+
+  /** The cages of an edit as they are shown now. */
+  shown(edit: EditState): ReturnType<typeof shownCages> {
+    return shownCages(edit, this.drag);
+  }
+}

@@ -1,0 +1,68 @@
+/** Tells the server where the page looks from, once a frame, and remembers it for the pictures that answer. */
+import type { PageMessage } from "./protocol";
+import type { Viewpoint } from "./pictures";
+import type { Stage } from "./stage";
+
+const REST_AFTER = 140;
+const REMEMBERED = 200;
+
+export class CameraFeed {
+  seq = 0;
+  private readonly viewpoints = new Map<number, Viewpoint>();
+  private changed = false;
+  private moving = false;
+  private rest: ReturnType<typeof setTimeout> | undefined;
+  /** Whether a button is held that turns the view: then it does not rest. */
+  held = false;
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly send: (message: PageMessage) => boolean,
+  ) {
+    stage.cameraChanged.push(() => {
+      this.changed = true;
+      this.moving = true;
+      this.waitForRest();
+    });
+    stage.beforeFrame.push(() => {
+      if (this.changed) this.tell();
+    });
+  }
+
+  /** Sends the camera as it is, at rest: after connecting, say. */
+  restate(): void {
+    this.moving = false;
+    this.tell();
+  }
+
+  /** Where the picture of a camera message was taken from. */
+  viewpoint(seq: number): Viewpoint | null {
+    return this.viewpoints.get(seq) ?? null;
+  }
+
+  private waitForRest(): void {
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => {
+      if (this.held) this.waitForRest();
+      else this.restate();
+    }, REST_AFTER);
+  }
+
+  private tell(): void {
+    this.changed = false;
+    const { stage } = this;
+    const seq = ++this.seq;
+    this.viewpoints.set(seq, { viewProjection: stage.viewProjection, eye: stage.camera.position.clone() });
+    this.viewpoints.delete(seq - REMEMBERED);
+    const { width, height } = stage.pixels;
+    this.send({
+      type: "camera",
+      seq,
+      c2w: stage.c2w,
+      width: Math.min(4096, Math.max(16, width)),
+      height: Math.min(4096, Math.max(16, height)),
+      fov_y_deg: stage.camera.fov,
+      moving: this.moving,
+    });
+  }
+}

@@ -1,0 +1,92 @@
+/** `window.cagefield`: what tests and measurements may read of the page. */
+import { cornersOf, middle, type Part } from "./cage";
+import type { App } from "./app";
+import type { Latency } from "./latency";
+import type { PictureHeader } from "./protocol";
+import { pickCorner } from "./picking";
+import { draggable } from "./scenery";
+import { selected, type Editor } from "./store";
+
+export interface Inspector {
+  readonly now: Editor;
+  readonly picture: PictureHeader | null;
+  readonly latency: Latency;
+  readonly camera: { c2w: number[]; seq: number };
+  /** Why the last drag stopped, what it was. */
+  readonly drag: { id: number; seq: number; ended: boolean; why: string | null } | null;
+  /** Whether the last picture is final, and shows the camera as it is and no drag. */
+  readonly settled: boolean;
+  /** Milliseconds since a picture or a state came. */
+  readonly quiet: number;
+  /** A part of a cage, as it is shown, in CSS pixels of the window. */
+  screen(edit: number, kind: Part["kind"], index: number, cage?: "inner" | "deformed" | "outer"): { x: number; y: number };
+  /** Where to take hold of the gizmo's handle ("X", "XY", "XYZ", ...), in CSS pixels of the window. */
+  grip(axis: string): { x: number; y: number } | null;
+  /** A point of space in CSS pixels of the window. */
+  project(point: [number, number, number]): { x: number; y: number };
+  /** Distance along the ray at a CSS pixel of the window; null where there is nothing. */
+  depth(x: number, y: number): number | null;
+}
+
+declare global {
+  interface Window {
+    cagefield?: Inspector;
+  }
+}
+
+export function inspector(app: App): Inspector {
+  const { stage } = app;
+  const inWindow = (x: number, y: number): { x: number; y: number } => {
+    const box = stage.canvas.getBoundingClientRect();
+    return { x: box.left + x, y: box.top + y };
+  };
+  return {
+    get now() {
+      return app.store.now;
+    },
+    get picture() {
+      return app.lastPicture;
+    },
+    latency: app.latency,
+    get camera() {
+      return { c2w: stage.c2w, seq: app.camera.seq };
+    },
+    get drag() {
+      return app.drag && { id: app.drag.id, seq: app.drag.seq, ended: app.drag.ended, why: app.drag.why };
+    },
+    get settled() {
+      const picture = app.lastPicture;
+      return picture !== null && picture.final && picture.camera === app.camera.seq && app.drag === null;
+    },
+    get quiet() {
+      return performance.now() - app.lastNews;
+    },
+    screen(id, kind, index, cage = "deformed") {
+      const edit = app.store.now.state?.edits.find((each) => each.id === id);
+      const posed = edit && app.shown(edit)[cage];
+      if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
+      const { x, y } = stage.project(middle(posed.corners, cornersOf({ kind, index })));
+      return inWindow(x, y);
+    },
+    grip(axis) {
+      app.arrange();
+      const { width, height } = stage.points;
+      const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
+      const edit = selected(app.store.now);
+      const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
+      const slack = { x: 4 / width, y: 4 / height };
+      const at = app.gizmo.grip(axis, slack, (device) =>
+        cages.every(({ corners }) => pickCorner(...pixel(device), corners, stage.project) === null),
+      );
+      return at && inWindow(...pixel(at));
+    },
+    project(point) {
+      const { x, y } = stage.project(point);
+      return inWindow(x, y);
+    },
+    depth(x, y) {
+      const box = stage.canvas.getBoundingClientRect();
+      return app.pictures.depth.at((x - box.left) / box.width, (y - box.top) / box.height);
+    },
+  };
+}

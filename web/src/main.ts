@@ -1,0 +1,51 @@
+import "./editor.css";
+import { Actions } from "./actions";
+import { App } from "./app";
+import { inspector } from "./inspect";
+import { bindings, listenForKeys } from "./keys";
+import { Pointer } from "./pointer";
+import { remember } from "./remembered";
+import { dialogs } from "./ui/dialogs";
+import { h } from "./ui/dom";
+import { editsList } from "./ui/edits_list";
+import { help } from "./ui/help";
+import { historyList } from "./ui/history_list";
+import { jobs } from "./ui/jobs";
+import { options } from "./ui/options";
+import { overlay } from "./ui/overlay";
+import { pathList } from "./ui/path_list";
+import { status } from "./ui/status";
+import { toolbar } from "./ui/toolbar";
+import { topbar } from "./ui/topbar";
+
+const view = h("main", { class: "view" });
+const root = h("div", { class: "editor" }, view);
+document.body.append(root);
+
+const app = new App(view);
+const actions = new Actions(app);
+const pointer = new Pointer(app);
+const questions = dialogs(app);
+const keys = bindings(app, actions, pointer, questions);
+listenForKeys(app, actions, pointer, keys);
+
+const panel = h(
+  "aside",
+  { class: "panel" },
+  editsList(app, actions),
+  options(app, actions),
+  historyList(app),
+  pathList(app, actions, questions),
+  jobs(app),
+);
+view.append(overlay(app, pointer));
+root.append(topbar(app, actions, questions), toolbar(app, actions), panel, status(app), help(app, keys), questions.element);
+app.store.watch(["panel"], (now) => root.classList.toggle("wide", !now.panel));
+app.store.watch(["state", "hello"], ({ hello, state }) => {
+  document.title = `${state?.saved === false ? "● " : ""}${hello?.name ?? "cagefield"}`;
+});
+addEventListener("beforeunload", (event) => {
+  if (app.store.now.hello !== null) remember(app.store.now, app.stage.c2w);
+  if (app.store.now.state?.saved === false) event.preventDefault();
+});
+window.cagefield = inspector(app);

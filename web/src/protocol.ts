@@ -1,0 +1,451 @@
+// Made by `npm run protocol` from src/cagefield/server/protocol.py; change that.
+
+/**
+ * @minItems 3
+ * @maxItems 3
+ */
+export type Vec3 = [number, number, number];
+/**
+ * @minItems 8
+ * @maxItems 8
+ */
+export type Corners = [Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3];
+export type PageMessage =
+  | CameraMessage
+  | LookMessage
+  | PresentedMessage
+  | DragBegin
+  | DragMove
+  | DragEnd
+  | DragCancel
+  | Apply
+  | SetCage
+  | Place
+  | FitInner
+  | OuterMargin
+  | Change
+  | SceneChange
+  | Command
+  | Mirror
+  | Reorder
+  | GoTo
+  | SaveAs
+  | LoadEdits
+  | Ask
+  | SetPath
+  | RenderJob
+  | CancelJob;
+export type ServerMessage = Hello | State | Dragged | Answer | Notice | Job;
+
+/**
+ * A whole operation at once, from numeric fields.
+ */
+export interface Apply {
+  type: "apply";
+  edit: number;
+  target: "field" | "inner" | "outer" | "both";
+  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+}
+/**
+ * Move the cage.
+ */
+export interface TranslateBy {
+  kind: "translate";
+  by: Vec3;
+}
+/**
+ * Turn the cage about its pivot by R_x R_y R_z, intrinsic XYZ, in degrees.
+ */
+export interface RotateBy {
+  kind: "rotate";
+  rotation_deg: Vec3;
+  axes?: "world" | "cage";
+}
+/**
+ * Scale the cage about its pivot; factors above 0.
+ */
+export interface ScaleBy {
+  kind: "scale";
+  by: Vec3;
+  axes?: "world" | "cage";
+}
+/**
+ * Shear the cage about its pivot: xy adds xy * y to x, and so on.
+ */
+export interface ShearBy {
+  kind: "shear";
+  xy?: number;
+  xz?: number;
+  yx?: number;
+  yz?: number;
+  zx?: number;
+  zy?: number;
+  axes?: "world" | "cage";
+}
+/**
+ * Move one corner, the two of an edge, the four of a face, or any others together.
+ */
+export interface MoveCornersBy {
+  kind: "move_corners";
+  corners: number[];
+  by: Vec3;
+}
+/**
+ * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid".
+ */
+export interface Ask {
+  type: "ask";
+  request: number;
+  what: "surface" | "edit_text" | "grid";
+  x?: number;
+  y?: number;
+  edit?: number | null;
+}
+/**
+ * What the page looks from; `moving` while the mouse turns the view.
+ */
+export interface CameraMessage {
+  type: "camera";
+  seq: number;
+  c2w: number[];
+  width: number;
+  height: number;
+  fov_y_deg: number;
+  moving: boolean;
+}
+/**
+ * Stops a job; what it wrote of its file is removed.
+ */
+export interface CancelJob {
+  type: "cancel_job";
+  job: number;
+}
+/**
+ * Changes an edit's options; what is left out stays.
+ */
+export interface Change {
+  type: "change";
+  edit: number;
+  name?: string | null;
+  enabled?: boolean | null;
+  locked?: boolean | null;
+  kind?: ("continuous" | "move" | "copy" | "delete") | null;
+  shell?: ("flow" | "trilinear") | null;
+  falloff?: ("smooth" | "linear") | null;
+  width?: number | null;
+  /**
+   * 0: exact
+   */
+  lattice?: number | null;
+}
+/**
+ * What has no more than an edit to say.
+ */
+export interface Command {
+  type: "command";
+  name:
+    | "undo"
+    | "redo"
+    | "save"
+    | "duplicate"
+    | "remove"
+    | "select"
+    | "reset_operations"
+    | "remove_last_operation";
+  edit?: number | null;
+}
+/**
+ * A drag of an edit's cages begins.
+ */
+export interface DragBegin {
+  type: "drag_begin";
+  drag: number;
+  edit: number;
+  target: "field" | "inner" | "outer" | "both";
+}
+/**
+ * The drag is given up: everything as before it.
+ */
+export interface DragCancel {
+  type: "drag_cancel";
+  drag: number;
+}
+/**
+ * The drag ends with this operation, which becomes one entry of the history.
+ */
+export interface DragEnd {
+  type: "drag_end";
+  drag: number;
+  seq: number;
+  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+}
+/**
+ * Where the drag is: the whole operation since its beginning.
+ */
+export interface DragMove {
+  type: "drag";
+  drag: number;
+  seq: number;
+  operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+}
+/**
+ * Shrinks the inner cage to the dense region inside it.
+ */
+export interface FitInner {
+  type: "fit_inner";
+  edit: number;
+}
+/**
+ * Goes to an entry of the history, 0 the beginning.
+ */
+export interface GoTo {
+  type: "go_to";
+  entry: number;
+}
+/**
+ * A keyframe of a camera path: a camera, and how far each edit has gone (1 where it is not named).
+ */
+export interface Key {
+  c2w: number[];
+  fov_y_deg: number;
+  seconds: number;
+  parts: {
+    [k: string]: number | undefined;
+  };
+}
+/**
+ * An edit file's text: replaces the stack, or (paste) is appended to it.
+ */
+export interface LoadEdits {
+  type: "load_edits";
+  text: string;
+  append?: boolean;
+}
+/**
+ * What is shown: a view of the field; `before` leaves the edits out left of `split` (0 to 1 of the width).
+ */
+export interface LookMessage {
+  type: "look";
+  view?: "colour" | "depth" | "opacity" | "normals";
+  before?: boolean;
+  split?: number | null;
+}
+/**
+ * A mirrored copy of an edit's cages and operations, across the plane through the scene's middle.
+ */
+export interface Mirror {
+  type: "mirror";
+  edit: number;
+  axis: "x" | "y" | "z";
+}
+/**
+ * Makes the outer cage a margin around everything the inner cage is and was.
+ */
+export interface OuterMargin {
+  type: "outer_margin";
+  edit: number;
+  margin: number;
+}
+/**
+ * A new edit: a cage pair around the surface seen at a pixel (x, y in [0,1] of the camera's picture).
+ *
+ * Without a pixel it goes around the middle of what the camera sees.
+ */
+export interface Place {
+  type: "place";
+  x?: number | null;
+  y?: number | null;
+}
+/**
+ * The page has shown a picture; until then the server sends at most one more.
+ */
+export interface PresentedMessage {
+  type: "presented";
+  picture: number;
+}
+/**
+ * Renders the test views to numbered PNGs in a folder, or the camera path to an MP4, in the background.
+ */
+export interface RenderJob {
+  type: "render";
+  what: "test_views" | "camera_path";
+  out: string;
+  width?: number;
+  height?: number;
+  fps?: number;
+  overwrite?: boolean;
+}
+/**
+ * Puts an edit at another place in the stack, 0 first.
+ */
+export interface Reorder {
+  type: "reorder";
+  edit: number;
+  to: number;
+}
+/**
+ * Saves the scene, edits included, as a new folder on the server's machine.
+ */
+export interface SaveAs {
+  type: "save_as";
+  path: string;
+  overwrite?: boolean;
+}
+/**
+ * Changes what holds for all edits.
+ */
+export interface SceneChange {
+  type: "scene_change";
+  preserve_opacity: boolean;
+}
+/**
+ * A cage's corners by number, in Set mode: nothing of the field moves.
+ */
+export interface SetCage {
+  type: "set_cage";
+  edit: number;
+  cage: "inner" | "outer";
+  corners: Corners;
+}
+/**
+ * The camera path's keyframes; saved with the scene.
+ */
+export interface SetPath {
+  type: "set_path";
+  keys: Key[];
+  loop?: boolean;
+}
+/**
+ * The answer to an `ask`: a point and its normal, a text, or a grid; or nothing.
+ */
+export interface Answer {
+  type: "answer";
+  request: number;
+  point: Vec3 | null;
+  normal: Vec3 | null;
+  text: string | null;
+  grid: Vec3[][];
+}
+/**
+ * What became of a `drag`: `part` of the operation was followed; `why` where that is less than all.
+ */
+export interface Dragged {
+  type: "dragged";
+  drag: number;
+  seq: number;
+  part: number;
+  why: string | null;
+  inner: Corners;
+  deformed: Corners;
+  outer: Corners | null;
+}
+/**
+ * One edit as pages show it; corners in world units, deformed: the inner cage after its operations.
+ */
+export interface EditState {
+  id: number;
+  name: string;
+  colour: string;
+  enabled: boolean;
+  locked: boolean;
+  kind: "continuous" | "move" | "copy" | "delete";
+  shell: "flow" | "trilinear";
+  falloff: "smooth" | "linear";
+  width: number;
+  lattice: number;
+  lattice_error: [number, number] | null;
+  inner: Corners;
+  deformed: Corners;
+  outer: Corners | null;
+  pivot: Vec3;
+  inner_pivot: Vec3;
+  outer_pivot: Vec3 | null;
+  operations: string[];
+  problem: string | null;
+}
+/**
+ * The first message: what is being edited. `page` names this page among those that are open.
+ */
+export interface Hello {
+  type: "hello";
+  version: string;
+  page: number;
+  name: string;
+  /**
+   * @minItems 2
+   * @maxItems 2
+   */
+  bounds: [Vec3, Vec3];
+  voxel: number;
+  up: Vec3;
+  start: CameraMessage;
+  cameras: number[][];
+}
+/**
+ * How far a background job is.
+ */
+export interface Job {
+  type: "job";
+  job: number;
+  what: "test_views" | "camera_path";
+  state: "running" | "done" | "cancelled" | "failed";
+  done: number;
+  total: number;
+  out: string;
+  text: string;
+}
+/**
+ * A line for the user.
+ */
+export interface Notice {
+  type: "notice";
+  level: "info" | "warning" | "error";
+  text: string;
+}
+/**
+ * Everything that pages show of the edits; sent to all pages after each change.
+ */
+export interface State {
+  type: "state";
+  revision: number;
+  edits: EditState[];
+  selected: number | null;
+  history: string[];
+  entry: number;
+  saved: boolean;
+  path: string;
+  preserve_opacity: boolean;
+  keys: Key[];
+  loop: boolean;
+}
+/**
+ * Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.
+ *
+ * The picture is a JPEG (colour, while moving) or PNG of `width` x `height`, the part at (x, y) of a picture
+ * of full_width x full_height that covers the page's view; smaller ones are stretched. `depth_bytes` of
+ * uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow it:
+ * distance along the ray = value * depth_scale, 65535 where there is nothing.
+ */
+export interface PictureHeader {
+  type: "picture";
+  picture: number;
+  camera: number;
+  drag: number;
+  seq: number;
+  revision: number;
+  view: "colour" | "depth" | "opacity" | "normals";
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+  full_width: number;
+  full_height: number;
+  final: boolean;
+  picture_bytes: number;
+  depth_bytes: number;
+  depth_width: number;
+  depth_height: number;
+  depth_scale: number;
+  render_ms: number;
+  encode_ms: number;
+}

@@ -1,0 +1,133 @@
+/** What the page knows and shows; views listen, one change at a time. */
+import type { Part } from "./cage";
+import type { Axes } from "./operations";
+import type { EditState, Hello, Job, LookMessage, Notice, State } from "./protocol";
+
+export type Tool = "select" | "translate" | "rotate" | "scale";
+export type View = NonNullable<LookMessage["view"]>;
+export type CageName = "inner" | "outer" | "both";
+export type Target = "field" | CageName;
+
+export interface Hover {
+  part: Part;
+  cage: "inner" | "outer";
+}
+
+export interface Figures {
+  perSecond: number;
+  renderMs: number;
+  encodeMs: number;
+  width: number;
+  height: number;
+  final: boolean;
+}
+
+export interface Editor {
+  connection: "connecting" | "open" | "lost";
+  hello: Hello | null;
+  state: State | null;
+  mode: "set" | "edit";
+  tool: Tool;
+  axes: Axes;
+  /** Which cage Set mode moves. */
+  cage: CageName;
+  /** Snapping, while its key is held or its button is on. */
+  snap: boolean;
+  view: View;
+  before: boolean;
+  split: number | null;
+  grid: boolean;
+  cages: boolean;
+  panel: boolean;
+  help: boolean;
+  /** Corners that are dragged together, by the gizmo or by any of them. */
+  corners: number[];
+  hover: Hover | null;
+  /** Why the drag that goes on stopped, or null. */
+  limit: string | null;
+  notice: Notice | null;
+  jobs: Job[];
+  figures: Figures;
+}
+
+export const START: Editor = {
+  connection: "connecting",
+  hello: null,
+  state: null,
+  mode: "edit",
+  tool: "translate",
+  axes: "world",
+  cage: "inner",
+  snap: false,
+  view: "colour",
+  before: false,
+  split: null,
+  grid: false,
+  cages: true,
+  panel: true,
+  help: false,
+  corners: [],
+  hover: null,
+  limit: null,
+  notice: null,
+  jobs: [],
+  figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false },
+};
+
+export type Listener = (now: Editor, before: Editor) => void;
+
+export class Store {
+  private editor: Editor;
+  private readonly listeners: Listener[] = [];
+
+  constructor(start: Partial<Editor> = {}) {
+    this.editor = { ...START, ...start };
+  }
+
+  get now(): Editor {
+    return this.editor;
+  }
+
+  /** Takes changes over and tells the listeners, unless nothing is other than before. */
+  set(change: Partial<Editor>): void {
+    const before = this.editor;
+    const keys = Object.keys(change) as (keyof Editor)[];
+    if (keys.every((key) => Object.is(before[key], change[key]))) return;
+    this.editor = { ...before, ...change };
+    const now = this.editor;
+    for (const listener of this.listeners) listener(now, before);
+  }
+
+  /** Calls a listener at every change. */
+  listen(listener: Listener): void {
+    this.listeners.push(listener);
+  }
+
+  /** Calls an action now, and whenever one of these values is another. */
+  watch(keys: (keyof Editor)[], action: (now: Editor) => void): void {
+    this.listen((now, before) => {
+      if (keys.some((key) => now[key] !== before[key])) action(now);
+    });
+    action(this.editor);
+  }
+}
+
+/** The selected edit, or null. */
+export function selected(editor: Editor): EditState | null {
+  const state = editor.state;
+  return state?.edits.find((edit) => edit.id === state.selected) ?? null;
+}
+
+/** What a drag of the selected edit moves: the field in Edit mode, cages in Set mode. */
+export function target(editor: Editor): Target {
+  if (editor.mode === "edit") return "field";
+  return selected(editor)?.outer === null ? "inner" : editor.cage;
+}
+
+/** Whether the edit can be dragged at all, or why not. */
+export function obstacle(edit: EditState, mode: Editor["mode"]): string | null {
+  if (edit.locked) return `“${edit.name}” is locked`;
+  if (!edit.enabled) return `“${edit.name}” is hidden; show it (H) to move it`;
+  if (mode === "edit" && edit.kind === "delete") return "a delete has nothing to move; choose another kind, or Set mode (Tab)";
+  return null;
+}

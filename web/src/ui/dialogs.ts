@@ -1,0 +1,61 @@
+/** Questions before something is written: where to, how large. */
+import type { App } from "../app";
+import { h } from "./dom";
+
+export interface Dialogs {
+  element: HTMLElement;
+  saveAs: () => void;
+  render: (what: "test_views" | "camera_path") => void;
+}
+
+export function dialogs(app: App): Dialogs {
+  const host = h("div");
+  const field = (label: string, input: HTMLInputElement): HTMLElement => h("label", { class: "field" }, h("span", {}, label), input);
+  const text = (value: string): HTMLInputElement => h("input", { type: "text", value, required: true, maxLength: 1000, spellcheck: false });
+  const number = (value: number, min: number, max: number): HTMLInputElement =>
+    h("input", { type: "number", value: String(value), min: String(min), max: String(max), required: true });
+  const check = (): HTMLInputElement => h("input", { type: "checkbox" });
+
+  function ask(title: string, action: string, fields: HTMLElement[], done: () => void): void {
+    const cancel = h("button", { type: "button", class: "text", onclick: () => dialog.close() }, "Cancel");
+    const form = h("form", { method: "dialog" }, h("h2", {}, title), ...fields, h("div", { class: "bar end" }, cancel, h("button", { class: "text primary" }, action)));
+    const dialog = h("dialog", { onclose: () => dialog.remove() }, form);
+    form.onsubmit = done;
+    host.append(dialog);
+    dialog.showModal();
+  }
+
+  return {
+    element: host,
+    saveAs() {
+      const path = text(app.store.now.state?.path ?? "");
+      const overwrite = check();
+      ask("Save the scene as", "Save", [field("Folder", path), field("Replace what is there", overwrite)], () => {
+        app.send({ type: "save_as", path: path.value, overwrite: overwrite.checked });
+      });
+      path.select();
+    },
+    render(what) {
+      const film = what === "camera_path";
+      const base = (app.store.now.state?.path ?? "").replace(/\/+$/, "");
+      const out = text(film ? `${base}.mp4` : `${base}-views`);
+      const { width, height } = app.stage.points;
+      const sizes = [number(even(width), 16, 4096), number(even(height), 16, 4096)];
+      const fps = number(24, 1, 120);
+      const overwrite = check();
+      const fields = [field(film ? "File" : "Folder", out)];
+      if (film) fields.push(field("Width", sizes[0]), field("Height", sizes[1]), field("Pictures per second", fps));
+      fields.push(field("Replace what is there", overwrite));
+      ask(film ? "Render the camera path" : "Render the test views", "Render", fields, () => {
+        app.send({
+          type: "render", what, out: out.value, overwrite: overwrite.checked, fps: Number(fps.value),
+          width: Number(sizes[0].value), height: Number(sizes[1].value),
+        }); // prettier-ignore
+      });
+    },
+  };
+}
+
+function even(x: number): number {
+  return 2 * Math.round(x / 2);
+}

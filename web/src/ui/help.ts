@@ -1,0 +1,20 @@
+/** All keys. */
+import { HELD, type Binding } from "../keys";
+import type { App } from "../app";
+import { h } from "./dom";
+
+const GROUPS: Binding["group"][] = ["Tools", "Cages", "Edits", "View", "Scene"];
+
+export function help(app: App, bindings: Binding[]): HTMLElement {
+  const line = ({ keys, what }: { keys: string[]; what: string }): HTMLElement =>
+    h("div", { class: "binding" }, h("span", {}, ...keys.map((key) => h("kbd", {}, key))), h("span", {}, what));
+  const groups = GROUPS.map((group) =>
+    h("div", {}, h("h2", {}, group), ...bindings.filter((binding) => binding.group === group).map(line)),
+  );
+  const page = h("div", { class: "help", onclick: () => app.store.set({ help: false }) });
+  page.append(h("div", { class: "sheet" }, ...groups, h("div", {}, h("h2", {}, "Mouse"), ...HELD.map(line))));
+  app.store.watch(["help"], (now) => {
+    page.hidden = !now.help;
+  });
+  return page;
+}

@@ -1,0 +1,34 @@
+/** Background jobs: how far they are, and a way to stop them. */
+import { X } from "lucide";
+import type { App } from "../app";
+import type { Job } from "../protocol";
+import { h, iconButton } from "./dom";
+
+const WHAT: Record<Job["what"], string> = { test_views: "Test views", camera_path: "Video" };
+const GONE_AFTER = 8000;
+
+export function jobs(app: App): HTMLElement {
+  const list = h("div", { class: "jobs" });
+  app.store.watch(["jobs"], (now) => {
+    list.replaceChildren(...now.jobs.map((job) => shown(app, job)));
+    for (const job of now.jobs.filter((each) => each.state !== "running")) {
+      setTimeout(() => {
+        app.store.set({ jobs: app.store.now.jobs.filter((other) => other !== job) });
+      }, GONE_AFTER);
+    }
+  });
+  return list;
+}
+
+function shown(app: App, job: Job): HTMLElement {
+  const bar = h("progress", { max: Math.max(1, job.total), value: job.done });
+  const state =
+    job.state === "running" ? `${job.done} of ${job.total}` : job.state === "done" ? `written to ${job.out}` : job.text || job.state;
+  const stop = job.state === "running" ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel") : null;
+  return h(
+    "div",
+    { class: `job ${job.state}` },
+    h("div", { class: "row" }, h("strong", {}, WHAT[job.what]), h("span", { class: "quiet", title: job.out }, state), stop),
+    bar,
+  );
+}

@@ -1,0 +1,141 @@
+/** The selected edit's options and numbers. */
+import { Pane } from "tweakpane";
+import type { Actions } from "../actions";
+import type { App } from "../app";
+import { extent } from "../cage";
+import { leading } from "../drag";
+import { tidy, type Operation } from "../operations";
+import type { Change, EditState, Vec3 } from "../protocol";
+import { selected, target } from "../store";
+import { h, section } from "./dom";
+
+interface Point {
+  x: number;
+  y: number;
+  z: number;
+}
+
+const KINDS = { Continuous: "continuous", Move: "move", Copy: "copy", Delete: "delete" };
+const SHELLS = { Flow: "flow", Trilinear: "trilinear" };
+const FALLOFFS = { Smooth: "smooth", Linear: "linear" };
+const LATTICES = { Exact: 0, "32³ nodes": 32, "64³ nodes": 64, "128³ nodes": 128, "256³ nodes": 256 };
+
+export function options(app: App, actions: Actions): HTMLElement {
+  const host = h("div", { class: "pane" });
+  const operations = h("ol", { class: "operations" });
+  const pane = new Pane({ container: host });
+  const model = {
+    kind: "continuous", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "",
+    margin: 0.2, preserve: false,
+    position: point(0, 0, 0), turn: point(0, 0, 0), scale: point(1, 1, 1),
+  }; // prettier-ignore
+  let filling = false;
+  const change = (what: Omit<Change, "type" | "edit">): void => {
+    const edit = selected(app.store.now);
+    if (!filling && edit !== null) app.send({ type: "change", edit: edit.id, ...what });
+  };
+  const applyNow = (operation: Operation): void => {
+    const edit = selected(app.store.now);
+    if (edit !== null) app.send({ type: "apply", edit: edit.id, target: target(app.store.now), operation });
+  };
+
+  /** Changes the model without taking it for the user's doing, once the change that goes on is over. */
+  const settle = (change: () => void): void => {
+    setTimeout(() => {
+      filling = true;
+      change();
+      pane.refresh();
+      filling = false;
+    });
+  };
+
+  const numbers = pane.addFolder({ title: "Numbers" });
+  const position = numbers.addBinding(model, "position", { label: "Position", format: short });
+  position.on("change", ({ value, last }) => {
+    const edit = selected(app.store.now);
+    if (filling || !last || edit === null) return;
+    const { pivot } = leading(app.shown(edit), target(app.store.now));
+    const by = vec(value).map((x, i) => tidy(x - pivot[i])) as Vec3;
+    if (Math.hypot(...by) > 1e-9) applyNow({ kind: "translate", by });
+  });
+  numbers.addBinding(model, "turn", { label: "Turn by °", format: short }).on("change", ({ value, last }) => {
+    if (filling || !last || vec(value).every((x) => x === 0)) return;
+    applyNow({ kind: "rotate", rotation_deg: vec(value), axes: app.store.now.axes });
+    settle(() => (model.turn = point(0, 0, 0)));
+  });
+  numbers.addBinding(model, "scale", { label: "Scale by", format: short }).on("change", ({ value, last }) => {
+    if (filling || !last || vec(value).every((x) => x === 1)) return;
+    if (vec(value).every((x) => x > 0)) applyNow({ kind: "scale", by: vec(value), axes: app.store.now.axes });
+    else app.say("scale factors must be above 0", "warning");
+    settle(() => (model.scale = point(1, 1, 1)));
+  });
+
+  const kind = pane.addFolder({ title: "Kind" });
+  kind.addBinding(model, "kind", { label: "Kind", options: KINDS }).on("change", ({ value }) => change({ kind: value as EditState["kind"] }));
+  const continuous = [
+    kind.addBinding(model, "shell", { label: "Shell", options: SHELLS }).on("change", ({ value }) => change({ shell: value as EditState["shell"] })),
+    kind.addBinding(model, "falloff", { label: "Falloff", options: FALLOFFS }).on("change", ({ value }) => change({ falloff: value as EditState["falloff"] })),
+    kind.addBinding(model, "width", { label: "Width", min: 0.05, max: 1, step: 0.05 }).on("change", ({ value, last }) => {
+      if (last) change({ width: value });
+    }),
+    kind.addBinding(model, "lattice", { label: "Lattice", options: LATTICES }).on("change", ({ value }) => change({ lattice: value })),
+    kind.addBinding(model, "error", { label: "Its error", readonly: true }),
+  ] as const;
+  kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
+    if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
+  });
+
+  const cages = pane.addFolder({ title: "Cages" });
+  cages.addButton({ title: "Fit the inner cage (I)" }).on("click", () => actions.fitInner());
+  cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
+  cages.addButton({ title: "Outer cage by margin" }).on("click", () => actions.outerMargin(model.margin));
+
+  const removeLast = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("remove_last_operation", edit.id)) }, "Take the last one back");
+  const reset = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("reset_operations", edit.id)) }, "Reset");
+  const whole = section("Selected edit", host, h("div", { class: "subtitle" }, "Operations"), operations, h("div", { class: "bar" }, removeLast, reset));
+
+  let marginOf: number | null = null;
+  app.store.watch(["state", "mode", "cage"], (now) => {
+    const edit = selected(now);
+    whole.hidden = edit === null;
+    if (edit === null) return;
+    const { pivot } = leading(app.shown(edit), target(now));
+    Object.assign(model, {
+      kind: edit.kind, shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
+      error: latticeError(edit), preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
+    }); // prettier-ignore
+    if (marginOf !== edit.id) {
+      marginOf = edit.id;
+      model.margin = tidy(0.5 * extent(edit.inner), 3);
+    }
+    const [shell, falloff, width, lattice, error] = continuous;
+    for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
+    falloff.hidden = width.hidden = edit.kind !== "continuous" || edit.shell !== "flow";
+    error.hidden = lattice.hidden || edit.lattice === 0;
+    for (const binding of [shell, lattice]) binding.disabled = edit.locked;
+    filling = true;
+    pane.refresh();
+    filling = false;
+    operations.replaceChildren(...edit.operations.map((text) => h("li", {}, text)));
+    removeLast.disabled = reset.disabled = edit.operations.length === 0;
+  });
+  return whole;
+} // prettier-ignore
+
+function latticeError(edit: EditState): string {
+  if (edit.lattice_error === null) return "being measured";
+  const [most, mean] = edit.lattice_error;
+  return `${short(most)} voxels at most, ${short(mean)} on average`;
+}
+
+function point(x: number, y: number, z: number): Point {
+  return { x, y, z };
+}
+
+function vec({ x, y, z }: Point): Vec3 {
+  return [x, y, z];
+}
+
+function short(x: number): string {
+  return String(tidy(Number(x.toPrecision(4))));
+}

@@ -1,0 +1,76 @@
+/** What lies over the picture: the split's slider, the drag's numbers, lines for the user, a lost server. */
+import type { App } from "../app";
+import { described } from "../operations";
+import type { Pointer } from "../pointer";
+import { h } from "./dom";
+
+const TOAST_STAYS = 7000;
+
+export function overlay(app: App, pointer: Pointer): HTMLElement {
+  const layer = h("div", { class: "overlay" });
+  layer.append(splitter(app), readout(app, pointer), toasts(app), lost(app), hint(app));
+  return layer;
+}
+
+/** A bar to drag: the field before its edits on the left of it, after them on the right. */
+function splitter(app: App): HTMLElement {
+  const bar = h("div", { class: "splitter" }, h("span", { class: "before" }, "before"), h("span", { class: "grip" }), h("span", { class: "after" }, "after"));
+  bar.onpointerdown = (event) => bar.setPointerCapture(event.pointerId);
+  bar.onpointermove = (event) => {
+    if (!bar.hasPointerCapture(event.pointerId)) return;
+    const box = app.stage.canvas.getBoundingClientRect();
+    app.store.set({ split: Math.min(0.98, Math.max(0.02, (event.clientX - box.left) / box.width)) });
+  };
+  app.store.watch(["split"], ({ split }) => {
+    bar.hidden = split === null;
+    bar.style.left = `${100 * (split ?? 0)}%`;
+  });
+  return bar;
+} // prettier-ignore
+
+/** What the drag amounts to, beside the mouse. */
+function readout(app: App, pointer: Pointer): HTMLElement {
+  const label = h("div", { class: "readout" });
+  label.hidden = true;
+  app.stage.beforeFrame.push(() => {
+    const { drag } = app;
+    const shown = drag !== null && !drag.ended && drag.operation !== null;
+    label.hidden = !shown;
+    if (!shown) return;
+    label.textContent = described(drag.operation!);
+    label.classList.toggle("limit", drag.why !== null);
+    const { width, height } = app.stage.points;
+    const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);
+    const y = Math.min(pointer.at.y + 18, height - label.offsetHeight - 6);
+    label.style.transform = `translate(${x}px, ${y}px)`;
+  });
+  return label;
+}
+
+function toasts(app: App): HTMLElement {
+  const list = h("div", { class: "toasts" });
+  app.store.watch(["notice"], ({ notice }) => {
+    if (notice === null || notice.level === "info") return;
+    const toast = h("div", { class: `toast ${notice.level}`, role: "alert", onclick: () => toast.remove() }, notice.text);
+    list.append(toast);
+    while (list.children.length > 3) list.firstElementChild?.remove();
+    setTimeout(() => toast.remove(), TOAST_STAYS);
+  });
+  return list;
+}
+
+function lost(app: App): HTMLElement {
+  const line = h("div", { class: "lost", role: "alert" }, "The server is gone. Trying again…");
+  app.store.watch(["connection"], ({ connection }) => {
+    line.hidden = connection !== "lost";
+  });
+  return line;
+}
+
+function hint(app: App): HTMLElement {
+  const line = h("div", { class: "hint" }, "Double-click the picture to put a pair of cages around what is there");
+  app.store.watch(["state"], ({ state }) => {
+    line.hidden = state === null || state.edits.length > 0;
+  });
+  return line;
+}

@@ -1,0 +1,98 @@
+/** The camera path: keyframes, how far each edit has gone at them, playing, and rendering to a video. */
+import { Crosshair, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
+import type { Actions } from "../actions";
+import type { App } from "../app";
+import { duration, viewAt } from "../path";
+import type { Key, Vec3 } from "../protocol";
+import { h, icon, iconButton, section } from "./dom";
+
+export function pathList(app: App, actions: Actions, dialogs: { render: (what: "test_views" | "camera_path") => void }): HTMLElement {
+  const list = h("ol", { class: "keys" });
+  const length = h("span", { class: "quiet" });
+  const send = (keys: Key[], loop = app.store.now.state?.loop ?? false): void => {
+    app.send({ type: "set_path", keys, loop });
+  };
+  const keys = (): Key[] => app.store.now.state?.keys ?? [];
+  const replaced = (index: number, key: Partial<Key>): Key[] => keys().map((old, i) => (i === index ? { ...old, ...key } : old));
+  const playing = player(app);
+  const play = iconButton(Play, "Play the path in this page", () => playing.toggle(), "play");
+  const loop = iconButton(Repeat, "Back to the first keyframe: a loop", () => send(keys(), !app.store.now.state?.loop), "loop");
+  const film = h("button", { type: "button", class: "text", onclick: () => dialogs.render("camera_path") }, "Render video…");
+  const views = h("button", { type: "button", class: "text", onclick: () => dialogs.render("test_views") }, "Render test views…");
+
+  app.store.watch(["state"], ({ state }) => {
+    if (state === null || (document.activeElement instanceof HTMLInputElement && list.contains(document.activeElement) && document.activeElement.type === "range")) return;
+    list.replaceChildren(
+      ...state.keys.map((key, index) => {
+        const seconds = h("input", { type: "number", min: "0.1", max: "3600", step: "0.5", value: String(key.seconds), title: "Seconds to the next keyframe" });
+        seconds.onchange = () => send(replaced(index, { seconds: Math.max(0.1, Number(seconds.value) || 2) }));
+        const parts = state.edits.map((edit) => {
+          const at = key.parts[String(edit.id)] ?? 1;
+          const slider = h("input", { type: "range", min: "0", max: "1", step: "0.05", value: String(at), title: `How far “${edit.name}” has gone here` });
+          slider.style.accentColor = edit.colour;
+          slider.onchange = () => {
+            slider.blur();
+            send(replaced(index, { parts: { ...key.parts, [edit.id]: Number(slider.value) } }));
+          };
+          return h("label", { class: "part" }, h("span", {}, edit.name || `edit ${edit.id}`), slider);
+        });
+        return h(
+          "li",
+          { class: "key" },
+          h("div", { class: "row" },
+            h("span", { class: "number" }, String(index + 1)),
+            seconds, h("span", { class: "quiet" }, "s"), h("span", { class: "space" }),
+            iconButton(Crosshair, "Look from here", () => look(app, key.c2w, key.fov_y_deg), "go"),
+            iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.stage.c2w })), "update"),
+            iconButton(Trash2, "Remove this keyframe", () => send(keys().filter((_, i) => i !== index)), "drop"),
+          ),
+          ...parts,
+        );
+      }),
+    );
+    const total = duration(state.keys, state.loop);
+    length.textContent = state.keys.length === 0 ? "no keyframes" : `${total.toFixed(1)} s`;
+    play.disabled = film.disabled = state.keys.length < 2;
+    loop.classList.toggle("on", state.loop);
+  });
+  playing.changed = (on) => play.replaceChildren(icon(on ? Square : Play));
+  return section(
+    "Camera path",
+    h("div", { class: "bar" }, iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"), play, loop, h("span", { class: "space" }), length),
+    list,
+    h("div", { class: "bar" }, film, views),
+  );
+} // prettier-ignore
+
+/** Moves the page's camera along the path until its end, or until it is stopped. */
+function player(app: App): { toggle: () => void; changed: (on: boolean) => void } {
+  let started: number | null = null;
+  const self = {
+    changed: ((): void => undefined) as (on: boolean) => void,
+    toggle(): void {
+      started = started === null ? performance.now() : null;
+      self.changed(started !== null);
+      if (started !== null) requestAnimationFrame(step);
+    },
+  };
+  function step(): void {
+    const { state } = app.store.now;
+    if (started === null || state === null) return;
+    const seconds = (performance.now() - started) / 1000;
+    if (state.keys.length < 2 || (seconds > duration(state.keys, state.loop) && !state.loop)) {
+      self.toggle();
+      return;
+    }
+    const view = viewAt(state.keys, state.loop, seconds % Math.max(duration(state.keys, state.loop), 1e-3));
+    look(app, view.c2w, view.fov_y_deg);
+    requestAnimationFrame(step);
+  }
+  return self;
+}
+
+function look(app: App, c2w: number[], fov_y_deg: number): void {
+  const { hello } = app.store.now;
+  if (hello === null) return;
+  const around = hello.bounds[0].map((low, i) => 0.5 * (low + hello.bounds[1][i])) as Vec3;
+  app.stage.look(c2w, fov_y_deg, hello.up, around);
+}

@@ -1,0 +1,32 @@
+/** The line at the bottom: why a drag stopped, what the server said, how fast pictures come. */
+import type { App } from "../app";
+import { h } from "./dom";
+
+const NOTICE_STAYS = 12000;
+
+export function status(app: App): HTMLElement {
+  const message = h("span", { class: "message" });
+  const figures = h("span", { class: "figures" });
+  const saved = h("span", { class: "saved" });
+  const connection = h("span", { class: "connection" });
+  let until: ReturnType<typeof setTimeout> | undefined;
+  app.store.watch(["limit", "notice", "mode", "state"], (now) => {
+    const notice = now.notice;
+    message.className = `message ${now.limit !== null ? "limit" : (notice?.level ?? "")}`;
+    message.title = now.limit ?? notice?.text ?? "";
+    message.textContent = now.limit !== null ? `The drag stops here: ${now.limit.split(";")[0]}` : message.title;
+  });
+  app.store.watch(["notice"], (now) => {
+    clearTimeout(until);
+    if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
+  });
+  app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
+    const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
+    figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms` : "";
+    saved.textContent = state === null ? "" : state.saved ? "saved" : "not saved";
+    saved.classList.toggle("due", state?.saved === false);
+    connection.className = `connection ${c}`;
+    connection.title = { open: "Connected", connecting: "Connecting…", lost: "The server is gone" }[c];
+  });
+  return h("footer", { class: "status" }, message, h("span", { class: "space" }), figures, saved, connection);
+}

@@ -1,0 +1,73 @@
+/** The row on top: the scene, undo and redo, what is shown, saving. */
+import { Camera, CircleQuestionMark, Columns2, Download, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
+import type { Actions } from "../actions";
+import type { App } from "../app";
+import type { View } from "../store";
+import { h, icon, iconButton } from "./dom";
+
+const VIEWS: [View, string][] = [
+  ["colour", "Colour"],
+  ["depth", "Depth"],
+  ["opacity", "Opacity"],
+  ["normals", "Normals"],
+];
+
+export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void }): HTMLElement {
+  const name = h("span", { class: "scene-name" });
+  const unsaved = h("span", { class: "unsaved", title: "There are unsaved changes" });
+  const mode = h("span", { class: "mode-badge" });
+  const undo = iconButton(Undo2, "Undo (Ctrl+Z)", () => actions.command("undo"), "undo");
+  const redo = iconButton(Redo2, "Redo (Ctrl+Shift+Z)", () => actions.command("redo"), "redo");
+  const views = VIEWS.map(([view, label]) =>
+    h("button", { type: "button", title: `${label} (V)`, onclick: () => actions.view(view), data: { view } }, label),
+  );
+  const split = iconButton(Columns2, "Before and after, side by side (P); hold B for before", () => actions.toggleSplit(), "split");
+  const grid = iconButton(Grid3x3, "Deformed lattice (L)", () => actions.toggle("grid"), "grid");
+  const file = h("input", { type: "file", accept: ".yaml,.yml,.json", hidden: true });
+  file.onchange = () => {
+    const chosen = file.files?.[0];
+    if (chosen) void actions.load(chosen);
+    file.value = "";
+  };
+  const save = iconButton(Save, "Save (Ctrl+S)", () => actions.save(), "save");
+  const panel = iconButton(PanelRight, "Panel (N)", () => actions.toggle("panel"), "panel-toggle");
+  app.store.watch(["state", "hello", "view", "split", "grid", "panel", "mode"], (now) => {
+    name.textContent = now.hello?.name ?? "";
+    unsaved.classList.toggle("shown", now.state?.saved === false);
+    save.classList.toggle("due", now.state?.saved === false);
+    undo.disabled = (now.state?.entry ?? 0) <= 0;
+    redo.disabled = now.state === null || now.state.entry >= now.state.history.length - 1;
+    for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
+    split.classList.toggle("on", now.split !== null);
+    grid.classList.toggle("on", now.grid);
+    panel.classList.toggle("on", now.panel);
+    mode.textContent = now.mode === "set" ? "Set cages" : "Edit field";
+    mode.dataset.mode = now.mode;
+  });
+  const link = (node: typeof Download, title: string, href: string, download: string): HTMLAnchorElement =>
+    h("a", { class: "icon", title, href, download, ariaLabel: title }, icon(node));
+  return h(
+    "header",
+    { class: "top" },
+    h("span", { class: "brand" }, "cagefield"),
+    name,
+    unsaved,
+    mode,
+    h("span", { class: "space" }),
+    h("div", { class: "group" }, undo, redo),
+    h("div", { class: "segments" }, ...views),
+    h("div", { class: "group" }, split, grid),
+    h("span", { class: "space" }),
+    h(
+      "div",
+      { class: "group" },
+      save,
+      iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as"),
+      iconButton(FolderOpen, "Load an edit file…", () => file.click(), "load"),
+      link(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
+      link(Camera, "Screenshot of the field", `screenshot.png${location.search}`, "screenshot.png"),
+    ),
+    h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),
+    file,
+  );
+}

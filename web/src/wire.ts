@@ -1,0 +1,30 @@
+/** Binary messages: a header in JSON, a picture and its depth. */
+import type { PictureHeader } from "./protocol";
+
+export interface Parcel {
+  header: PictureHeader;
+  picture: Uint8Array;
+  /** Distances in steps of `depth_scale`, row by row; 65535 where there is nothing. */
+  depth: Uint16Array;
+}
+
+/** The parts of a binary message. */
+export function unpack(message: ArrayBuffer): Parcel {
+  const length = new DataView(message).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as PictureHeader;
+  const start = 4 + length;
+  const picture = new Uint8Array(message, start, header.picture_bytes);
+  const at = start + header.picture_bytes;
+  return { header, picture, depth: new Uint16Array(message.slice(at, at + header.depth_bytes)) };
+}
+
+/** A binary message of these parts, as the server makes it. */
+export function pack(header: PictureHeader, picture: Uint8Array, depth: Uint16Array): ArrayBuffer {
+  const json = new TextEncoder().encode(JSON.stringify(header));
+  const bytes = new Uint8Array(4 + json.length + picture.length + depth.byteLength);
+  new DataView(bytes.buffer).setUint32(0, json.length, true);
+  bytes.set(json, 4);
+  bytes.set(picture, 4 + json.length);
+  bytes.set(new Uint8Array(depth.buffer, depth.byteOffset, depth.byteLength), 4 + json.length + picture.length);
+  return bytes.buffer;
+}

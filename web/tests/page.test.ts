@@ -1,0 +1,172 @@
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { Connection, socketAddress, type Handlers, type Socket } from "../src/connection";
+import { HELD, bindings, named } from "../src/keys";
+import { Latency } from "../src/latency";
+import { duration, viewAt } from "../src/path";
+import { scenery } from "../src/scenery";
+import { START, Store, obstacle, selected, target } from "../src/store";
+import type { Actions } from "../src/actions";
+import type { App } from "../src/app";
+import type { Pointer } from "../src/pointer";
+import type { Key } from "../src/protocol";
+import { expectClose } from "./cages";
+import { edit, state } from "./fake_server";
+
+describe("the connection", () => {
+  beforeEach(() => vi.useFakeTimers());
+  afterEach(() => vi.useRealTimers());
+
+  it("opens again, ever more patiently, and at once after it had been open", () => {
+    const sockets: (Socket & { sent: string[] })[] = [];
+    const waits: number[] = [];
+    const handlers: Handlers = { opened: vi.fn(), lost: (wait) => waits.push(wait), message: vi.fn(), picture: vi.fn() };
+    const connection = new Connection(() => {
+      const sent: string[] = [];
+      const socket = { binaryType: "blob" as BinaryType, readyState: 1, onopen: null, onclose: null, onmessage: null, sent, send: (text: string) => void sent.push(text) };
+      sockets.push(socket);
+      return socket;
+    }, handlers);
+    const close = (): void => {
+      const socket = sockets[sockets.length - 1];
+      (socket.onclose as unknown as () => void)();
+    };
+    close();
+    expect(connection.send({ type: "presented", picture: 1 })).toBe(false);
+    vi.advanceTimersByTime(250);
+    close();
+    vi.advanceTimersByTime(499);
+    expect(sockets).toHaveLength(2);
+    vi.advanceTimersByTime(1);
+    expect(sockets).toHaveLength(3);
+    (sockets[2].onopen as unknown as () => void)();
+    expect(connection.send({ type: "presented", picture: 1 })).toBe(true);
+    expect(sockets[2].sent).toEqual(['{"type":"presented","picture":1}']);
+    close();
+    expect(waits).toEqual([250, 500, 250]);
+  });
+
+  it("keeps the link's token", () => {
+    const page = new URL("http://host:8000/?token=abc#x") as unknown as Location;
+    expect(socketAddress(page)).toBe("ws://host:8000/socket?token=abc");
+  });
+});
+
+describe("the store", () => {
+  it("tells of changes only", () => {
+    const store = new Store();
+    const heard = vi.fn();
+    store.watch(["tool"], heard);
+    store.set({ tool: "rotate" });
+    store.set({ tool: "rotate", mode: "set" });
+    expect(heard).toHaveBeenCalledTimes(2);
+  });
+
+  it("knows what a drag moves", () => {
+    const now = { ...START, state: state() };
+    expect(selected(now)?.id).toBe(1);
+    expect(target(now)).toBe("field");
+    expect(target({ ...now, mode: "set", cage: "both" })).toBe("both");
+    expect(target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) })).toBe("inner");
+  });
+
+  it("says why an edit cannot be dragged", () => {
+    expect(obstacle(edit(), "edit")).toBeNull();
+    expect(obstacle(edit({ locked: true }), "edit")).toMatch(/locked/);
+    expect(obstacle(edit({ enabled: false }), "set")).toMatch(/hidden/);
+    expect(obstacle(edit({ kind: "delete" }), "edit")).toMatch(/nothing to move/);
+    expect(obstacle(edit({ kind: "delete" }), "set")).toBeNull();
+  });
+});
+
+describe("what is drawn", () => {
+  const eye: [number, number, number] = [0, -5, 0];
+  it("is both cages of the selected edit, with a dot on each corner and on faces that look this way", () => {
+    const { segments, dots } = scenery({ ...START, state: state() }, null, [], eye);
+    expect(segments).toHaveLength(24);
+    expect(dots.filter((dot) => dot.shape === "round")).toHaveLength(8);
+    expect(dots.filter((dot) => dot.shape === "square")).toHaveLength(1);
+  });
+
+  it("is where the inner cage was, too, once it has moved; and both cages' handles in Set mode", () => {
+    const moved = edit({ deformed: edit().inner.map(([x, y, z]) => [x + 0.1, y, z]) as never });
+    expect(scenery({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(36);
+    expect(scenery({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
+  });
+
+  it("has the other edits in their colours, hidden ones not, and nothing where cages are off", () => {
+    const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
+    const { segments } = scenery({ ...START, state: state({ edits }) }, null, [], eye);
+    expect(segments).toHaveLength(48);
+    expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
+    expect(scenery({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments).toHaveLength(0);
+  });
+
+  it("has no handles where the edit is locked", () => {
+    expect(scenery({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots).toHaveLength(0);
+  });
+});
+
+describe("keys", () => {
+  const nobody: unknown = {};
+  it("each mean one thing, and all that the editor needs is there", () => {
+    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, { saveAs: vi.fn() }).flatMap((binding) => binding.keys);
+    expect(new Set(all).size).toBe(all.length);
+    for (const key of ["1", "2", "3", "G", "R", "S", "F", "H", "D", "Tab", "Delete", "Escape", "Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+S", "Ctrl+C", "?"]) {
+      expect(all).toContain(key);
+    }
+    for (const { keys } of HELD) for (const key of keys) expect(all).not.toContain(key);
+  });
+
+  it("are named as they are shown", () => {
+    const key = (name: string, control = false, shift = false): string => named({ key: name, ctrlKey: control, metaKey: false, shiftKey: shift });
+    expect(key("z", true)).toBe("Ctrl+Z");
+    expect(key("Z", true, true)).toBe("Ctrl+Shift+Z");
+    expect(key("?", false, true)).toBe("?");
+    expect(key("Tab")).toBe("Tab");
+    expect(key("g")).toBe("G");
+  });
+});
+
+describe("latency", () => {
+  it("goes from the mouse's move to the picture that shows it", () => {
+    const latency = new Latency();
+    latency.moved(1, 1, 100);
+    latency.moved(1, 2, 110);
+    latency.framed(116);
+    const picture = { time: 180, drag: 1, seq: 2, camera: 1, revision: 1, width: 100, fullWidth: 100, final: false };
+    latency.shown(picture, 150, 160, 20, 2);
+    latency.shown({ ...picture, time: 999 }, 150, 160, 20, 2);
+    expect(latency.moves[0]).toMatchObject({ lines: 116, presented: null });
+    expect(latency.moves[1]).toMatchObject({ lines: 116, received: 150, decoded: 160, presented: 180, renderMs: 20 });
+  });
+
+  it("counts pictures a second", () => {
+    const latency = new Latency();
+    for (let time = 0; time <= 1000; time += 100) {
+      latency.shown({ time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, final: false }, 0, 0, 0, 0);
+    }
+    expect(latency.perSecond(1000)).toBeCloseTo(10, 6);
+    expect(latency.perSecond(5000)).toBe(0);
+  });
+});
+
+describe("the camera path", () => {
+  const at = (x: number, fov_y_deg: number): Key => ({ c2w: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1], fov_y_deg, seconds: 2, parts: {} });
+  const keys = [at(0, 40), at(1, 50), at(2, 60)];
+
+  it("goes through its keyframes at their times", () => {
+    expect(duration(keys, false)).toBe(4);
+    expect(duration(keys, true)).toBe(6);
+    for (const [n, key] of keys.entries()) {
+      const view = viewAt(keys, false, 2 * n);
+      expectClose(view.c2w, key.c2w, 6);
+      expect(view.fov_y_deg).toBeCloseTo(key.fov_y_deg, 9);
+    }
+    expectClose(viewAt(keys, true, 6).c2w, keys[0].c2w, 6);
+  });
+
+  it("goes evenly between keyframes in a row", () => {
+    expect(viewAt(keys, false, 1).c2w[3]).toBeCloseTo(0.5, 1);
+    expect(viewAt(keys, false, 99).c2w[3]).toBeCloseTo(2, 6);
+  });
+});
