@@ -10,32 +10,31 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
+import cagefield
 from editor_page import EditorPage, editor_page
 from editor_server import editor_server
 
 HERE = Path(__file__).parent
 
-ARM = """\
-version: 1
-edits:
-  - name: arm
-    inner: {center: [0.68, -0.11, 0.35], size: [0.5, 0.5, 1.1]}
-    outer: {margin: 0.3}
-    lattice: 64
-"""
+FILE = Path(cagefield.__file__).parent / "examples" / "digger.yaml"
 
-CONE = """\
-  - name: cone
+COPY = """\
+  - name: second cone
     adjustment: discrete
     keep_source: true
     inner: {center: [0.65, 0.5, -0.2175], size: [0.255, 0.255, 0.365]}
     operations:
-      - translate: [0, -0.97, 0]
+      - translate: [-1.4, -1, 0]
+"""
+
+DELETE = """\
+  - name: no beacon
+    delete: true
+    inner: {center: [-0.12, 0.2, 0.56], size: [0.12, 0.12, 0.08]}
 """
 
 
@@ -64,25 +63,25 @@ def session(editor: EditorPage, folder: Path) -> None:
         file.write_text(text)
         editor.changed(lambda: editor.page.set_input_files("input[type=file]", file))
 
-    def chosen(action: Callable[[], object]) -> None:
-        editor.changed(action)  # type: ignore[arg-type]
+    def turned(by: tuple[float, float]) -> None:
+        with editor.held((150, 690), by, steps=8):
+            pass
+        editor.settle()
 
+    edits = FILE.read_text(encoding="utf-8")
+    turned((-230, -20))
     shot("open")
-    load(ARM)
+    load(edits[: edits.index("    operations:")])
     editor.tools(mode="set", tool="select", cage="both")
     shot("cages")
-    editor.tools(mode="edit", tool="translate")
-    editor.drag(editor.grip("Z"), (0, -45))
-    editor.tools(tool="rotate")
-    editor.drag(editor.grip("Y"), (0, 30))
+    editor.tools(mode="edit", tool="rotate")
+    editor.drag(editor.grip("Y"), (0, -13))
+    editor.tools(tool="translate")
+    editor.drag(editor.grip("Z"), (0, -55))
     shot("raised")
-    load(
-        ARM.rstrip()
-        + "\n    operations:\n      - rotate_deg: [0, -10, 0]\n      - translate: [0, 0, 0.1]\n"
-        + CONE
-    )
+    load(edits + COPY)
     shot("copied")
-    chosen(lambda: editor.page.locator(".pane select").first.select_option("Delete"))
+    load(edits + COPY + DELETE)
     shot("deleted")
 
 
