@@ -120,14 +120,15 @@ def measured(page: Page, seconds: float) -> str:
     pictures = page.evaluate(f"cagefield.latency.presented.slice({shown}).filter(p => p.drag > 0)")
     settle(page)
     page.set_viewport_size({"width": 800 + FRAME[0], "height": 800 + FRAME[1]})
-    page.mouse.move(300, 300)
-    time.sleep(0.5)
+    until(page, "cagefield.picture.full_width === 800 && cagefield.picture.full_height === 800")
     settle(page)
     lets_go = []
     for _ in range(3):
         let_go = drag(page, 1.0)
+        finals = f"cagefield.latency.presented.filter(p => p.final && p.drag === 0 && p.time > {let_go})"
+        until(page, f"{finals}.length > 0")
+        final = page.evaluate(f"{finals}[0]")
         settle(page)
-        final = page.evaluate("cagefield.latency.presented.filter(p => p.final).at(-1)")
         assert final["fullWidth"] == 800, final
         lets_go.append(final["time"] - let_go)
     return rows(moves, pictures, lets_go)

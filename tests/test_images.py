@@ -110,7 +110,7 @@ def test_video_errors_leave_nothing(tmp_path):
         write_video(tmp_path / "a.mp4", [])
     with pytest.raises(CagefieldError, match=r"frame 1 is \[16, 18, 3\]; all frames must be \[16, 16, 3\]"):
         write_video(tmp_path / "a.mp4", [small, large])
-    with pytest.raises(CagefieldError, match=r"writes \.mp4 files"):
+    with pytest.raises(CagefieldError, match=r"a video's name ends in \.mp4"):
         write_video(tmp_path / "a.gif", [small])
     with pytest.raises(CagefieldError, match="fps must be positive"):
         write_video(tmp_path / "a.mp4", [small], fps=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import json
@@ -22,7 +23,10 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from cagefield.edits import load_edits
+from cagefield.errors import CagefieldError
+from cagefield.server.hub import Page
 from cagefield.server.protocol import MOST_BYTES
+from cagefield.server.sockets import _told
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 
@@ -254,6 +258,7 @@ def test_the_page_the_edit_file_and_a_screenshot_are_served(server: EditorServer
         assert [edit.name for edit in load_edits(file)] == ["ball"]
         shot = urllib.request.urlopen(f"{link}/screenshot.png?page={hello['page']}").read()
         assert Image.open(io.BytesIO(shot)).size == (64, 64)
+        assert urllib.request.urlopen(f"{link}/screenshot.png").read() == shot  # of the newest page
         with pytest.raises(urllib.error.HTTPError, match="404"):
             urllib.request.urlopen(f"{link}/screenshot.png?page=999")
 
@@ -291,14 +296,49 @@ def box(half: float) -> list[list[float]]:
     return [[half * (2 * (k >> a & 1) - 1) for a in range(3)] for k in range(8)]
 
 
+def renderer(server: EditorServer) -> int:
+    """The number of the rendering process."""
+    (pid,) = [
+        pid for pid in server.children() if "resource_tracker" not in Path(f"/proc/{pid}/cmdline").read_text()
+    ]
+    return pid
+
+
+def test_a_question_that_waits_for_the_renderer_holds_up_nothing_else(server: EditorServer) -> None:
+    with page(server) as (client, hello):
+        number = load(client, BALL)["edits"][0]["id"]
+        client.look_from(hello, 48)
+        client.final()
+        os.kill(renderer(server), signal.SIGSTOP)
+        try:
+            client.send("ask", request=9, what="surface", x=0.5, y=0.5)
+            client.send(
+                "apply", edit=number, target="field", operation={"kind": "translate", "by": [0.1, 0, 0]}
+            )
+            client.state(lambda s: s["edits"][0]["operations"])
+            assert not any(m["type"] == "answer" for m in client.messages)
+        finally:
+            os.kill(renderer(server), signal.SIGCONT)
+        assert client.until(lambda m: m["type"] == "answer")["request"] == 9
+
+
+def test_what_the_server_did_not_expect_is_told_too(caplog: pytest.LogCaptureFixture) -> None:
+    one = Page(1)
+    with _told(one):
+        raise ZeroDivisionError("by zero")
+    with _told(one):
+        raise CagefieldError("a line\nwith its cure")
+    first, second = (json.loads(asyncio.run(one.outbox.get())) for _ in range(2))
+    assert "could not do that (ZeroDivisionError: by zero)" in first["text"] and "by zero" in caplog.text
+    assert second["text"] == "a line with its cure"
+
+
 def test_a_lost_renderer_is_started_again_and_nothing_is_lost(server: EditorServer) -> None:
     with page(server) as (client, hello):
         state = load(client, BALL)
         client.look_from(hello, 64)
         client.final()
-        for pid in server.children():
-            if "resource_tracker" not in Path(f"/proc/{pid}/cmdline").read_text():
-                os.kill(pid, signal.SIGKILL)
+        os.kill(renderer(server), signal.SIGKILL)
         assert "started again" in client.notice()["text"]
         assert client.final()["full_width"] == 64
         number = state["edits"][0]["id"]

@@ -115,13 +115,13 @@ def test_a_quick_lattice_is_coarser_and_close(studio: Studio) -> None:
 def test_before_leaves_the_edits_out_left_of_the_split(studio: Studio) -> None:
     plain, edited = picture(studio, task()), picture(studio, task(MOVED))
     assert np.abs(plain - edited).max() > 100
-    half = picture(studio, task(MOVED, look=Look(before=True, split=0.5)))
+    half = picture(studio, task(MOVED, look=Look(split=0.5)))
     # Blocks of 8 pixels beside the split mix in a JPEG.
     assert np.abs(half[:, :16] - plain[:, :16]).max() < 12
     assert np.abs(half[:, 32:] - edited[:, 32:]).max() < 12
     assert np.abs(picture(studio, task(MOVED, look=Look(before=True))) - plain).max() < 12
     tile = Region(32, 0, 16, SIDE, SIDE, SIDE)
-    right = picture(studio, task(MOVED, region=tile, look=Look(before=True, split=0.5)))
+    right = picture(studio, task(MOVED, region=tile, look=Look(split=0.5)))
     assert np.abs(right - edited[:, 32:]).max() < 12
 
 

@@ -56,7 +56,7 @@ export function inspector(app: App): Inspector {
     },
     get settled() {
       const picture = app.lastPicture;
-      return picture !== null && picture.final && picture.camera === app.camera.seq && app.drag === null;
+      return app.drag === null && picture?.final === true && picture.drag === 0 && picture.camera === app.camera.seq;
     },
     get quiet() {
       return performance.now() - app.lastNews;

@@ -222,7 +222,7 @@ export interface LoadEdits {
   append?: boolean;
 }
 /**
- * What is shown: a view of the field; `before` leaves the edits out left of `split` (0 to 1 of the width).
+ * What is shown: a view; `before` leaves the edits out, `split` left of a share of the width.
  */
 export interface LookMessage {
   type: "look";
@@ -264,7 +264,7 @@ export interface PresentedMessage {
   picture: number;
 }
 /**
- * Renders the test views to numbered PNGs in a folder, or the camera path to an MP4, in the background.
+ * Renders the test views to PNGs in a folder, or the camera path to an MP4; in the background.
  */
 export interface RenderJob {
   type: "render";

@@ -59,9 +59,9 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
         return _download(text, "camera_path.json", "application/json")
 
     async def screenshot(request: Request) -> Response:
-        try:
-            page = hub.pages[int(request.query_params.get("page", ""))]
-        except (KeyError, ValueError):
+        newest = max(hub.pages, default=0)
+        page = hub.pages.get(_number(request.query_params.get("page", str(newest))))
+        if page is None:
             return PlainTextResponse("give ?page=, the number of an open page", 404)
         camera, look, shown = page.camera, page.look, hub.shown()
         if camera is None:
@@ -80,6 +80,11 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
         Mount("/", StaticFiles(directory=STATIC, html=True)),
     ]
     return _Guarded(Starlette(routes=routes, lifespan=life), guard)
+
+
+def _number(text: str) -> int:
+    """The number, or 0, which no page has."""
+    return int(text) if text.isascii() and text.isdigit() else 0
 
 
 def _download(content: str | bytes, name: str, kind: str) -> Response:

@@ -43,13 +43,14 @@ def hello_of(scene: Scene, name: str) -> protocol.Hello:
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds
     poses = [camera.c2w for camera in cameras]
+    every = [camera.c2w for group in scene.cameras.values() for camera in group]
     return protocol.Hello(
         version=cagefield.__version__,
         page=0,
         name=name,
         bounds=(vec3(lower), vec3(upper)),
         voxel=float(min(scene.field.voxel_size)),
-        up=vec3(shared_up(np.stack(poses))) if poses else (0.0, 0.0, 1.0),
+        up=vec3(shared_up(np.stack(every))) if every else (0.0, 0.0, 1.0),
         start=protocol.CameraMessage(
             seq=0,
             c2w=first.c2w.reshape(-1).tolist(),

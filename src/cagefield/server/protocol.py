@@ -114,7 +114,7 @@ class CameraMessage(Message):
 
 
 class LookMessage(Message):
-    """What is shown: a view; `before` leaves the edits out, left of `split` (0 to 1) where that is given."""
+    """What is shown: a view; `before` leaves the edits out, `split` left of a share of the width."""
 
     type: Literal["look"] = "look"
     view: View = "colour"

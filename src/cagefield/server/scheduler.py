@@ -43,7 +43,7 @@ FIRST_RATE = 4e5
 
 @dataclass(frozen=True)
 class Look:
-    """What of the scene is shown: a view, and where the edits are left out: `before` and `split`."""
+    """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
 
     view: View = "colour"
     before: bool = False

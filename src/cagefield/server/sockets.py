@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections import deque
+from collections.abc import Coroutine, Iterator
+from typing import Any
 
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -18,6 +21,8 @@ from cagefield.server.speaking import Speaker
 
 TOO_BIG, TOO_MANY = 1009, 1008
 """Close codes of RFC 6455: message too big, policy violation."""
+
+_log = logging.getLogger(__name__)
 
 MOST_REFUSED = 2000
 """Messages over the rate after which the socket is closed."""
@@ -108,13 +113,37 @@ def _first(error: ValidationError) -> str:
 
 
 async def _do(speaker: Speaker, page: Page, inbox: Inbox) -> None:
-    while True:
-        message = await inbox.get()
-        try:
-            await speaker.hear(message)
-        except (CagefieldError, OSError) as error:
-            page.notice("error", " ".join(str(error).split()))
-        await asyncio.sleep(0)
+    waiting: set[asyncio.Task[None]] = set()
+    try:
+        while True:
+            message = await inbox.get()
+            with _told(page):
+                rest = speaker.hear(message)
+                if rest is not None:
+                    task = asyncio.ensure_future(_finish(rest, page))
+                    waiting.add(task)
+                    task.add_done_callback(waiting.discard)
+            await asyncio.sleep(0)
+    finally:
+        for task in waiting:
+            task.cancel()
+
+
+async def _finish(rest: Coroutine[Any, Any, None], page: Page) -> None:
+    with _told(page):
+        await rest
+
+
+@contextlib.contextmanager
+def _told(page: Page) -> Iterator[None]:
+    """What cannot be done becomes a line for the page's user."""
+    try:
+        yield
+    except (CagefieldError, OSError) as error:
+        page.notice("error", str(error))
+    except Exception as error:
+        _log.exception("a message could not be followed")
+        page.notice("error", f"the server could not do that ({type(error).__name__}: {error}); see its log")
 
 
 async def _send(socket: WebSocket, page: Page) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import numpy as np
@@ -30,12 +31,13 @@ class Speaker:
         self._hub, self._page = hub, page
         self._session = hub.session
 
-    async def hear(self, message: protocol.PageMessage) -> None:
-        """Does what a message says and tells the pages what came of it."""
-        act: Any = getattr(self, f"_{message.type}")
-        after = act(message)
-        if after is not None:
-            await after
+    def hear(self, message: protocol.PageMessage) -> Coroutine[Any, Any, None] | None:
+        """Does what a message says and tells the pages what came of it.
+
+        Returns the rest where it has to wait for the rendering process; other messages need not wait.
+        """
+        act: Callable[[Any], Coroutine[Any, Any, None] | None] = getattr(self, f"_{message.type}")
+        return act(message)
 
     # ---- seeing ----
 

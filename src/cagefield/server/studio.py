@@ -58,8 +58,7 @@ class Studio:
     def picture(self, task: PictureTask, stop: Stop) -> PictureDone | Stopped:
         """The part of a picture that a task asks for, encoded."""
         began = time.perf_counter()
-        bare = task.look.before and task.look.split is None
-        renderer = self.plain if bare else self.renderer(task.shown, exact=task.exact)
+        renderer = self.plain if task.look.before else self.renderer(task.shown, exact=task.exact)
         mapped = time.perf_counter()
         if stop():
             return Stopped(task.number)
@@ -88,7 +87,8 @@ class Studio:
         """A whole picture, its edits exact; None where it was stopped."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
         task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
-        return self._frame(task, self.renderer(shown, exact=True), stop or (lambda: False))
+        renderer = self.plain if look.before else self.renderer(shown, exact=True)
+        return self._frame(task, renderer, stop or (lambda: False))
 
     def warm(self, stage: int) -> None:
         """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
@@ -114,7 +114,9 @@ class Studio:
         edits = self.edits(shown.edits)
         if not exact:
             edits = [self._quickly(edit) for edit in edits]
-        renderer = self.plain.with_edits(
+        # What the last ones share with these need not be looked at again.
+        last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
+        renderer = (last[0].renderer if last else self.plain).with_edits(
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
         )
         if exact:
@@ -142,7 +144,7 @@ class Studio:
     def _frame(self, task: PictureTask, edited: Renderer, stop: Stop) -> Frame | None:
         """The region of the picture; left of a split without the edits."""
         region, split = task.region, task.look.split
-        if not task.look.before or split is None:
+        if task.look.before or split is None:
             return self._part(task, edited, region, stop)
         left = min(max(round(split * region.full_width) - region.x, 0), region.width)
         parts: list[Frame] = []

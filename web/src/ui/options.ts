@@ -125,7 +125,7 @@ export function options(app: App, actions: Actions): HTMLElement {
 function latticeError(edit: EditState): string {
   if (edit.lattice_error === null) return "being measured";
   const [most, mean] = edit.lattice_error;
-  return `${short(most)} voxels at most, ${short(mean)} on average`;
+  return `≤ ${most.toPrecision(2)}, mean ${mean.toPrecision(2)} voxels`;
 }
 
 function point(x: number, y: number, z: number): Point {
