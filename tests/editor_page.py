@@ -69,10 +69,14 @@ class EditorPage:
         return next(edit for edit in state["edits"] if edit["id"] == state["selected"])
 
     def changed(self, action: Any) -> dict[str, Any]:
-        """The state after an action and the server's answer to it."""
-        revision = self.state["revision"]
+        """The state after an action that made an entry of the history, or went to another one."""
+        before = self.state
         action()
-        self.until(f"cagefield.now.state.revision > {revision}")
+        self.until(
+            f"cagefield.drag === null && (cagefield.now.state.entry !== {before['entry']}"
+            f" || cagefield.now.state.saved !== {str(before['saved']).lower()}"
+            f" || cagefield.now.state.selected !== {before['selected'] or 'null'})"
+        )
         self.settle()
         return self.state
 

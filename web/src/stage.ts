@@ -6,8 +6,18 @@ import type { Vec3 } from "./protocol";
 
 const MOST_PIXELS_PER_POINT = 2;
 
+/** Whether pages are drawn by the processor: then only lines and dots are smooth, which see to it themselves. */
+function isSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const information = gl?.getExtension("WEBGL_debug_renderer_info");
+  if (!gl || !information) return false;
+  const name = String(gl.getParameter(information.UNMASKED_RENDERER_WEBGL));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
 export class Stage {
-  readonly renderer = new WebGLRenderer({ antialias: true, alpha: false, powerPreference: "high-performance" });
+  readonly renderer = new WebGLRenderer({ antialias: !isSoftware(), powerPreference: "high-performance" });
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;
@@ -16,7 +26,6 @@ export class Stage {
   afterFrame: ((time: number) => void)[] = [];
   /** Called when the camera or the canvas is another. */
   cameraChanged: (() => void)[] = [];
-  /** Called when a frame that was drawn has reached the screen. */
   private scheduled = false;
   private size = new Vector2(1, 1);
 
