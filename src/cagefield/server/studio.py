@@ -114,7 +114,9 @@ class Studio:
         edits = self.edits(shown.edits)
         if not exact:
             edits = [self._quickly(edit) for edit in edits]
-        renderer = self.plain.with_edits(
+        # What the last ones share with these need not be looked at again.
+        last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
+        renderer = (last[0].renderer if last else self.plain).with_edits(
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
         )
         if exact:
