@@ -18,23 +18,23 @@ from cagefield.rendering.images import write_png
 
 
 class Nerfacto:
-    """A trained nerfacto as a cagefield field, inside the box of its scene."""
+    """The field of a trained nerfacto as a cagefield field, inside the box [2,3] of its scene."""
 
-    def __init__(self, model):
-        self.model = model.eval()
-        self.bounds = model.scene_box.aabb.detach().cpu().numpy().astype(np.float64)
+    def __init__(self, field, box):
+        self.field = field.eval()
+        self.bounds = box.detach().cpu().numpy().astype(np.float64)
 
     @torch.no_grad()
     def __call__(self, positions, viewdirs):
         from nerfstudio.cameras.rays import Frustums, RaySamples
         from nerfstudio.field_components.field_heads import FieldHeadNames
 
-        device = next(self.model.parameters()).device
+        device = next(self.field.parameters()).device
         x, d = (torch.from_numpy(np.array(a, np.float32)).to(device) for a in (positions, viewdirs))
         edge = torch.zeros_like(x[:, :1])
         frustums = Frustums(origins=x, directions=d, starts=edge, ends=edge, pixel_area=edge)
         samples = RaySamples(frustums=frustums, camera_indices=torch.zeros_like(edge, dtype=torch.int64))
-        outputs = self.model.field(samples)
+        outputs = self.field(samples)
         sigma, rgb = outputs[FieldHeadNames.DENSITY][:, 0], outputs[FieldHeadNames.RGB]
         return sigma.cpu().numpy(), rgb.cpu().numpy()
 
@@ -49,7 +49,7 @@ def main(config, edits, picture):
     size = int(seen.width), int(seen.height)
     lens = float(seen.fx), float(seen.fy), float(seen.cx), float(seen.cy)
     camera = Camera(pose, *size, *lens).resized(size[0] // 4, size[1] // 4)
-    field = Nerfacto(pipeline.model)
+    field = Nerfacto(pipeline.model.field, pipeline.model.scene_box.aabb)
     write_png(picture, render_sampled(field, camera, samples=256, edits=load_edits(edits)).rgb)
 
 

@@ -274,6 +274,8 @@ def test_settings_are_checked() -> None:
         replace(TINY, exact_size=8)
     with pytest.raises(CagefieldError, match="views is 0; it must be at least 1"):
         replace(TINY, views=0)
+    with pytest.raises(CagefieldError, match="discrete_views is 0; it must be at least 1"):
+        replace(TINY, discrete_views=0)
 
 
 def test_digests_follow_content_and_sources() -> None:

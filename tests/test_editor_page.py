@@ -321,10 +321,6 @@ def test_saved_edits_are_found_again_after_a_reload(editor: EditorPage, scene: P
     assert stored.name == "cone" and np.allclose(stored.deformed.corners, edits[0]["deformed"], atol=1e-6)
     editor.page.reload()
     editor.ready()
-    from PIL import Image
-
-    Image.fromarray((255 * before).astype("uint8")).save("/tmp/shots/rl_a.png")
-    Image.fromarray((255 * editor.pixels()).astype("uint8")).save("/tmp/shots/rl_b.png")
     assert editor.state["edits"] == edits
     assert editor.page.evaluate("cagefield.now.mode") == "edit"
     assert difference(editor.pixels(), before) < 0.15

@@ -47,12 +47,12 @@ def test_the_own_field_is_about_thirty_lines() -> None:
 def test_a_nerfacto_is_a_field() -> None:
     pytest.importorskip("nerfstudio", reason="nerfstudio is not installed")
     import torch
-    from nerfstudio.data.scene_box import SceneBox
-    from nerfstudio.models.nerfacto import NerfactoModelConfig
+    from nerfstudio.fields.nerfacto_field import NerfactoField
 
-    box = SceneBox(torch.tensor([[-1.0, -1, -1], [1, 1, 1]]))
-    config = NerfactoModelConfig(implementation="torch", camera_optimizer=None)
-    field = loaded("nerfstudio_nerfacto").Nerfacto(config.setup(scene_box=box, num_train_data=2))
+    box = torch.tensor([[-1.0, -1, -1], [1, 1, 1]])
+    inner = NerfactoField(box, num_images=2, implementation="torch", log2_hashmap_size=12)
+    field = loaded("nerfstudio_nerfacto").Nerfacto(inner, box)
+    np.testing.assert_array_equal(field.bounds, box.numpy())
     positions = np.random.default_rng(0).uniform(-1, 1, (10, 3)).astype(np.float32)
     sigma, rgb = field(positions, np.tile([[0.0, 0.0, -1.0]], (10, 1)))
     assert sigma.shape == (10,) and rgb.shape == (10, 3)

@@ -18,7 +18,8 @@ from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translat
 from cagefield.errors import CageError, EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import Falloff, FlowShell
-from cagefield.warps.extended import Extended, bends_one_to_one, stay_one_to_one, straightened_slope
+from cagefield.warps.bends import bends_one_to_one, forms, stay_one_to_one
+from cagefield.warps.extended import Extended, straightened_slope
 from cagefield.warps.flow_motion import TIMES
 from random_cages import can_be_evaluated, dragged, examples, random_operation, seeds
 
@@ -26,6 +27,20 @@ INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.15, 0.15, -0.1))
 BENT_OUTER = OUTER.move_corner(3, (0.3, 0.2, -0.1)).move_corner(4, (-0.2, 0.1, -0.3))
 ROD, SLOT = Cage.box((0, 0, 0), (1.2, 0.3, 0.3)), Cage.box((0, 0, 0), (1.6, 0.8, 0.8))
+TWISTED = Cage(
+    np.array(
+        [
+            [0.09, -0.79, -0.48],
+            [0.01, -0.68, 0.12],
+            [-0.58, 0.04, -0.71],
+            [0.58, 0.14, -0.67],
+            [-0.54, -0.04, 0.23],
+            [0.1, -0.3, 0.23],
+            [-0.72, -0.15, -0.14],
+            [0.32, 0.78, 0.02],
+        ]
+    )
+)
 
 EDITS = {
     "turn of 90": Edit(INNER, OUTER).rotate((0, 0, np.pi / 2)),
@@ -37,6 +52,7 @@ EDITS = {
     "corner after rotation": Edit(INNER, OUTER).rotate((0.5, 0.2, 1.5)).move_corner(7, (0.1, -0.2, 0.1)),
     "scale of a turned cage": Edit(INNER, OUTER).rotate((0.5, 0.2, 0.5)).scale((0.6, 1.5, 1.1)),
     "bent cages": Edit(BENT, BENT_OUTER).rotate((1.0, 0.5, 1.0)).scale((0.9, 0.8, 1.0)),
+    "bent far": Edit(INNER, OUTER.grown(1.0)).move_corner(7, (-0.31, -0.42, 0.36)),
     "turn in a slot": Edit(ROD, SLOT).rotate((0, 0, np.pi)),
     "linear, half": Edit(INNER, OUTER, falloff="linear", width=0.5).rotate((0, 0, 1)).translate((0.1, 0, 0)),
 }
@@ -97,8 +113,8 @@ def flow_edits(draw: st.DrawFn) -> Edit:
     return edit
 
 
-def check_map(edit: Edit, n: int = 80) -> None:
-    """Every promise of the shell, at random points."""
+def check_map(edit: Edit, n: int = 80, tolerance: float = 2e-5) -> None:
+    """Every promise of the shell, at random points; the tolerance is for the inner cage's faces."""
     shell = shell_of(edit)
     scene = np.ptp(shell.outer.corners, axis=0).max()
     p = shell_points(shell, n)
@@ -112,8 +128,6 @@ def check_map(edit: Edit, n: int = 80) -> None:
     # On the inner cage's faces it is phi, up to the integration's error: the aim is 1e-4 of the scene.
     on_inner, xi = face_points(shell.deformed, 60)
     expected = Extended.of(shell.inner).points(xi)
-    # The linear profile has a kink on the faces, which costs it two orders.
-    tolerance = 2e-5 if edit.falloff == "smooth" else 2e-4
     assert np.abs(shell.to_canonical(on_inner)[0] - expected).max() < tolerance * scene
     # On the outer cage's it is the identity, up to the rounding of where the face is.
     on_outer, _ = face_points(shell.outer, 60)
@@ -126,7 +140,9 @@ def check_map(edit: Edit, n: int = 80) -> None:
 @pytest.mark.parametrize("name", EDITS)
 def test_map_of_named_edits(name: str) -> None:
     EDITS[name].check()
-    check_map(EDITS[name])
+    # The linear profile has a kink on the faces, which costs two orders. A corner dragged deep into its cage
+    # is squeezed, which the steps are not made for.
+    check_map(EDITS[name], tolerance={"linear, half": 2e-4, "bent far": 5e-5}.get(name, 2e-5))
 
 
 @examples(10)
@@ -289,8 +305,15 @@ PROBLEMS = [
         "the flow shell is left by the inner cage: it bulges through the outer cage between its corners",
     ),
     (
-        Edit(INNER, OUTER.grown(1.0)).move_corner(7, (-0.31, -0.42, 0.36)),
+        # One cage with a corner at its opposite edge becomes another.
+        Edit(INNER.move_corner(2, (-0.05, -0.59, 0.02)), OUTER.grown(1.0))
+        .move_corner(2, (0.05, 0.59, -0.02))
+        .move_corner(0, (0.29, 0.58, -0.53)),
         "the flow shell cannot follow the inner cage: it is bent too far",
+    ),
+    (
+        Edit(TWISTED, OUTER.grown(1.0)),
+        "the flow shell cannot surround the inner cage: it is bent too far before any operation",
     ),
 ]
 
@@ -307,7 +330,7 @@ def test_bends_that_are_one_to_one_have_a_positive_determinant_everywhere() -> N
     g = np.linspace(-1.3, 1.3, 27)  # -1 and 1 among them, where the least values are, beyond the faces
     xi = np.stack(np.meshgrid(g, g, g), axis=-1).reshape(-1, 3)
     xi = np.concatenate([xi, xi * (1.0 - 1e-9)])
-    least = np.array([np.linalg.det(straightened_slope(k, xi)).min() for k in K])
+    least = np.array([np.linalg.det(straightened_slope(k, xi)).min() for k in forms(K)])
     found = bends_one_to_one(K)
     assert 10 < found.sum() < 50
     assert (least[found] > 0.0).all()

@@ -7,13 +7,14 @@ to the velocity. It is a list of vec3, appended to the lattices' nodes:
     0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
     7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
     9     linear 0 or 1, outer cage affine 0 or 1
-    10-13 bend K_o of the outer cage    14-17 dK/dt of the inner cage
+    10-19 bend and tilts of the outer cage, see `bends.forms`
+    20-23 dK/dt of the inner cage
 
 then for each of 2 steps + 1 moments `MOMENT` of them:
 
     0-3   y = rows . Z + [3]            4-7   velocity of the affine part = rows . Z + [7]
     8     distances h of the faces      9     step h from this knot on, at even moments
-    10-13 bend K at that time           14-16 rows of W_o F, which takes the bend's velocity to Z
+    10-19 bend and tilts at that time   20-22 rows of W_o F, which takes the bend's velocity to Z
 
 The float64 reference, and the mathematics, are in `flow_shell`.
 """
@@ -25,11 +26,15 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.hexahedron import Array
+from cagefield.warps.bends import forms
 from cagefield.warps.flow_shell import FlowShell
 
 vec3 = qd.math.vec3
 
-HEADER, MOMENT = 18, 17
+HEADER, MOMENT = 24, 23
+
+STARTS = 9
+"""Places from which Newton's method is tried again where it is stuck."""
 
 
 def table(shell: FlowShell) -> NDArray[np.float32]:
@@ -57,7 +62,9 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
     )
     head[8] = steps, motion.is_affine, 1.0 / shell.falloff.width
     head[9, :2] = shell.falloff.profile == "linear", outer.is_affine
-    head[10:14], head[14:18] = outer.bend, bend_rate
+    head[20:24] = bend_rate
+    if not outer.is_affine:
+        head[10:20] = outer.form
     rows = np.zeros((2 * steps + 1, MOMENT, 3))
     rows[:, 0:3] = W @ outer.frame
     rows[:, 3] = (W @ (outer.centre - c)[:, :, None])[:, :, 0]
@@ -66,8 +73,9 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
     rows[:, 7] = (L @ (outer.centre - c)[:, :, None])[:, :, 0] + dc @ outer.inverse.T
     rows[:, 8] = 1.0 / np.linalg.norm(W, axis=2) / unit
     rows[:-1:2, 9, 0] = np.diff(knots)
-    rows[:, 10:14] = motion.start.bend + times[:, None, None] * bend_rate
-    rows[:, 14:17] = outer.inverse @ F
+    if not motion.is_affine:
+        rows[:, 10:20] = forms(motion.start.bend + times[:, None, None] * bend_rate)
+    rows[:, 20:23] = outer.inverse @ F
     return np.concatenate([head, rows.reshape(-1, 3)])
 
 
@@ -165,10 +173,10 @@ def velocity(
                 xi = x
                 dxi = dx
                 held = qd.max(qd.min(xi, 1.0), -1.0)
-                v += rows_times(lattice, moment + 14, bend(held, lattice, base + 14))
+                v += rows_times(lattice, moment + 20, bend(held, lattice, base + 20))
                 if qd.static(tangent):
                     dv += rows_times(
-                        lattice, moment + 14, bend_along(held, inside(xi, dxi), lattice, base + 14)
+                        lattice, moment + 20, bend_along(held, inside(xi, dxi), lattice, base + 20)
                     )
     # Outside the outer cage everything is at rest, also after a stage's rounding.
     far = lattice[base + 7] * (1.0 - z * z)
@@ -210,9 +218,9 @@ def velocity(
 
 @qd.func
 def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise: qd.template()):
-    """xi with xi + B(clamp(xi)) = y for the bend at a row of the table, to rounding or (not precise) to 1e-5.
+    """xi with y(xi) = y for the form at a row of the table, to rounding or (not precise) to 1e-5.
 
-    Newton's method, its steps halved where they fail.
+    Newton's method, its steps halved where they fail; what is stuck at a kink is tried again from elsewhere.
     """
     xi = start
     enough = qd.static(3e-7 if precise else 1e-5) * (1.0 + qd.abs(y).max())
@@ -220,8 +228,10 @@ def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise:
     best = start
     step = vec3(0.0, 0.0, 0.0)
     share = 1.0
-    for _ in range(24):
-        residual = xi + bend(qd.max(qd.min(xi, 1.0), -1.0), lattice, K) - y
+    tried = 0
+    for _ in range(24 * (1 + STARTS)):
+        held = qd.max(qd.min(xi, 1.0), -1.0)
+        residual = xi + bend(held, lattice, K) + tilt(xi - held, lattice, K + 4) - y
         new = qd.abs(residual).max()
         if new < size:
             best = xi
@@ -233,14 +243,23 @@ def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise:
         else:
             share *= 0.5
             if share < 0.01:
-                break
+                if size < 1e-3 * (1.0 + qd.abs(y).max()) or tried == STARTS:
+                    break
+                # The centre, then the corners of a cube twice as large.
+                best = vec3(0.0, 0.0, 0.0)
+                if tried > 0:
+                    n = tried - 1
+                    best = 4.0 * vec3(n % 2, (n // 2) % 2, n // 4) - 2.0
+                step = vec3(0.0, 0.0, 0.0)
+                size = 1e30
+                tried += 1
         xi = best - share * step
     return best
 
 
 @qd.func
 def straighten_slope(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
-    """(d(xi + B(clamp(xi)))/dxi)^-1 d."""
+    """(dy/dxi)^-1 d."""
     x = qd.max(qd.min(xi, 1.0), -1.0)
     a = lattice[K]
     b = lattice[K + 1]
@@ -251,10 +270,16 @@ def straighten_slope(xi: vec3, d: vec3, lattice: qd.template(), K: qd.i32):
     w = vec3(0.0, 0.0, 1.0)
     if qd.abs(xi.x) <= 1.0:
         u += x.y * a + x.z * b + x.y * x.z * g
+    else:
+        u += lattice[K + 5 if xi.x > 0.0 else K + 4]
     if qd.abs(xi.y) <= 1.0:
         v += x.x * a + x.z * c + x.x * x.z * g
+    else:
+        v += lattice[K + 7 if xi.y > 0.0 else K + 6]
     if qd.abs(xi.z) <= 1.0:
         w += x.x * b + x.y * c + x.x * x.y * g
+    else:
+        w += lattice[K + 9 if xi.z > 0.0 else K + 8]
     return solve_columns(u, v, w, d)
 
 
@@ -277,6 +302,15 @@ def bend(xi: vec3, lattice: qd.template(), K: qd.i32):
         + xi.y * xi.z * lattice[K + 2]
         + xi.x * xi.y * xi.z * lattice[K + 3]
     )
+
+
+@qd.func
+def tilt(beyond: vec3, lattice: qd.template(), at: qd.i32):
+    """The tilts at a row of the table, times xi - clamp(xi)."""
+    out = vec3(0.0, 0.0, 0.0)
+    for a in qd.static(range(3)):
+        out += beyond[a] * lattice[at + 2 * a + 1 if beyond[a] > 0.0 else at + 2 * a]
+    return out
 
 
 @qd.func

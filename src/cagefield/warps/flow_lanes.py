@@ -56,16 +56,17 @@ def newton(
     table: qd.template(),
     K: qd.i32,
 ):
-    """(xi after a step from xi = (x, y, z) towards xi + B(clamp(xi)) = a, the residual before it)."""
+    """(xi after a step from xi = (x, y, z) towards y(xi) = a, the residual before it)."""
     cx = qd.max(qd.min(x, 1.0), -1.0)
     cy = qd.max(qd.min(y, 1.0), -1.0)
     cz = qd.max(qd.min(z, 1.0), -1.0)
     tx, ty, tz = bend(cx, cy, cz, table, K)
-    rx = x + tx - ax
-    ry = y + ty - ay
-    rz = z + tz - az
+    xy, xz, yx, yz, zx, zy = tilts(x, y, z, table, K)
+    rx = x + tx + (y - cy) * yx + (z - cz) * zx - ax
+    ry = y + ty + (x - cx) * xy + (z - cz) * zy - ay
+    rz = z + tz + (x - cx) * xz + (y - cy) * yz - az
     residual = qd.max(qd.abs(rx), qd.abs(ry), qd.abs(rz))
-    sx, sy, sz = unbend(x, y, z, rx, ry, rz, table, K)
+    sx, sy, sz = unbend(x, y, z, rx, ry, rz, table, K, True)
     return x - sx, y - sy, z - sz, residual
 
 
@@ -79,8 +80,9 @@ def unbend(
     rz: qd.f32,
     table: qd.template(),
     K: qd.i32,
+    around: qd.template(),
 ):
-    """(d(xi + B(clamp(xi)))/dxi)^-1 r at xi = (x, y, z), by Cramer's rule."""
+    """(dy/dxi)^-1 r at xi = (x, y, z), by Cramer's rule; without tilts where nothing is around the cage."""
     a = table[K]
     b = table[K + 1]
     c = table[K + 2]
@@ -103,6 +105,14 @@ def unbend(
     wx = in_z * (cx * b.x + cy * c.x + xy * g.x)
     wy = in_z * (cx * b.y + cy * c.y + xy * g.y)
     wz = 1.0 + in_z * (cx * b.z + cy * c.z + xy * g.z)
+    if qd.static(around):
+        dxy, dxz, dyx, dyz, dzx, dzy = tilts(x, y, z, table, K)
+        uy += (1.0 - in_x) * dxy
+        uz += (1.0 - in_x) * dxz
+        vx += (1.0 - in_y) * dyx
+        vz += (1.0 - in_y) * dyz
+        wx += (1.0 - in_z) * dzx
+        wy += (1.0 - in_z) * dzy
     # v x w, w x u and u x v.
     px = vy * wz - vz * wy
     py = vz * wx - vx * wz
@@ -118,6 +128,25 @@ def unbend(
         (rx * px + ry * py + rz * pz) * inverse,
         (rx * qx + ry * qy + rz * qz) * inverse,
         (rx * tx + ry * ty + rz * tz) * inverse,
+    )
+
+
+@qd.func
+def tilts(x: qd.f32, y: qd.f32, z: qd.f32, table: qd.template(), K: qd.i32):
+    """The tilts on the sides where xi = (x, y, z) is: (xy, xz, yx, yz, zx, zy), across their axes."""
+    ax = table[K + 4]
+    bx = table[K + 5]
+    ay = table[K + 6]
+    by = table[K + 7]
+    az = table[K + 8]
+    bz = table[K + 9]
+    return (
+        qd.select(x > 0.0, bx.y, ax.y),
+        qd.select(x > 0.0, bx.z, ax.z),
+        qd.select(y > 0.0, by.x, ay.x),
+        qd.select(y > 0.0, by.z, ay.z),
+        qd.select(z > 0.0, bz.x, az.x),
+        qd.select(z > 0.0, bz.y, az.y),
     )
 
 

@@ -159,8 +159,8 @@ def _march(
                         cx = qd.max(qd.min(ix, 1.0), -1.0)
                         cy = qd.max(qd.min(iy, 1.0), -1.0)
                         cz = qd.max(qd.min(iz, 1.0), -1.0)
-                        tx, ty, tz = bend(cx, cy, cz, table, 14)
-                        tx, ty, tz = times(table, moment + 14, tx, ty, tz)
+                        tx, ty, tz = bend(cx, cy, cz, table, 20)
+                        tx, ty, tz = times(table, moment + 20, tx, ty, tz)
                         vx += tx
                         vy += ty
                         vz += tz
@@ -169,7 +169,7 @@ def _march(
                     vy *= w
                     vz *= w
                     if qd.static(bent_outer):
-                        vx, vy, vz = unbend(x, y, z, vx, vy, vz, table, 10)
+                        vx, vy, vz = unbend(x, y, z, vx, vy, vz, table, 10, False)
                     kx[lane] = vx
                     ky[lane] = vy
                     kz[lane] = vz

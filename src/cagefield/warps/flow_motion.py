@@ -1,8 +1,8 @@
 """How the inner cage moves from its canonical to its deformed place, for the flow shell.
 
-Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `extended`), is
+Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `bends`), is
 
-    x(xi, t) = c(t) + F(t) (xi + B_t(clamp(xi))).
+    x(xi, t) = c(t) + F(t) y_t(xi),    y_t(xi) = xi + B_t(xi) in the cage.
 
 With F_0, F_1 the Jacobians at the centres of the canonical and the deformed cage, and F_1 F_0^-1 = R S its
 polar decomposition, F(t) = e^(-k sin(pi t)) R^t S^t F_0: the rotation turns evenly about a fixed axis (by 180
@@ -22,16 +22,8 @@ from scipy.spatial.transform import Rotation
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.extended import (
-    AXES,
-    SIGNS,
-    Extended,
-    bend,
-    bends,
-    slope_columns,
-    stay_one_to_one,
-    straightened_slope,
-)
+from cagefield.warps.bends import AXES, SIGNS, bend, bends, stay_one_to_one
+from cagefield.warps.extended import Extended, slope_columns, straightened_slope
 
 LEAST_SIZE = 1e-2
 """The cage is shrunk to no less than this on its way."""
@@ -127,7 +119,7 @@ class Motion:
             return a + t[:, None] * (b - a), np.broadcast_to(b - a, (len(t), 3))
         ends = self.confines.coordinates(np.stack([a, b]))
         z = ends[0] + t[:, None] * (ends[1] - ends[0])
-        slope = self.confines.frame @ straightened_slope(self.confines.bend, z)
+        slope = self.confines.frame @ straightened_slope(self.confines.form, z)
         return self.confines.points(z), slope @ (ends[1] - ends[0])
 
     @cached_property
@@ -157,7 +149,7 @@ class Motion:
         if self.confines.is_affine:
             return z.reshape(x.shape), v @ self.confines.inverse.T
         along = hexahedron.solve(
-            slope_columns(self.confines.bend, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
+            slope_columns(self.confines.form, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
         )
         return z.reshape(x.shape), along.T.reshape(x.shape)
 

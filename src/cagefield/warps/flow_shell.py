@@ -10,7 +10,8 @@ import numpy as np
 from cagefield import hexahedron
 from cagefield.cages import Cage, are_valid
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.extended import Extended, bend, bend_slope
+from cagefield.warps.bends import bend, bend_slope
+from cagefield.warps.extended import Extended
 from cagefield.warps.flow_motion import Motion, gaps, may_bend
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
@@ -252,7 +253,7 @@ class FlowShell:
         d_near = ((e ** (p - 1.0) * cage.place.heights * np.sign(xi))[:, None] @ dxi)[:, 0]
         d_far = ((D ** (-p - 1.0) * confines.heights * z)[:, None] @ dz)[:, 0]
         dq = q[:, None] * (d_near / np.maximum(near, 1e-300)[:, None] + d_far / far[:, None])
-        V, dV = cage.velocity(xi, dxi)
+        V, dV = cage.velocity(x[rows], xi, dxi)
         v[rows] = w[:, None] * V
         G[rows] = w[:, None, None] * dV + V[:, :, None] * (slope[:, None] * dq)[:, None]
         return v, G
@@ -275,10 +276,14 @@ class _Moment:
     frame_rate: Array
     bend_rate: Array
 
-    def velocity(self, xi: Array, dxi: Array) -> tuple[Array, Array]:
-        """(V [N,3], dV/dx [N,3,3]) at coordinates xi [N,3] with dxi/dx [N,3,3]."""
+    def velocity(self, x: Array, xi: Array, dxi: Array) -> tuple[Array, Array]:
+        """(V [N,3], dV/dx [N,3,3]) at points x [N,3] with coordinates xi [N,3] and dxi/dx [N,3,3].
+
+        V = dc/dt + dF/dt F^-1 (x - c) + F dB/dt(clamp(xi)): that of the cage on its faces, and not of what
+        the coordinates around it do.
+        """
         clamped = xi.clip(-1.0, 1.0)
-        y = xi + bend(self.place.bend, clamped)
+        y = (x - self.place.centre) @ self.place.inverse.T
         V = self.centre_rate + y @ self.frame_rate.T
         dV = np.broadcast_to(self.frame_rate @ self.place.inverse, (len(xi), 3, 3))
         if self.bend_rate.any():
