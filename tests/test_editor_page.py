@@ -71,7 +71,7 @@ def editor(opened: EditorPage, scene: Path) -> EditorPage:
     opened.changed(lambda: opened.page.set_input_files("input[type=file]", file))
     edit = opened.state["edits"][0]
     if opened.state["selected"] != edit["id"]:
-        opened.changed(lambda: opened.page.click(f'.edit[data-edit="{edit["id"]}"]'))
+        opened.changed(lambda: opened.page.dispatch_event(f'.edit[data-edit="{edit["id"]}"]', "click"))
     opened.tools(mode="edit", tool="translate", axes="world")
     return opened
 

@@ -13,6 +13,7 @@ const SNAP_ANGLE = 15;
 const SNAP_FACTOR = 0.1;
 const CLICK_REACH = 4;
 const LINE_REACH = 7;
+const DOUBLE_CLICK = 500;
 /** The gizmo's handle for turning freely: it fills the gizmo, and gives way to what is inside. */
 const WHOLE_BALL = "XYZE";
 
@@ -33,6 +34,8 @@ export class Pointer {
   private hold: Hold | null = null;
   private pressed: { x: number; y: number } | null = null;
   private latest = { x: 0, y: 0, time: 0 };
+  /** The first press of what may become a double click: when, and whether nothing was under it. */
+  private first = { time: -Infinity, free: true };
 
   constructor(private readonly app: App) {
     const { canvas } = app.stage;
@@ -79,6 +82,9 @@ export class Pointer {
     this.pressed = { ...this.at };
     const free = event.button !== 0 || event.altKey;
     const hover = free ? null : this.under();
+    if (event.timeStamp - this.first.time > DOUBLE_CLICK) {
+      this.first = { time: event.timeStamp, free: hover === null && this.app.gizmo.axis === null };
+    }
     if (free || (hover === null && this.app.gizmo.axis === null)) {
       this.app.camera.held = true;
       return;
@@ -240,7 +246,7 @@ export class Pointer {
 
   private place(event: MouseEvent): void {
     this.locate(event);
-    if (this.under() !== null || this.app.gizmo.axis !== null) return;
+    if (!this.first.free) return;
     const { width, height } = this.app.stage.points;
     this.app.expectEdit();
     this.app.send({ type: "place", x: clamp(this.at.x / width), y: clamp(this.at.y / height) });

@@ -48,6 +48,8 @@ class Hub:
         """A line for the pages that come."""
         self._pages = 0
         self._shown = self._what_is_shown()
+        self._shown_revision = session.revision
+        """The revision that `_shown` was taken from."""
         self._pictures = 0
         self._trouble: str | None = None
 
@@ -143,6 +145,7 @@ class Hub:
     def pump(self) -> None:
         """Has rendered what is new to see."""
         shown = self._what_is_shown()
+        self._shown_revision = self.session.revision
         if shown != self._shown:
             self._shown = shown
             self._pictures += 1
@@ -167,7 +170,7 @@ class Hub:
             generation,
         )
         drag, seq = (page.drag, page.seq) if page.drag else (0, 0)
-        return task, Stamp(self.session.revision, drag, seq)
+        return task, Stamp(self._shown_revision, drag, seq)
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""
