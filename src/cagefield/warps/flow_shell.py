@@ -26,6 +26,10 @@ STRAIN = 0.125
 """A step lasts until the flow has strained some part of the shell by about this much."""
 
 LEAST_STEPS, MOST_STEPS = 4, 512
+
+FLAT = 0.1
+"""Least singular value of the inner cage's unit face normals (1 for a box) below which steps get shorter."""
+
 _CHUNK = 8192
 
 
@@ -111,7 +115,12 @@ class FlowShell:
         z, dz = self.motion.surface(t)
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)
-        rate = 1.5 * squeeze + np.linalg.norm(dF @ np.linalg.inv(F), axis=(1, 2)) + 1e-3
+        W = np.linalg.inv(F)
+        rate = 1.5 * squeeze + np.linalg.norm(dF @ W, axis=(1, 2)) + 1e-3
+        # A cage sheared nearly flat is felt far along its length: its faces' normals are nearly dependent.
+        normals = W / np.linalg.norm(W, axis=2, keepdims=True)
+        flat = np.linalg.svd(normals, compute_uv=False)[:, -1] / FLAT
+        rate *= np.maximum(1.0, flat**-0.5)
         return t, np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])
 
     def to_canonical(self, points: Array) -> tuple[Array, Array]:
