@@ -53,7 +53,9 @@ class EditorPage:
     def settle(self) -> None:
         """Waits for the whole picture of the state; where the field did not change there is no new one."""
         self.until(
-            "cagefield.settled && (cagefield.picture.revision === cagefield.now.state.revision"
+            "cagefield.settled"
+            " && cagefield.picture.full_width === document.querySelector('.view').clientWidth"
+            " && (cagefield.picture.revision === cagefield.now.state.revision"
             " ? cagefield.quiet > 60 : cagefield.quiet > 700)"
         )
 
