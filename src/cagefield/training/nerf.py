@@ -28,7 +28,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.nerf import Linear, Mlp, NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.rendering.nerf import Jitter, Rays, march, trace
-from cagefield.training.voxel import _interruptible as interruptible
+from cagefield.training.running import run_to_end
 
 SKIP = 5
 """The trunk layer that sees the position's encoding again."""
@@ -139,22 +139,7 @@ def train_nerf(
         CagefieldError: an unbounded capture, or a checkpoint that cannot be read or has other options.
     """
     run = _Run(dataset, config or NerfConfig())
-    if resume:
-        if checkpoint is None or not checkpoint.is_file():
-            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start without resume")
-        run.restore(checkpoint)
-    saved = run.seconds
-    with interruptible() as interrupted:
-        while run.done < 1.0 and not interrupted():
-            run.advance()
-            if on_progress is not None:
-                on_progress(run.progress())
-            if checkpoint is not None and run.seconds - saved > 60.0:
-                run.store(checkpoint)
-                saved = run.seconds
-    finished = run.done >= 1.0
-    if checkpoint is not None and not finished:
-        run.store(checkpoint)
+    finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
     some = dataset.train[:: max(1, len(dataset.train) // 4)]
     return NerfResult(

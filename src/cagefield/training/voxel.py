@@ -11,14 +11,11 @@ On a CPU a run of given `steps` gives the same field for the same seed and numbe
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import os
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +30,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress, Snapshots
+from cagefield.training.running import run_to_end
 from cagefield.training.specks import without_specks
 
 if TYPE_CHECKING:
@@ -150,25 +148,14 @@ def train_voxel(
     """
     devices.start()
     run = _Run(dataset, config or VoxelConfig())
-    if resume:
-        if checkpoint is None or not checkpoint.is_file():
-            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start without resume")
-        run.restore(checkpoint)
-    saved = run.seconds
-    with _interruptible() as interrupted:
-        while run.done < 1.0 and not interrupted():
-            before = run.step, run.seconds
-            run.advance()
-            if on_progress is not None:
-                on_progress(run.progress())
-            if snapshots is not None and snapshots.due(before, (run.step, run.seconds)):
-                snapshots.on_field(run.progress(), run.field())
-            if checkpoint is not None and run.seconds - saved > 60.0:
-                run.store(checkpoint)
-                saved = run.seconds
-        finished = run.done >= 1.0
-        if checkpoint is not None and not finished:
-            run.store(checkpoint)
+
+    def snapshot(before: tuple[int, float]) -> None:
+        if snapshots is not None and snapshots.due(before, (run.step, run.seconds)):
+            snapshots.on_field(run.progress(), run.field())
+
+    finished = run_to_end(
+        run, checkpoint=checkpoint, resume=resume, on_progress=on_progress, after_step=snapshot
+    )
     field = run.field()
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
@@ -613,23 +600,3 @@ def seen(
         inside = (np.abs(pixels - size / 2) <= size / 2 + margin).all(axis=1) & (depth > near)
         votes += inside
     return votes >= min(least, len(views))
-
-
-@contextlib.contextmanager
-def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Turns Ctrl-C into a flag that is looked at between steps (in the main thread)."""
-    pressed = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed.is_set
-        return
-
-    def press(_signal: int, _frame: object) -> None:
-        if pressed.is_set():
-            raise KeyboardInterrupt
-        pressed.set()
-
-    before = signal.signal(signal.SIGINT, press)
-    try:
-        yield pressed.is_set
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,95 @@
+"""The loop of a training: steps until the run is done or Ctrl-C is pressed, and its checkpoints."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+from cagefield.errors import CagefieldError
+
+CHECKPOINT_SECONDS = 60.0
+"""Seconds of training between two checkpoints."""
+
+
+class Run(Protocol):
+    """The state of a training run."""
+
+    step: int
+    seconds: float
+
+    @property
+    def done(self) -> float:
+        """Progress, 0 to 1."""
+
+    def advance(self) -> None:
+        """One step."""
+
+    def progress(self) -> Any:
+        """Where the run stands, to be told."""
+
+    def store(self, path: Path) -> None:
+        """Writes the state, whole or not at all."""
+
+    def restore(self, path: Path) -> None:
+        """Takes the state from a file."""
+
+
+def run_to_end(
+    run: Run,
+    *,
+    checkpoint: Path | None,
+    resume: bool,
+    on_progress: Callable[[Any], None] | None,
+    after_step: Callable[[tuple[int, float]], None] = lambda before: None,
+) -> bool:
+    """True when the run was finished, False when Ctrl-C ended it early.
+
+    Its state is written to `checkpoint` every minute and when it ends early; `resume` goes on from there.
+    `after_step` is called after each step and its report, with the (step, seconds) before it.
+
+    Raises:
+        CagefieldError: nothing to resume from, or nothing that `restore` can read.
+    """
+    if resume:
+        if checkpoint is None or not checkpoint.is_file():
+            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start without resume")
+        run.restore(checkpoint)
+    saved = run.seconds
+    with _interruptible() as interrupted:
+        while run.done < 1.0 and not interrupted():
+            before = run.step, run.seconds
+            run.advance()
+            if on_progress is not None:
+                on_progress(run.progress())
+            after_step(before)
+            if checkpoint is not None and run.seconds - saved > CHECKPOINT_SECONDS:
+                run.store(checkpoint)
+                saved = run.seconds
+        finished = run.done >= 1.0
+        if checkpoint is not None and not finished:
+            run.store(checkpoint)
+    return finished
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[Callable[[], bool]]:
+    """Turns Ctrl-C into a flag that is looked at between steps (in the main thread)."""
+    pressed = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed.is_set
+        return
+
+    def press(_signal: int, _frame: object) -> None:
+        if pressed.is_set():
+            raise KeyboardInterrupt
+        pressed.set()
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield pressed.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)
