@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cagefield.errors import FieldError
+from cagefield.fields.files import read_tensors
 from cagefield.fields.nerf import Linear, Mlp, NerfField
 
 KIND = "NerfField"
@@ -40,25 +41,8 @@ def load_nerf(path: str | Path) -> NerfField:
         FieldError: the file is missing, truncated, of another kind or newer than this version, or its tensors
             do not fit together.
     """
-    from safetensors import SafetensorError, safe_open
-
-    if not Path(path).is_file():
-        raise FieldError(f"{path}: no such field file; copy it back or import the checkpoint again")
-    try:
-        with safe_open(str(path), framework="numpy") as file:
-            metadata = file.metadata() or {}
-            tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError) as error:
-        raise FieldError(
-            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
-        ) from error
-    if metadata.get("kind") != KIND:
-        raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {KIND!r}")
-    if metadata.get("version") != FORMAT_VERSION:
-        raise FieldError(
-            f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
-            f"{FORMAT_VERSION!r}; update cagefield"
-        )
+    cure = "copy it back or import the checkpoint again"
+    metadata, tensors = read_tensors(path, KIND, FORMAT_VERSION, cure)
     try:
         options = json.loads(metadata["options"])
         rectified = list(options.pop("rectified_feature"))

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.contraction import contract
+from cagefield.fields.files import read_tensors
 
 FORMAT_VERSION = "1"
 
@@ -185,25 +186,8 @@ class VoxelField:
         Raises:
             FieldError: the file is missing, truncated, of another kind or newer than this version.
         """
-        from safetensors import SafetensorError, safe_open
-
-        if not Path(path).is_file():
-            raise FieldError(f"{path}: no such field file; train one with `cagefield train DATA -o SCENE`")
-        try:
-            with safe_open(str(path), framework="numpy") as file:
-                metadata = file.metadata() or {}
-                tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        except (SafetensorError, OSError) as error:
-            raise FieldError(
-                f"{path}: not a readable field file ({error}); it may be truncated, write it again"
-            ) from error
-        if metadata.get("kind") != "VoxelField":
-            raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected 'VoxelField'")
-        if metadata.get("version") != FORMAT_VERSION:
-            raise FieldError(
-                f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
-                f"{FORMAT_VERSION!r}; update cagefield"
-            )
+        cure = "train one with `cagefield train DATA -o SCENE`"
+        metadata, tensors = read_tensors(path, "VoxelField", FORMAT_VERSION, cure)
         missing = {"bounds", "resolution", "vertices", "density", "sh"} - tensors.keys()
         if missing:
             raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")

@@ -1,0 +1,38 @@
+"""Field files: safetensors with the kind of field and the version of its layout in the header."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cagefield.errors import FieldError
+
+
+def read_tensors(
+    path: str | Path, kind: str, version: str, cure: str
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """(header, tensors by name) of a field file; `cure` says where a file that is not there comes from.
+
+    Raises:
+        FieldError: the file is missing, truncated, of another kind or of a newer version.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    if not Path(path).is_file():
+        raise FieldError(f"{path}: no such field file; {cure}")
+    try:
+        with safe_open(str(path), framework="numpy") as file:
+            metadata = file.metadata() or {}
+            tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError) as error:
+        raise FieldError(
+            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+        ) from error
+    if metadata.get("kind") != kind:
+        raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {kind!r}")
+    if metadata.get("version") != version:
+        raise FieldError(
+            f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
+            f"{version!r}; update cagefield"
+        )
+    return metadata, tensors
