@@ -4,7 +4,8 @@ A run is a sequence of stages. Each stage is a grid: the stored vertices of the 
 largest weight they got in any training ray, cropped to what is left (bounded scenes) and refined. Within a
 stage, batches of pixel patches are marched (`kernels.march_batch`) and every voxel that they met is updated
 (`kernels.gauss_newton`). Patches that meet no occupied block any more are left out of the batches: their
-gradients are zero. At the end, specks are taken out of a bounded scene's field.
+gradients are zero. At the end, specks are taken out of a bounded scene's field, and
+what no photo showed of it is filled.
 
 On a CPU a run of given `steps` gives the same field for the same seed and number of threads.
 """
@@ -28,6 +29,7 @@ from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
+from cagefield.training.filling import filled
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress, Snapshots
 from cagefield.training.running import run_to_end
@@ -146,6 +148,8 @@ def train_voxel(
         DatasetError: no photos, or photos that cannot be read.
         CagefieldError: a checkpoint that cannot be read or was written with another configuration.
     """
+    from cagefield.training.unseen import unseen
+
     devices.start()
     run = _Run(dataset, config or VoxelConfig())
 
@@ -157,6 +161,8 @@ def train_voxel(
         run, checkpoint=checkpoint, resume=resume, on_progress=on_progress, after_step=snapshot
     )
     field = run.field()
+    if not field.contracted:
+        field = filled(field, unseen(field, [view.camera for view in dataset.train]))
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
