@@ -70,6 +70,8 @@ class VoxelConfig:
         damping: added to every curvature.
         largest_step: largest change of a voxel's optical depth in one step.
         smooth: weight of the Laplacian regularisation; None takes 2e-4, or 2e-3 for an unbounded capture.
+        plain: weight of a penalty on the colour's dependence on the view, relative to what the photos say:
+            what was seen from one side alone keeps its colour on the others, where it would take a wild one.
         prune: vertices whose largest weight stayed under this are dropped.
         step: distance between samples, in voxels.
         distortion: weight of mip-NeRF 360's distortion loss, against floaters.
@@ -90,6 +92,7 @@ class VoxelConfig:
     damping: float = 0.05
     largest_step: float = 0.3
     smooth: float | None = None
+    plain: float = 2e-2
     prune: float = 0.01
     step: float = 0.7
     exposure: bool | None = None
@@ -434,6 +437,7 @@ class _Run:
             rate,
             config.largest_step,
             config.damping,
+            config.plain,
             grid.terms,
         )
         loss = float(losses.to_numpy().mean()) / 3.0
