@@ -46,8 +46,8 @@ class FlowShell:
 
         d_i = |e|_p,  e_a = h_a max(|xi_a| - 1, 0);    1 / d_o = |1 / D|_p,  D_a = H_a (1 - z_a^2) / 2,
 
-    and w depends on d_o / (d_i + d_o), see `Falloff`. The flow of a Lipschitz field is one to one: it cannot
-    fold while the inner cage stays inside the outer. Valid for every pair of hexahedra with a gap between them.
+    and w depends on d_o / (d_i + d_o), see `Falloff`. The flow of a Lipschitz field is one to one: it
+    cannot fold while the inner cage stays inside the outer. Valid for all pairs of hexahedra with a gap.
 
     Integrated by the classical Runge-Kutta method with steps of equal estimated strain; `to_canonical` goes
     backwards through the same times, its Jacobian is that of the discrete scheme, and `to_deformed` is the
