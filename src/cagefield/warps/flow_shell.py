@@ -7,13 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield import hexahedron
 from cagefield.cages import Cage, are_valid
 from cagefield.hexahedron import Array, Mask
 from cagefield.warps.bends import bend, bend_slope
 from cagefield.warps.extended import Extended
 from cagefield.warps.falloff import Falloff
 from cagefield.warps.flow_motion import Motion, gaps, may_bend
+from cagefield.warps.inverting import inverted
 
 POWER = 4
 """Exponent p of the distances' norm."""
@@ -105,7 +105,10 @@ class FlowShell:
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)
         W = np.linalg.inv(F)
-        rate = 1.5 * squeeze + np.linalg.norm(dF @ W, axis=(1, 2)) + 1e-3
+        inside = (dF @ W)[:, None]
+        if not self.motion.is_affine:
+            inside = inside + F[:, None] @ self.motion.corner_rates(t) @ W[:, None]
+        rate = 1.5 * squeeze + np.linalg.norm(inside, axis=(2, 3)).max(axis=1) + 1e-3
         # A cage sheared nearly flat is felt far along its length: its faces' normals are nearly dependent.
         normals = W / np.linalg.norm(W, axis=2, keepdims=True)
         flat = np.linalg.svd(normals, compute_uv=False)[:, -1] / FLAT
@@ -118,30 +121,8 @@ class FlowShell:
 
     def to_deformed(self, points: Array) -> tuple[Array, Array]:
         """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3] in the shell."""
-        x, _ = self._march(points, self.knots)
-        # Newton's method on `to_canonical`, until it gives the points back.
-        back, J = self.to_canonical(x)
-        error = np.linalg.norm(back - points, axis=1)
-        aim = 1e-13 * np.abs(self.outer.corners).max()
-        for _ in range(8):
-            rows = np.flatnonzero(error > aim)
-            if len(rows) == 0:
-                break
-            step = hexahedron.invert(J[rows]) @ (back - points)[rows][:, :, None]
-            trial = x[rows] - step[:, :, 0]
-            new, slope = self.to_canonical(trial)
-            size = np.linalg.norm(new - points[rows], axis=1)
-            better = size < error[rows]
-            if not better.any():
-                break
-            rows = rows[better]
-            x[rows], back[rows], J[rows], error[rows] = (
-                trial[better],
-                new[better],
-                slope[better],
-                size[better],
-            )
-        return x, hexahedron.invert(J)
+        start, _ = self._march(points, self.knots)
+        return inverted(self.to_canonical, points, start, np.abs(self.outer.corners).max())
 
     def least_ratio(self) -> float:
         """Least det of d(deformed)/d(canonical) at 4096 points of the shell: a sample, not a bound."""
