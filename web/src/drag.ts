@@ -8,6 +8,9 @@ import { middle } from "./cage";
 import type { Corners, Dragged, EditState, PageMessage } from "./protocol";
 import type { Target } from "./store";
 
+/** What the server says, too, where a continuous edit is confined. */
+const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
+
 /** The cages of an edit, as they are shown. */
 export interface Cages {
   inner: Posed;
@@ -62,7 +65,7 @@ export class Drag {
     const byCage = this.confined ? containedPart(operation, this.start.deformed, this.outerCorners) : 1;
     const byServer = expectedPart(operation, this.last);
     const share = Math.min(byCage, byServer);
-    this.why = share >= 1 ? null : (this.last?.why ?? "the inner cage stops at the outer cage");
+    this.why = share >= 1 ? null : (this.last?.why ?? AT_OUTER_CAGE);
     this.shown = this.after(share < 1 ? part(operation, share) : operation);
   }
 

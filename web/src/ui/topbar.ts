@@ -46,6 +46,12 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
   });
   const link = (node: typeof Download, title: string, href: string, download: string): HTMLAnchorElement =>
     h("a", { class: "icon", title, href, download, ariaLabel: title }, icon(node));
+  const screenshot = link(Camera, "Screenshot of the field", "screenshot.png", "screenshot.png");
+  app.store.watch(["hello"], ({ hello }) => {
+    const query = new URLSearchParams(location.search);
+    if (hello !== null) query.set("page", String(hello.page));
+    screenshot.search = query.toString();
+  });
   return h(
     "header",
     { class: "top" },
@@ -65,7 +71,7 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
       iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as"),
       iconButton(FolderOpen, "Load an edit file…", () => file.click(), "load"),
       link(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
-      link(Camera, "Screenshot of the field", `screenshot.png${location.search}`, "screenshot.png"),
+      screenshot,
     ),
     h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),
     file,
