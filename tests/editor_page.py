@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -51,12 +52,10 @@ class EditorPage:
         self.settle()
 
     def settle(self) -> None:
-        """Waits for the whole picture of the state; where the field did not change there is no new one."""
+        """Waits for the whole picture of what is to be seen."""
         self.until(
             "cagefield.settled"
             " && cagefield.picture.full_width === document.querySelector('.view').clientWidth"
-            " && (cagefield.picture.revision === cagefield.now.state.revision"
-            " ? cagefield.quiet > 60 : cagefield.quiet > 700)"
         )
 
     @property
@@ -81,6 +80,39 @@ class EditorPage:
         )
         self.settle()
         return self.state
+
+    def load(self, file: Path) -> dict[str, Any]:
+        """The state after an edit file was loaded."""
+        return self.changed(lambda: self.page.set_input_files("input[type=file]", file))
+
+    def loaded(self, file: Path) -> EditorPage:
+        """The page with the edits of a file, the last one selected, in Edit mode."""
+        self.load(file)
+        self.tools(mode="edit", tool="translate", axes="world")
+        return self
+
+    def fill(self, label: str, value: float, axis: str = "x") -> dict[str, Any]:
+        """The state after a number was typed into a field of the panel."""
+
+        def type_in() -> None:
+            field = (
+                self.page.locator(".pane .tp-lblv", has_text=label).locator("input").nth("xyz".index(axis))
+            )
+            field.fill(str(value))
+            field.press("Enter")
+
+        return self.changed(type_in)
+
+    def said(self, words: str) -> str:
+        """The line that the page shows, once it has these words."""
+        self.until(f"document.querySelector('.status .message').textContent.includes({words!r})")
+        return cast(str, self.page.inner_text(".status .message"))
+
+    def tab(self, link: str) -> EditorPage:
+        """One more page of the same browser."""
+        page = self.page.context.new_page()
+        page.goto(link)
+        return EditorPage(page)
 
     def press(self, *keys: str) -> None:
         for key in keys:
@@ -152,6 +184,7 @@ def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[Edit
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         page = browser.new_page(viewport={"width": width, "height": height})
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("dialog", lambda dialog: dialog.accept())
         page.goto(link)
