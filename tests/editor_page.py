@@ -64,6 +64,11 @@ class EditorPage:
         return cast(dict[str, Any], self.page.evaluate("cagefield.now.state"))
 
     @property
+    def edits(self) -> list[dict[str, Any]]:
+        """The edits, without the errors of their lattices, which are measured later."""
+        return [{**edit, "lattice_error": None} for edit in self.state["edits"]]
+
+    @property
     def edit(self) -> dict[str, Any]:
         """The selected edit."""
         state = self.state

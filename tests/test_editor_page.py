@@ -164,12 +164,12 @@ def test_a_drag_stops_at_the_outer_cage_and_says_why(editor: EditorPage) -> None
 
 
 def test_escape_gives_a_drag_up(editor: EditorPage) -> None:
-    before, state = editor.pixels(), editor.state
+    before, edits, history = editor.pixels(), editor.edits, editor.state["history"]
     with editor.held(editor.grip("Z"), (0, -30)):
         editor.until("cagefield.picture.drag > 0")
         editor.press("Escape")
     editor.settle()
-    assert editor.state["edits"] == state["edits"] and editor.state["history"] == state["history"]
+    assert editor.edits == edits and editor.state["history"] == history
     assert cone(editor.pixels()).at == pytest.approx(cone(before).at, abs=1.0)
 
 
@@ -201,20 +201,23 @@ def test_discrete_and_continuous_copy_and_delete(editor: EditorPage) -> None:
 
 
 def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
-    first, before = editor.state, editor.pixels()
+    first, clean, before = editor.state, editor.edits, editor.pixels()
     for n in range(10):
         revision = editor.state["revision"]
         with editor.held(editor.grip("Z"), (0, 6 if n % 2 else -12), steps=2):
             pass
         editor.until(f"cagefield.now.state.revision > {revision} && cagefield.drag === null")
     editor.settle()
-    last, after = editor.state, editor.pixels()
+    last, done, after = editor.state, editor.edits, editor.pixels()
     assert last["entry"] == first["entry"] + 10
-    for key, wanted, seen in (("Control+z", first, before), ("Control+Shift+Z", last, after)):
+    for key, wanted, edits, seen in (
+        ("Control+z", first, clean, before),
+        ("Control+Shift+Z", last, done, after),
+    ):
         editor.press(*[key] * 10)
         editor.until(f"cagefield.now.state.entry === {wanted['entry']}")
         editor.settle()
-        assert editor.state["edits"] == wanted["edits"]
+        assert editor.edits == edits
         assert difference(editor.pixels(), seen) < 0.1  # JPEG's
     assert cone(after).at[1] < cone(before).at[1] - 15
 
@@ -262,7 +265,7 @@ def test_lines_are_solid_before_the_field_and_dashed_behind_it(editor: EditorPag
 
 def test_saved_edits_are_found_again_after_a_reload(editor: EditorPage, scene: Path) -> None:
     editor.drag(editor.grip("Z"), (0, -30))
-    before, edits = editor.pixels(), editor.state["edits"]
+    before, edits = editor.pixels(), editor.edits
     assert editor.state["saved"] is False
     editor.changed(lambda: editor.press("Control+s"))
     assert editor.state["saved"] is True
@@ -270,7 +273,7 @@ def test_saved_edits_are_found_again_after_a_reload(editor: EditorPage, scene: P
     assert stored.name == "cone" and np.allclose(stored.deformed.corners, edits[0]["deformed"], atol=1e-6)
     editor.page.reload()
     editor.ready()
-    assert editor.state["edits"] == edits
+    assert editor.edits == edits
     assert editor.page.evaluate("cagefield.now.mode") == "edit"
     assert difference(editor.pixels(), before) < 0.15
 
