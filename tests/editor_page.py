@@ -27,7 +27,7 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
-PATIENCE = 120.0
+PATIENCE = 25.0
 """Seconds until what does not come is given up: the first pictures wait for kernels to compile."""
 
 Point = tuple[float, float]
@@ -149,8 +149,10 @@ class EditorPage:
         mouse.down()
         for n in range(1, steps + 1):
             mouse.move(start[0] + by[0] * n / steps, start[1] + by[1] * n / steps)
-        yield
-        mouse.up()
+        try:
+            yield
+        finally:
+            mouse.up()
 
     def drag(self, start: Point, by: Point) -> dict[str, Any]:
         """The selected edit after a drag."""
@@ -164,6 +166,7 @@ class EditorPage:
 
     def pixels(self, cages: bool = False) -> NDArray[np.float64]:
         """The picture on the screen [H,W,3] in [0,1]; the cages are taken off for it, unless wanted."""
+        self.page.bring_to_front()
         if not cages:
             self.press("o")
         self.page.mouse.move(2, 2)
@@ -188,8 +191,10 @@ def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[Edit
     complaints: list[str] = []
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": width, "height": height})
-        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, permissions=["clipboard-read", "clipboard-write"]
+        )
+        page = context.new_page()
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("dialog", lambda dialog: dialog.accept())
         page.goto(link)

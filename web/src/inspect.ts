@@ -57,7 +57,7 @@ export function inspector(app: App): Inspector {
     get settled() {
       const picture = app.lastPicture;
       const { state, view, before, split } = app.store.now;
-      if (app.drag !== null || picture === null || state === null) return false;
+      if (app.drag !== null || picture === null || state === null || !app.camera.resting) return false;
       const seen = picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
       return picture.final && seen && picture.view === view && picture.before === before && picture.split === split;
     },

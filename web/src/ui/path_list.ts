@@ -81,13 +81,13 @@ function player(app: App): { toggle: () => void; changed: (on: boolean) => void 
     const { state } = app.store.now;
     if (started === null || state === null) return;
     const seconds = (performance.now() - started) / 1000;
-    if (state.keys.length < 2 || (seconds > duration(state.keys, state.loop) && !state.loop)) {
-      self.toggle();
-      return;
+    const whole = duration(state.keys, state.loop);
+    if (whole > 0) {
+      const view = viewAt(state.keys, state.loop, state.loop ? seconds % whole : seconds);
+      look(app, view.c2w, view.fov_y_deg);
     }
-    const view = viewAt(state.keys, state.loop, seconds % Math.max(duration(state.keys, state.loop), 1e-3));
-    look(app, view.c2w, view.fov_y_deg);
-    requestAnimationFrame(step);
+    if (whole > 0 && (state.loop || seconds < whole)) requestAnimationFrame(step);
+    else self.toggle();
   }
   return self;
 }
