@@ -27,7 +27,7 @@ FLAGS = [
     "--disable-sync",
     "--no-first-run",
 ]
-PATIENCE = 25.0
+PATIENCE = 120.0
 """Seconds until what does not come is given up: the first pictures wait for kernels to compile."""
 
 Point = tuple[float, float]

@@ -239,7 +239,7 @@ def test_files_that_are_no_edit_files_are_told_in_a_line(editor: EditorPage, fol
         file.write_text(content)
         editor.page.set_input_files("input[type=file]", file)
         editor.said(words)
-        assert editor.page.locator(".toast.error", has_text=words).count() == 1
+        assert editor.page.locator(".toast.error", has_text=words).count() >= 1
     assert editor.edits == edits
 
 
