@@ -37,6 +37,8 @@ export class Drag {
   readonly start: Cages;
   shown: Cages;
   operation: Operation | null = null;
+  /** As much of the operation as the cages follow. */
+  followed: Operation | null = null;
   seq = 0;
   /** Why the drag stopped, or null while all of it is followed. */
   why: string | null = null;
@@ -66,7 +68,7 @@ export class Drag {
     const byServer = expectedPart(operation, this.last);
     const share = Math.min(byCage, byServer);
     this.why = share >= 1 ? null : (this.last?.why ?? AT_OUTER_CAGE);
-    this.shown = this.after(share < 1 ? part(operation, share) : operation);
+    this.follow(operation, share);
   }
 
   /** Takes the server's answer over. */
@@ -77,7 +79,8 @@ export class Drag {
     this.last = { operation, part: message.part, why: message.why };
     if (message.seq !== this.seq) return;
     this.why = message.why;
-    const pivots = this.after(message.part < 1 ? part(operation, message.part) : operation);
+    this.follow(operation, message.part);
+    const pivots = this.shown;
     this.shown = {
       inner: { corners: message.inner, pivot: pivots.inner.pivot },
       deformed: { corners: message.deformed, pivot: pivots.deformed.pivot },
@@ -99,6 +102,11 @@ export class Drag {
     this.ended = true;
     this.shown = this.start;
     this.send({ type: "drag_cancel", drag: this.id });
+  }
+
+  private follow(operation: Operation, share: number): void {
+    this.followed = share < 1 ? part(operation, share) : operation;
+    this.shown = this.after(this.followed);
   }
 
   private get confined(): boolean {
