@@ -338,9 +338,11 @@ def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None, s
         sums = march(field.torch, rays, mapped)[1]
         points = (rays.origins[:, None] + sums.t[..., None] * rays.directions[:, None]).reshape(-1, 3)
         along = rays.directions[:, None].expand(*sums.t.shape, 3).reshape(-1, 3)
-        offsets = step * torch.eye(3)
+        # float32 does not tell apart points 1e-3 from each other where NDC rays are a thousand away
+        size = step * points.norm(dim=1, keepdim=True).clamp_min(1.0)
+        offsets = [size * axis for axis in torch.eye(3)]
         slopes = torch.stack([sigma(points + o, along) - sigma(points - o, along) for o in offsets], dim=1)
-        own = torch.nn.functional.normalize(slopes, dim=1).reshape(*sums.t.shape, 3)
+        own = torch.nn.functional.normalize(slopes, dim=1, eps=1e-30).reshape(*sums.t.shape, 3)
         total = -(own * sums.weights[..., None] * (sums.weights[..., None] > 1e-4)).sum(1)
     return torch.nn.functional.normalize(total, dim=1).numpy()
 

@@ -145,7 +145,8 @@ def _normals(field: TorchNerf, rays: Rays, sums: Sums, mapped: TensorMap | None)
     else:
         canonical, along, _ = mapped(points, viewdirs)
         slopes = (mapped.jacobian(points) * field.density_gradient(canonical, along)[:, :, None]).sum(dim=1)
-    own = -torch.nn.functional.normalize(slopes, dim=1) * sums.weights[seen][:, None]
+    # slopes far away in NDC are tiny
+    own = -torch.nn.functional.normalize(slopes, dim=1, eps=1e-30) * sums.weights[seen][:, None]
     total = torch.zeros_like(rays.origins).index_add_(0, rows, own)
     return torch.nn.functional.normalize(total, dim=1)
 
