@@ -26,8 +26,8 @@ class Field(Protocol):
     that works in coordinates of its own, u = c x, must return c times its density.
 
     `render_sampled(field, camera, edits=...)` renders any field, and `fields.baking.bake(field)` makes the
-    voxels for the fast renderer and the editor. A plain function works too, where `far` (or, to bake, `bounds`) is
-    given.
+    voxels for the fast renderer and the editor. A plain function works too, where `far` (or, to bake,
+    `bounds`) is given.
 
     A field may also have, for baking: `signed_density(positions, viewdirs)` [N], negative where it is empty,
     which keeps surfaces sharper than sigma does; and `seen_along(positions [N,3], viewdirs [N,K,3])`, the
