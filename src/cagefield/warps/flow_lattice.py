@@ -31,6 +31,12 @@ START_STEPS = 8
 LOST = 1e30
 """Written to nodes whose coordinates were not followed."""
 
+AT_REST = 1.0 - 1e-4
+"""Nodes that end farther out than this, in coordinates of the outer cage, stay where they are.
+
+`flow_lanes.NEAR` would let those on the outer cage's faces drift by about 2e-5.
+"""
+
 FOLLOWED = 0.05
 """Largest residual of the inner cage's coordinates, in units of xi, after the first of two steps."""
 
@@ -188,7 +194,7 @@ def _march(
                 y = zy[lane]
                 z = zz[lane]
                 moved = vec3(0.0, 0.0, 0.0)
-                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) < 1.0:
+                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) < AT_REST:
                     Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
                     if qd.static(bent_outer):
                         tx, ty, tz = bend(x, y, z, table, 10)
