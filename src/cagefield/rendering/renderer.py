@@ -103,10 +103,12 @@ class Renderer:
         near: float = 0.0,
         region: tuple[int, int, int, int] | None = None,
         should_stop: Callable[[], bool] | None = None,
+        step: float | None = None,
     ) -> Frame | None:
         """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
 
-        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered.
+        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
+        takes the place of the renderer's own.
         """
         from cagefield.rendering import march
         from cagefield.rendering.grid import ivec3, vec3
@@ -119,10 +121,10 @@ class Renderer:
         n = np.array(field.resolution)
         if field.contracted:
             lower, scale = field.center, 1.0 / field.half_size
-            step = self.step
+            length = step or self.step
         else:
             lower, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-            step = self.step / float(scale.max())
+            length = (step or self.step) / float(scale.max())
         rows = down if should_stop is None else BAND
         for row in range(0, down, rows):
             if should_stop is not None and should_stop():
@@ -146,7 +148,7 @@ class Renderer:
                 ivec3(*field.resolution),
                 vec3(*lower.tolist()),
                 vec3(*scale.tolist()),
-                step,
+                length,
                 near,
                 int(normals),
                 self._boxes,

@@ -21,6 +21,9 @@ from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
+LONGEST_STEP = 1.5
+"""Most voxels between samples while something moves; no more than a pixel shows, either."""
+
 MOVING_QUALITY, REST_QUALITY = 85, 95
 """JPEG qualities."""
 
@@ -163,7 +166,14 @@ class Studio:
             normals=task.look.view == "normals",
             region=(region.x, region.y, region.width, region.height),
             should_stop=None if task.moving else stop,
+            step=self._step(task.camera, renderer.step) if task.moving else None,
         )
+
+    def _step(self, camera: Camera, least: float) -> float:
+        """Voxels between the samples of a moving picture: what a pixel shows in the middle of the field."""
+        distance = float(np.linalg.norm(camera.origin - self._middle))
+        shown = distance / camera.fx / float(max(self.scene.field.voxel_size))
+        return min(max(shown, least), LONGEST_STEP)
 
     def _quickly(self, edit: Edit) -> Edit:
         """The edit with a coarser lattice, kept as long as the edit is."""
