@@ -52,9 +52,9 @@ def encode(blocks: NDArray[np.bool_], leap: int = MAX_LEAP) -> NDArray[np.int32]
     """Brick codes [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz], D at most `leap`."""
     # Pairs along z, y, x become 2, 4, 8 bits of a byte.
     pairs = np.ascontiguousarray(blocks).view("<u2")
-    mask = ((pairs & 1) | (pairs >> 7)).astype(np.uint8)
-    mask = mask[:, 0::2] | mask[:, 1::2] << 2
-    mask = mask[0::2] | mask[1::2] << 4
+    rows = ((pairs & 1) | (pairs >> 7)).astype(np.uint8)
+    faces = rows[:, 0::2] + np.uint8(4) * rows[:, 1::2]
+    mask = faces[0::2] + np.uint8(16) * faces[1::2]
     empty = mask == 0
     if empty.all():
         return np.full(mask.shape, 256 * leap, np.int32)
