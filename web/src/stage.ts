@@ -16,8 +16,21 @@ function isSoftware(): boolean {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
+/** A renderer whose canvas lets nothing through: the browser then need not blend it with what is behind. */
+function opaqueRenderer(): WebGLRenderer {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("webgl2", {
+    alpha: false,
+    depth: true,
+    stencil: false,
+    antialias: !isSoftware(),
+    powerPreference: "high-performance",
+  });
+  return new WebGLRenderer({ canvas, context: context ?? undefined });
+}
+
 export class Stage {
-  readonly renderer = new WebGLRenderer({ antialias: !isSoftware(), powerPreference: "high-performance" });
+  readonly renderer = opaqueRenderer();
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;

@@ -86,7 +86,7 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
     except CagefieldError as error:
         why = _short(str(error))
     else:
-        found = problem(whole)
+        found = whole.reason()
         if found is None or problem(edit) is not None:
             return Moved(whole, problem=found)
         why = found
