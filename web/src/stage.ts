@@ -17,20 +17,22 @@ function isSoftware(): boolean {
 }
 
 /** A renderer whose canvas lets nothing through: the browser then need not blend it with what is behind. */
-function opaqueRenderer(): WebGLRenderer {
+function opaqueRenderer(antialias: boolean): WebGLRenderer {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("webgl2", {
     alpha: false,
     depth: true,
     stencil: false,
-    antialias: !isSoftware(),
+    antialias,
     powerPreference: "high-performance",
   });
   return new WebGLRenderer({ canvas, context: context ?? undefined });
 }
 
 export class Stage {
-  readonly renderer = opaqueRenderer();
+  /** Whether the processor draws the page. */
+  readonly software = isSoftware();
+  readonly renderer = opaqueRenderer(!this.software);
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;

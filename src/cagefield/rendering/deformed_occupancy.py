@@ -61,7 +61,7 @@ def deform(
     jumps: bool,
     known: Known | None = None,
     coarse: bool = False,
-    proceed: Proceed = nothing,
+    proceed: Proceed | None = None,
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
@@ -69,7 +69,7 @@ def deform(
     holds what the fine one holds and more, for a tenth of the time. `proceed` is called between the passes,
     and may raise.
     """
-    field = grid.field
+    field, proceed = grid.field, proceed or nothing
     if stack.n_edits == 0:
         return canonical
     boxes = [_grid_box(field, box) for box in stack.boxes.astype(np.float64)]

@@ -64,21 +64,32 @@ class Renderer:
         self._pack_edits()
 
     def with_edits(
-        self, edits: EditStack, *, preserve_opacity: bool | None = None, coarse: bool = False
+        self,
+        edits: EditStack,
+        *,
+        preserve_opacity: bool | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
     ) -> Renderer:
         """A renderer of the same field under other edits; what they share with these is kept.
 
         `coarse` looks at the edited space by bricks instead of cells: ready sooner, the same picture, slower.
+        `proceed` is called now and then, and gives the renderer up by raising.
         """
         other = object.__new__(Renderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
-        other._pack_edits(self, coarse)
+        other._pack_edits(self, coarse, proceed)
         return other
 
-    def _pack_edits(self, before: Renderer | None = None, coarse: bool = False) -> None:
+    def _pack_edits(
+        self,
+        before: Renderer | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
+    ) -> None:
         from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import for_kernels
         from cagefield.warps.device import DeviceStack, widened
@@ -89,7 +100,7 @@ class Renderer:
         if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
             known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
         self._coarse = coarse
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse)
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed)
         self._codes = for_kernels(self._occupancy.codes)
         self._stack = stack
         self._boxes = for_kernels(stack.boxes.astype(np.float32))
