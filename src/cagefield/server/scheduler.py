@@ -20,16 +20,16 @@ from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixel
 MOST_UNSHOWN = 2
 """Pictures sent and not yet shown, at most, per page."""
 
-MOVING_SECONDS = 0.055
+MOVING_SECONDS = 0.045
 """Time that a picture may take while something moves."""
 
-TILE_SECONDS = 0.12
-"""Time that a tile may take at rest."""
+TILE_SECONDS = 0.25
+"""Time that a tile may take at rest; each costs the page a frame. Abandoned ones end sooner."""
 
 SETTLE_SECONDS = 0.12
 """How long nothing may have changed before the view counts as at rest."""
 
-MOST_TILES = 16
+MOST_TILES = 9
 """Tiles of a view, at most."""
 
 LEAST_SIDE = 96
@@ -153,16 +153,16 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends with what is shown already, the whole picture comes at once.
+        Where a drag ends the picture at full resolution comes at once.
         """
         if revision == self._revision and dragging == self._dragging:
             return
-        let_go = revision == self._revision and not dragging
+        let_go = self._dragging and not dragging
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
             was_shown = p.shown_version == p.version
             self._changed(page, now)
-            if let_go and was_shown:
+            if let_go and (was_shown or p.showing.exact):
                 p.shown_version, p.changed = p.version, -math.inf
 
     def presented(self, page: int, picture: int) -> None:
