@@ -107,15 +107,15 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int
 
 
 def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.rendering import deformed_occupancy
+    from cagefield.rendering import smooth_occupancy
     from cagefield.warps import flow_lattice
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
         start = Renderer(field(), stack)
         counts = [
             counted(monkeypatch, flow_lattice, "sample"),
-            counted(monkeypatch, deformed_occupancy, "_corners"),
-            counted(monkeypatch, deformed_occupancy, "_refined"),
+            counted(monkeypatch, smooth_occupancy, "_images"),
+            counted(monkeypatch, smooth_occupancy, "_refined"),
         ]
         # Another edit each time: an equal one would find its lattice there.
         start.with_edits(stack.set(number, stack[number].translate((0.01 * len(stack), 0, 0))))
@@ -124,8 +124,9 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
     alone, chain = work(EditStack([small(4)]), 0), work(APART, 4)
     assert chain[0] == alone[0] == [3 * 8**3]
-    # Occupancy: as many corners probed; how many blocks pass depends on the little that differs.
-    assert chain[1] == alone[1] and len(chain[1]) == 1
+    # Occupancy: as many points mapped, first for bricks, then for blocks; how many of those pass depends on
+    # the little that differs.
+    assert chain[1] == alone[1] and len(chain[1]) == 2
     assert sum(chain[2]) == pytest.approx(sum(alone[2]), rel=0.1)
 
 
