@@ -37,6 +37,7 @@ from cagefield.rendering.grid import (
     uncontract_point,
     vec3,
 )
+from cagefield.rendering.links import Link
 from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
 from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
@@ -62,11 +63,13 @@ def deform(
     known: Known | None = None,
     coarse: bool = False,
     proceed: Proceed | None = None,
+    link: Link | None = None,
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
     Only what `known` does not know is looked at. `coarse` takes the first pass alone, for whole bricks: it
-    holds what the fine one holds and more, for a tenth of the time. `proceed` is called between the passes,
+    holds what the fine one holds and more, for a tenth of the time; with a `link`, the stack has the edit of
+    the link in place of another one, and nothing else is looked at. `proceed` is called between the passes,
     and may raise.
     """
     field, proceed = grid.field, proceed or nothing
@@ -98,11 +101,14 @@ def deform(
     if jumps:
         near = _jumping(canonical, grid, stack, begin, bricks, new[region], coarse, proceed)
     else:
-        near = smooth.near_bricks(canonical, grid, stack, begin, bricks)
+        if link is not None and coarse:
+            near = link.near_bricks(grid, begin, bricks)
+        else:
+            near = smooth.near_bricks(canonical, grid, stack, begin, bricks)
         if coarse:
             near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
         else:
-            near = smooth.occupied_blocks(canonical, grid, stack, begin, near, proceed)
+            near = smooth.occupied_blocks(canonical, grid, stack, begin, near, new[region], proceed)
     np.copyto(blocks[region], near, where=new[region])
     return Occupancy.from_blocks(first, blocks, leap)
 

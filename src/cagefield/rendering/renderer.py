@@ -17,6 +17,7 @@ from cagefield.rendering.frame import Background, Frame
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
+    from cagefield.rendering.links import Chain
     from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
@@ -61,6 +62,7 @@ class Renderer:
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
         self._coarse = False
+        self._chain: Chain | None = None
         self._pack_edits()
 
     def with_edits(
@@ -92,6 +94,7 @@ class Renderer:
     ) -> None:
         from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import for_kernels
+        from cagefield.rendering.links import Chain, replaced
         from cagefield.warps.device import DeviceStack, widened
 
         stack = DeviceStack.from_stack(self.edits)
@@ -99,8 +102,15 @@ class Renderer:
         known = None
         if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
             known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
+        link = None
+        if before is not None and coarse and not jumps:
+            place = replaced(before.edits, self.edits)
+            if place is not None:
+                if self._chain is None or not self._chain.fits(self.edits, place):
+                    self._chain = Chain.of(self.edits, place, self._canonical, self._grid)
+                link = self._chain.link(self.edits.active[place])
         self._coarse = coarse
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed)
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed, link)
         self._codes = for_kernels(self._occupancy.codes)
         self._stack = stack
         self._boxes = for_kernels(stack.boxes.astype(np.float32))

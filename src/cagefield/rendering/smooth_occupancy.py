@@ -48,12 +48,23 @@ def near_bricks(
     grid: DeviceGrid,
     stack: DeviceStack,
     lower: NDArray[np.int64],
-    count: tuple[int, ...],
+    count: NDArray[np.int64],
+    starts: NDArray[np.float32] | None = None,
 ) -> Mask:
-    """The bricks [count] with an occupied corner, the first one's at grid coordinates `lower`."""
+    """The bricks [count] with an occupied corner, the first one's at grid coordinates `lower`.
+
+    `starts`, where given, are where the corners are mapped from; see `brick_corners`.
+    """
     points = tuple((count + 1).tolist())
-    images = _images(grid, stack, lower, np.ones(points, bool), BRICK)
+    images = _images(grid, stack, lower, np.ones(points, bool), BRICK, starts)
     return _cubes(_occupied(images, canonical, points))
+
+
+def brick_corners(
+    grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Images [N,3], grid coordinates, of the corners of bricks [count] under a stack."""
+    return _images(grid, stack, lower, np.ones(tuple((count + 1).tolist()), bool), BRICK)
 
 
 def occupied_blocks(
@@ -62,9 +73,10 @@ def occupied_blocks(
     stack: DeviceStack,
     lower: NDArray[np.int64],
     bricks: Mask,
+    new: Mask,
     proceed: Proceed,
 ) -> Mask:
-    """The occupied blocks [2bx,2by,2bz] of the bricks that `near_bricks` found.
+    """Which of the `new` blocks [2bx,2by,2bz] are occupied, of the bricks that `near_bricks` found.
 
     `proceed` is called between the passes, and may raise.
     """
@@ -77,7 +89,7 @@ def occupied_blocks(
     proceed()
     images = _images(grid, stack, lower, wanted, 2)
     proceed()
-    near &= _cubes(_occupied(images, canonical, points))
+    near &= new & _cubes(_occupied(images, canonical, points))
     candidates = np.argwhere(near).astype(np.int32)
     if len(candidates):
         proceed()
@@ -86,12 +98,22 @@ def occupied_blocks(
 
 
 def _images(
-    grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], wanted: Mask, spacing: int
+    grid: DeviceGrid,
+    stack: DeviceStack,
+    lower: NDArray[np.int64],
+    wanted: Mask,
+    spacing: int,
+    starts: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Images [N,3], grid coordinates, of the wanted lattice points, `spacing` cells apart; others UNKNOWN."""
+    """Images [N,3], grid coordinates, of the wanted lattice points, `spacing` cells apart; others UNKNOWN.
+
+    `starts` [N,3], grid coordinates, take the points' place where they are given.
+    """
     images = np.empty((wanted.size, 3), np.float32)
     _map_points(
         images,
+        np.zeros((1, 3), np.float32) if starts is None else starts,
+        int(starts is not None),
         np.ascontiguousarray(wanted, np.uint8).reshape(-1),
         ivec3(*lower.tolist()),
         ivec3(*wanted.shape),
@@ -148,6 +170,8 @@ def _refined(
 @qd.kernel
 def _map_points(
     images: Nodes,
+    starts: Nodes,
+    started: qd.i32,
     wanted: U8,
     lower: ivec3,
     count: ivec3,
@@ -166,6 +190,8 @@ def _map_points(
         if wanted[n] > 0:
             at = lower + spacing * ivec3(n // (count.y * count.z), (n // count.z) % count.y, n % count.z)
             g = qd.cast(at, qd.f32)
+            if started == 1:
+                g = starts[n]
             p = g / scale + origin
             if contracted == 1:
                 p = uncontract_point(g / half - 2.0) / scale + origin
