@@ -1,6 +1,9 @@
 """Prints least det J and largest stretch of the flow shell for several weights, over a fixed set of edits.
 
 python benchmarks/flow_profiles.py
+
+The edits are the nine continuous ones of `cagefield bench edits`, then fourteen of a box; the trilinear shell
+is there to compare with.
 """
 
 from __future__ import annotations
@@ -9,16 +12,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cagefield.benchmarking.cases import CASES
+from cagefield.benchmarking.compare import continuous
+from cagefield.benchmarking.distortion import between
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.hexahedron import Array
-from cagefield.warps import Falloff, FlowShell, flow_shell
+from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_shell
+from cagefield.warps.extended import Extended
 
 BOX, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 ASIDE = Cage.box((0.25, -0.1, 0.1), 0.6, (0.2, 0.1, 0.3))
 BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.15, 0.15, -0.1))
 BENT_OUTER = OUTER.move_corner(3, (0.3, 0.2, -0.1)).move_corner(4, (-0.2, 0.1, -0.3))
 EDITS = {
+    **{f"{c.scene} {c.name}": continuous(c) for c in CASES if c.kind == "continuous"},
     "turn 30": Edit(BOX, OUTER).rotate((0, 0, np.pi / 6)),
     "turn 90": Edit(BOX, OUTER).rotate((0, 0, np.pi / 2)),
     "turn 180": Edit(BOX, OUTER).rotate((0, 0, np.pi)),
@@ -38,51 +46,90 @@ EDITS = {
 }
 
 
+SMOOTH = Falloff()
+
+
 @dataclass(frozen=True)
 class Rational(Falloff):
     """w = r^2 / (r^2 + (1 - r)^2) = 1 / (1 + q^2): no root where p is 2."""
 
-    def weight(self, q: Array) -> tuple[Array, Array]:
+    def weight(self, q: Array, coefficients: tuple[float, float]) -> tuple[Array, Array]:
         """(w, dw/dq)."""
         w = 1.0 / (1.0 + q * q)
         return w, -2.0 * q * w * w
 
 
-WEIGHTS: dict[str, tuple[int, Falloff]] = {
-    "p=2 smooth": (2, Falloff()),
-    "p=4 smooth": (4, Falloff()),
-    "p=8 smooth": (8, Falloff()),
-    "p=2 linear": (2, Falloff("linear")),
-    "p=8 linear": (8, Falloff("linear")),
-    "p=2 rational": (2, Rational()),
+@dataclass(frozen=True)
+class Weight:
+    """A weight: the norm's p, the falloff, and its coefficients where the shell does not choose them."""
+
+    power: int = 4
+    falloff: Falloff = SMOOTH
+    coefficients: tuple[float, float] | None = None
+
+
+def blended(linear: float) -> Weight:
+    """g^2 (3 - 2 g) and the linear profile, mixed."""
+    return Weight(coefficients=(linear, 1.0 - linear))
+
+
+def ending(slope: float) -> Weight:
+    """The smooth profile with the same slope at the outer cage for all edits."""
+    return Weight(coefficients=(slope, 1.0 - slope * 17.0 / 18.0))
+
+
+WEIGHTS: dict[str, Weight] = {
+    "smooth": Weight(),
+    "p=2": Weight(2),
+    "p=8": Weight(8),
+    "a=0": ending(0.0),
+    "a=0.5": ending(0.5),
+    "a=0.95": ending(0.95),
+    "half linear": blended(0.5),
+    "linear": Weight(falloff=Falloff("linear")),
+    "p=2 rational": Weight(2, Rational()),
 }
 
 
-def measure(edit: Edit, falloff: Falloff) -> tuple[float, float]:
-    """(least det J, largest stretch either way) of `to_deformed` at 1500 points of the shell."""
+def measure(edit: Edit, weight: Weight | None) -> tuple[float, float]:
+    """(least det J, largest stretch either way) of `to_deformed` at about 2000 points of the shell.
+
+    Half of them are near the inner cage. Without a weight, of the trilinear shell.
+    """
     assert edit.outer is not None
-    shell = FlowShell(edit.inner, edit.deformed, edit.outer, falloff, strain=0.25)
-    origin, frame = edit.outer.frame
-    p = origin + np.random.default_rng(0).random((1500, 3)) @ frame.T
-    p = p[edit.outer.contains(p)]
-    J = shell.to_canonical(p[~edit.deformed.contains(p)])[1]
+    shell: FlowShell | TrilinearShell
+    if weight is None:
+        shell = TrilinearShell(edit.inner, edit.deformed, edit.outer)
+    else:
+        flow_shell.POWER = weight.power
+        shell = FlowShell(edit.inner, edit.deformed, edit.outer, weight.falloff, strain=0.25)
+        if weight.coefficients is not None:
+            shell.__dict__["coefficients"] = weight.coefficients
+    near = np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 3))
+    near *= np.linspace(1.0, 1.2, len(near))[:, None] / np.abs(near).max(axis=1, keepdims=True)
+    p = Extended.of(edit.deformed).points(near)
+    p = p[edit.outer.contains(p) & ~edit.deformed.contains(p)]
+    J = shell.to_canonical(np.concatenate([p, between(edit.deformed, edit.outer, 1000)]))[1]
+    det = np.linalg.det(J)
     s = np.linalg.svd(J, compute_uv=False)
-    return float(1.0 / np.linalg.det(J).max()), float(np.maximum(s[:, 0], 1.0 / s[:, 2]).max())
+    if (det <= 0.0).any():
+        return 0.0, np.inf
+    return float(1.0 / det.max()), float(np.maximum(s[:, 0], 1.0 / s[:, 2]).max())
 
 
 def main() -> None:
     """Print a row per edit and a column per weight."""
-    print(f"{'least det J, largest stretch':30s}" + "".join(f"{name:>16s}" for name in WEIGHTS))
+    names = ["trilinear", *WEIGHTS]
+    print(f"{'least det J, largest stretch':24s}" + "".join(f"{name:>15s}" for name in names))
     logs = []
     for name, edit in EDITS.items():
-        row = []
-        for power, falloff in WEIGHTS.values():
-            flow_shell.POWER = power
-            row.append(measure(edit, falloff))
+        row = [measure(edit, weight) for weight in (None, *WEIGHTS.values())]
         logs.append(np.log(np.maximum(row, 1e-6)))
-        print(f"{name:30s}" + "".join(f"{least:8.3f}{most:8.2f}" for least, most in row), flush=True)
-    means = np.exp(np.mean(logs, axis=0))
-    print(f"{'geometric mean':30s}" + "".join(f"{least:8.3f}{most:8.2f}" for least, most in means))
+        print(f"{name:24s}" + "".join(f"{least:8.3f}{most:7.1f}" for least, most in row), flush=True)
+    built_in = sum(case.kind == "continuous" for case in CASES)
+    for what, part in (("geometric mean", logs), ("of the first nine", logs[:built_in])):
+        means = np.exp(np.mean(part, axis=0))
+        print(f"{what:24s}" + "".join(f"{least:8.3f}{most:7.2f}" for least, most in means))
 
 
 if __name__ == "__main__":

@@ -175,7 +175,12 @@ def test_map_against_another_integrator() -> None:
         d_i = np.linalg.norm(np.maximum(np.abs(y) - half, 0.0), 4)
         d_o = 1.0 / np.linalg.norm(2.0 * big / (big**2 - x * x), 4)
         r = d_o / (d_i + d_o)
-        return a * r * r * (3 - 2 * r) * np.array([-x[1], x[0], 0.0])
+        w = end * r + (1 - end * 17 / 18) * r * r * (3 - 2 * r) - end / 18 * max(2 * r - 1, 0) ** 9
+        return a * w * np.array([-x[1], x[0], 0.0])
+
+    # The corners of the turned square come nearer to the faces.
+    gap, before = big - half * (np.cos(a) + np.sin(a)), big - half
+    end = 0.95 - 0.45 * (gap / before) ** (1 / 0.8)
 
     shell = shell_of(Edit(INNER, OUTER).rotate((0, 0, a)), strain=0.01)
     p = shell_points(shell, 12)
@@ -250,6 +255,36 @@ def test_translation_and_scale_keep_less_than_a_folding_share() -> None:
     # Figures of benchmarks/flow_profiles.py: a change of the weight that squeezes more shows here.
     for name, least in (("turn of 90", 0.27), ("turn of 180", 0.12), ("scale 2.4", 0.08), ("shear", 0.4)):
         assert shell_of(EDITS[name]).least_ratio() > least
+
+
+def test_weights_fade_from_one_to_nothing() -> None:
+    g = np.linspace(0.0, 1.0, 201)[1:]
+    q = 1.0 / g - 1.0
+    h = 1e-6
+    for profile in ("smooth", "linear"):
+        for change in (0.0, 0.7, 5.0):
+            falloff = Falloff(profile)
+            ab = falloff.coefficients(change)
+            w, slope = falloff.weight(q, ab)
+            assert w[-1] == pytest.approx(1.0, abs=1e-15) and (np.diff(w) > 0.0).all()
+            # Central differences, of a slope that jumps at the inner cage where the profile is linear.
+            below, above = (falloff.weight(q[:-1] + s * h * q[:-1], ab)[0] for s in (-1.0, 1.0))
+            np.testing.assert_allclose((above - below) / (2 * h * q[:-1]), slope[:-1], rtol=1e-6, atol=1e-8)
+            assert falloff.weight(np.array([1e9]), ab)[0] == pytest.approx(1e-9 * ab[0], rel=1e-6)
+            assert slope[-1] == pytest.approx(0.0 if profile == "smooth" else -1.0, abs=1e-12)
+
+
+def test_the_more_a_gap_changes_the_nearer_to_linear_is_the_weight() -> None:
+    turn = EDITS["turn of 180"]
+    assert shell_of(turn).coefficients[0] == pytest.approx(0.5, abs=1e-12)
+    assert shell_of(turn.replace(falloff="linear")).coefficients == (1.0, 0.0)
+    # A tenth of the gap is left: 0.95 - 0.45 e^(-log 10 / 0.8).
+    push = shell_of(EDITS["translation by 90% of the gap"])
+    assert push.coefficients[0] == pytest.approx(0.95 - 0.45 * 10.0 ** (-1.0 / 0.8), rel=1e-9)
+    # In the middle of the face ahead, the shell is squeezed evenly by 10 at best; by g^2 (3 - 2 g), 27 times.
+    z = np.linspace(0.751, 0.799, 40)
+    J = push.to_canonical(np.stack([z, 0.0 * z, 0.0 * z], axis=1))[1]
+    assert 9.0 < J[:, 0, 0].max() < 13.5
 
 
 def test_width_one_moves_all_of_the_shell_and_less_moves_less() -> None:

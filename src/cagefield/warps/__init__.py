@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from cagefield.warps.flow_shell import FALLOFFS, Falloff, FlowShell
+from cagefield.warps.falloff import FALLOFFS, Falloff
+from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.maps import Mapped, Shell, Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 

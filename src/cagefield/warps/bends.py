@@ -54,9 +54,14 @@ def bend_slope(K: Array, xi: Array) -> Array:
     return np.stack([*along, x * K[1] + y * K[2] + x * y * K[3]], axis=2)
 
 
+def corner_slopes(K: Array) -> Array:
+    """dB/dxi [B,8,3,3] of bends K [B,4,3] at the cube's corners, the last axis xi."""
+    return np.asarray(np.einsum("bki,nkj->bnij", K, _CORNER_SLOPES))
+
+
 def forms(K: Array) -> Array:
     """The bends K [B,4,3] and, below them, their tilts [B,6,3]: of the faces -x, +x, -y, +y, -z, +z."""
-    M = np.eye(3) + np.einsum("bki,nkj->bnij", K, _CORNER_SLOPES)
+    M = np.eye(3) + corner_slopes(K)
     normals = np.stack([_cross(M[..., a - 2], M[..., a - 1]) for a in range(3)], axis=2)
     normals /= np.maximum(np.linalg.norm(normals, axis=3, keepdims=True), 1e-300)
     n = normals[:, _FACE_CORNERS, _FACE_AXES[:, None]].reshape(-1, 4, 3)
@@ -118,7 +123,7 @@ def bends_one_to_one(K: Array) -> Mask:
 def _are_one_to_one(form: Array) -> Mask:
     """What `bends_one_to_one` says of forms [B,10,3], by all of the determinants."""
     K = form[:, :4]
-    M = np.eye(3) + np.einsum("bki,nkj->bnij", K, _CORNER_SLOPES)
+    M = np.eye(3) + corner_slopes(K)
     e = np.eye(3) + np.swapaxes(form[:, _CORNER_TILTS], 2, 3)
     x, y, z = (np.stack([M[..., a], e[..., a]], axis=2) for a in range(3))  # [B,8,2,3]
     mixed = np.einsum("bnxi,bnyzi->bnxyz", x, _cross(y[:, :, :, None], z[:, :, None]))

@@ -6,7 +6,7 @@ to the velocity. It is a list of vec3, appended to the lattices' nodes:
 
     0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
     7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
-    9     linear 0 or 1, outer cage affine 0 or 1
+    9     a of the weight, outer cage affine 0 or 1, b of the weight
     10-19 bend and tilts of the outer cage, see `bends.forms`
     20-23 dK/dt of the inner cage
 
@@ -61,7 +61,7 @@ def table_along(shell: FlowShell, knots: Array) -> Array:
         0.5 * outer.heights / unit,
     )
     head[8] = steps, motion.is_affine, 1.0 / shell.falloff.width
-    head[9, :2] = shell.falloff.profile == "linear", outer.is_affine
+    head[9] = shell.coefficients[0], outer.is_affine, shell.coefficients[1]
     head[20:24] = bend_rate
     if not outer.is_affine:
         head[10:20] = outer.form
@@ -195,10 +195,13 @@ def velocity(
         r = 1.0 / (1.0 + q)
         per_width = lattice[base + 8].z
         g = qd.max((r - 1.0) * per_width + 1.0, 0.0)
-        linear = lattice[base + 9].x > 0.5
-        w = g
-        if not linear:
-            w = g * g * (3.0 - 2.0 * g)
+        end = lattice[base + 9].x
+        middle = lattice[base + 9].z
+        u = qd.max(2.0 * g - 1.0, 0.0)
+        u8 = u * u
+        u8 *= u8
+        u8 *= u8
+        w = g * (end + middle * g * (3.0 - 2.0 * g)) + (1.0 - end - middle) * u8 * u
         out = w * v
         if qd.static(tangent):
             dw = 0.0
@@ -210,8 +213,7 @@ def velocity(
                 dE = (ee * e * height * sign).dot(dxi)
                 dF = 2.0 * (ff * ff * inverse * lattice[base + 7] * z).dot(dz)
                 dw = -r * r * per_width * q * (dE / E + dF / F)
-                if not linear:
-                    dw *= 6.0 * g * (1.0 - g)
+                dw *= end + 6.0 * middle * g * (1.0 - g) + 18.0 * (1.0 - end - middle) * u8
             dout = w * dv + dw * v
     return out, dout, z, xi
 

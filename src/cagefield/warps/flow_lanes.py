@@ -22,9 +22,14 @@ def weight_at(
     """w at coordinates z of the outer and xi of the inner cage: 1 / (1 + d_i / d_o) in one division."""
     H = table[7]
     height = table[moment + 8]
-    dx = qd.max(H.x * (1.0 - x * x), NEAR)
-    dy = qd.max(H.y * (1.0 - y * y), NEAR)
-    dz = qd.max(H.z * (1.0 - z * z), NEAR)
+    dx = H.x * (1.0 - x * x)
+    dy = H.y * (1.0 - y * y)
+    dz = H.z * (1.0 - z * z)
+    # What is nearer than NEAR to a face comes to rest there all the same.
+    rest = qd.max(qd.min(qd.min(dx, dy, dz) / NEAR, 1.0), 0.0)
+    dx = qd.max(dx, NEAR)
+    dy = qd.max(dy, NEAR)
+    dz = qd.max(dz, NEAR)
     ex = height.x * qd.max(qd.abs(ix) - 1.0, 0.0)
     ey = height.y * qd.max(qd.abs(iy) - 1.0, 0.0)
     ez = height.z * qd.max(qd.abs(iz) - 1.0, 0.0)
@@ -41,8 +46,13 @@ def weight_at(
     # Two roots, not one of the product, which float32 has no room for.
     q = qd.sqrt(qd.sqrt(ex * ex + ey * ey + ez * ez) * qd.sqrt(a * a + b * b + c * c))
     g = qd.max((product / (product + q) - 1.0) * table[8].z + 1.0, 0.0)
-    linear = table[9].x
-    return g * (linear + (1.0 - linear) * g * (3.0 - 2.0 * g))
+    end = table[9].x
+    middle = table[9].z
+    u = qd.max(2.0 * g - 1.0, 0.0)
+    u8 = u * u
+    u8 *= u8
+    u8 *= u8
+    return rest * (g * (end + middle * g * (3.0 - 2.0 * g)) + (1.0 - end - middle) * u8 * u)
 
 
 @qd.func

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from cagefield import hexahedron
 from cagefield.cages import Cage
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps.bends import AXES, SIGNS, bend, bends, stay_one_to_one
+from cagefield.warps.bends import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
 from cagefield.warps.extended import Extended, slope_columns, straightened_slope
 
 LEAST_SIZE = 1e-2
@@ -112,6 +112,13 @@ class Motion:
     def bend(self, t: float) -> Array:
         """K [4,3] at time t."""
         return self.start.bend + t * (self.end.bend - self.start.bend)
+
+    def corner_rates(self, t: Array) -> Array:
+        """How the bend strains the cage at its corners [T,8,3,3] at times t [T], in the straightened cage."""
+        going = self.end.bend - self.start.bend
+        return corner_slopes(going[None]) @ np.linalg.inv(
+            np.eye(3) + corner_slopes(self.start.bend + t[:, None, None] * going)
+        )
 
     def _centre(self, t: Array) -> tuple[Array, Array]:
         a, b = self.start.centre, self.end.centre

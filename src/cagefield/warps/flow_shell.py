@@ -7,14 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield import hexahedron
 from cagefield.cages import Cage, are_valid
 from cagefield.hexahedron import Array, Mask
 from cagefield.warps.bends import bend, bend_slope
 from cagefield.warps.extended import Extended
+from cagefield.warps.falloff import Falloff
 from cagefield.warps.flow_motion import Motion, gaps, may_bend
-
-FALLOFFS: tuple[str, ...] = ("smooth", "linear")
+from cagefield.warps.inverting import inverted
 
 POWER = 4
 """Exponent p of the distances' norm."""
@@ -33,28 +32,6 @@ FLAT = 0.1
 _CHUNK = 8192
 
 
-@dataclass(frozen=True)
-class Falloff:
-    """How the motion fades from the inner cage (all of it) to the outer (none).
-
-    profile "smooth" (w = g^2 (3 - 2 g)) or "linear" (w = g), with g = (r - 1 + width) / width cut to [0,1]
-    and r = d_o / (d_i + d_o); width in (0,1] from "only near the inner cage" to "the whole shell".
-    """
-
-    profile: str = "smooth"
-    width: float = 1.0
-
-    def weight(self, q: Array) -> tuple[Array, Array]:
-        """(w [N], dw/dq [N]) at ratios q = d_i / d_o >= 0 of the distances."""
-        r = 1.0 / (1.0 + q)
-        g = (r - 1.0) / self.width + 1.0
-        slope = np.where(g > 0.0, -r * r / self.width, 0.0)
-        g = g.clip(0.0, 1.0)
-        if self.profile == "linear":
-            return g, slope
-        return g * g * (3.0 - 2.0 * g), slope * 6.0 * g * (1.0 - g)
-
-
 SMOOTH = Falloff()
 
 
@@ -69,17 +46,20 @@ class FlowShell:
 
         d_i = |e|_p,  e_a = h_a max(|xi_a| - 1, 0);    1 / d_o = |1 / D|_p,  D_a = H_a (1 - z_a^2) / 2,
 
-    and w = s(d_o / (d_i + d_o)), see `Falloff`. The flow of a Lipschitz field is one to one: it cannot fold
-    while the inner cage stays inside the outer. Valid for every pair of hexahedra with a gap between them.
+    and w depends on d_o / (d_i + d_o), see `Falloff`. The flow of a Lipschitz field is one to one: it
+    cannot fold while the inner cage stays inside the outer. Valid for all pairs of hexahedra with a gap.
 
     Integrated by the classical Runge-Kutta method with steps of equal estimated strain; `to_canonical` goes
     backwards through the same times, its Jacobian is that of the discrete scheme, and `to_deformed` is the
     inverse of `to_canonical` as computed.
 
-    Chosen by measurement (`benchmarks/flow_profiles.py`, 14 edits), geometric means of the least det J and
-    the largest stretch, smooth: p = 2 0.192 and 9.6; p = 4 0.190 and 8.6; p = 8 0.187 and 8.9; linear: p = 2
-    0.139 and 13.6, p = 8 0.130 and 12.4 (better for translations alone); w = 1 / (1 + (d_i / d_o)^2), p = 2:
-    0.141 and 12.3.
+    Chosen by measurement (`benchmarks/flow_profiles.py`, 23 edits), geometric means of the least det J and
+    the largest stretch, smooth: p = 2 0.201 and 7.0; p = 4 0.231 and 5.9; p = 8 0.238 and 5.8, for which
+    float32 has no room; with the same slope a at the outer cage for all edits, p = 4: a = 0 (which is
+    g^2 (3 - 2 g)) 0.212 and 7.2, 0.5 0.228 and 6.2, 0.95 0.208 and 6.6; linear 0.184 and 8.8; as much of it
+    as of g^2 (3 - 2 g) 0.235 and 5.9, but with a kink at the inner cage; w = 1 / (1 + (d_i / d_o)^2), p = 2:
+    0.165 and 10.1. The largest stretch of the nine among them that are edits of the built-in scenes: smooth
+    3.8, a = 0 5.0, linear 4.5, the trilinear shell 4.7.
 
     Parameters: the canonical and the deformed inner cage, the outer cage, the falloff, the strain of a step.
     """
@@ -95,10 +75,19 @@ class FlowShell:
         """The way of the inner cage."""
         return Motion(self.inner, self.deformed, self.outer)
 
+    @cached_property
+    def coefficients(self) -> tuple[float, float]:
+        """(a, b) of the weight, see `Falloff`."""
+        z, _ = self.motion.surface(np.array([0.0, 1.0]))
+        gaps = np.concatenate([1.0 + z.min(axis=1), 1.0 - z.max(axis=1)], axis=1)
+        before, after = np.log(np.maximum(gaps, LEAST_GAP))
+        return self.falloff.coefficients(float(np.abs(after - before).max()))
+
     def with_strain(self, strain: float) -> FlowShell:
         """The shell with other steps, and what is known of its motion."""
         other = replace(self, strain=strain)
-        other.__dict__.update(motion=self.motion, _strained=self._strained)
+        known = ("motion", "coefficients", "_strained")
+        other.__dict__.update({name: getattr(self, name) for name in known})
         return other
 
     @cached_property
@@ -116,7 +105,10 @@ class FlowShell:
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)
         W = np.linalg.inv(F)
-        rate = 1.5 * squeeze + np.linalg.norm(dF @ W, axis=(1, 2)) + 1e-3
+        inside = (dF @ W)[:, None]
+        if not self.motion.is_affine:
+            inside = inside + F[:, None] @ self.motion.corner_rates(t) @ W[:, None]
+        rate = 1.5 * squeeze + np.linalg.norm(inside, axis=(2, 3)).max(axis=1) + 1e-3
         # A cage sheared nearly flat is felt far along its length: its faces' normals are nearly dependent.
         normals = W / np.linalg.norm(W, axis=2, keepdims=True)
         flat = np.linalg.svd(normals, compute_uv=False)[:, -1] / FLAT
@@ -129,30 +121,8 @@ class FlowShell:
 
     def to_deformed(self, points: Array) -> tuple[Array, Array]:
         """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3] in the shell."""
-        x, _ = self._march(points, self.knots)
-        # Newton's method on `to_canonical`, until it gives the points back.
-        back, J = self.to_canonical(x)
-        error = np.linalg.norm(back - points, axis=1)
-        aim = 1e-13 * np.abs(self.outer.corners).max()
-        for _ in range(8):
-            rows = np.flatnonzero(error > aim)
-            if len(rows) == 0:
-                break
-            step = hexahedron.invert(J[rows]) @ (back - points)[rows][:, :, None]
-            trial = x[rows] - step[:, :, 0]
-            new, slope = self.to_canonical(trial)
-            size = np.linalg.norm(new - points[rows], axis=1)
-            better = size < error[rows]
-            if not better.any():
-                break
-            rows = rows[better]
-            x[rows], back[rows], J[rows], error[rows] = (
-                trial[better],
-                new[better],
-                slope[better],
-                size[better],
-            )
-        return x, hexahedron.invert(J)
+        start, _ = self._march(points, self.knots)
+        return inverted(self.to_canonical, points, start, np.abs(self.outer.corners).max())
 
     def least_ratio(self) -> float:
         """Least det of d(deformed)/d(canonical) at 4096 points of the shell: a sample, not a bound."""
@@ -257,7 +227,7 @@ class FlowShell:
         p = float(POWER)
         near, far = (e**p).sum(axis=1), (D**-p).sum(axis=1)  # d_i^p and d_o^-p
         q = (near * far) ** (1.0 / p)
-        w, slope = self.falloff.weight(q)
+        w, slope = self.falloff.weight(q, self.coefficients)
         # d log q = (d near / near + d far / far) / p; at near = 0, q and its gradient's share vanish.
         d_near = ((e ** (p - 1.0) * cage.place.heights * np.sign(xi))[:, None] @ dxi)[:, 0]
         d_far = ((D ** (-p - 1.0) * confines.heights * z)[:, None] @ dz)[:, 0]

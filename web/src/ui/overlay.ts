@@ -36,15 +36,22 @@ function readout(app: App, pointer: Pointer): HTMLElement {
   const label = h("div", { class: "readout" });
   label.hidden = true;
   let written = -Infinity;
+  let later: ReturnType<typeof setTimeout> | null = null;
   app.stage.beforeFrame.push(() => {
     const { drag } = app;
-    const shown = drag !== null && !drag.ended && drag.operation !== null;
+    const followed = drag === null || drag.ended ? null : drag.followed;
     const now = performance.now();
-    if (shown && !label.hidden && app.stage.software && now - written < TEXT_EVERY) return;
+    if (followed !== null && !label.hidden && app.stage.software && now - written < TEXT_EVERY) {
+      later ??= setTimeout(() => {
+        later = null;
+        app.stage.invalidate();
+      }, TEXT_EVERY);
+      return;
+    }
     written = now;
-    label.hidden = !shown;
-    if (!shown) return;
-    label.textContent = described(drag.operation!);
+    label.hidden = followed === null;
+    if (drag === null || followed === null) return;
+    label.textContent = described(followed);
     label.classList.toggle("limit", drag.why !== null);
     const { width, height } = app.stage.points;
     const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);
