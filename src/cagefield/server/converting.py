@@ -95,8 +95,7 @@ def state_of(
         revision=session.revision,
         pictured=pictured,
         edits=[
-            edit_state(entry, session.problem(entry.edit), errors.get(entry.id))
-            for entry in document.entries
+            edit_state(entry, session.problem(entry.edit), errors.get(entry.id)) for entry in document.entries
         ],
         selected=session.selected,
         history=list(session.history.names),
