@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -51,18 +52,21 @@ class EditorPage:
         self.settle()
 
     def settle(self) -> None:
-        """Waits for the whole picture of the state; where the field did not change there is no new one."""
+        """Waits for the whole picture of what is to be seen."""
         self.until(
             "cagefield.settled"
             " && cagefield.picture.full_width === document.querySelector('.view').clientWidth"
-            " && (cagefield.picture.revision === cagefield.now.state.revision"
-            " ? cagefield.quiet > 60 : cagefield.quiet > 700)"
         )
 
     @property
     def state(self) -> dict[str, Any]:
         """The server's state as the page knows it."""
         return cast(dict[str, Any], self.page.evaluate("cagefield.now.state"))
+
+    @property
+    def edits(self) -> list[dict[str, Any]]:
+        """The edits, without the errors of their lattices, which are measured later."""
+        return [{**edit, "lattice_error": None} for edit in self.state["edits"]]
 
     @property
     def edit(self) -> dict[str, Any]:
@@ -81,6 +85,39 @@ class EditorPage:
         )
         self.settle()
         return self.state
+
+    def load(self, file: Path) -> dict[str, Any]:
+        """The state after an edit file was loaded."""
+        return self.changed(lambda: self.page.set_input_files("input[type=file]", file))
+
+    def loaded(self, file: Path) -> EditorPage:
+        """The page with the edits of a file, the last one selected, in Edit mode."""
+        self.load(file)
+        self.tools(mode="edit", tool="translate", axes="world")
+        return self
+
+    def fill(self, label: str, value: float, axis: str = "x") -> dict[str, Any]:
+        """The state after a number was typed into a field of the panel."""
+
+        def type_in() -> None:
+            field = (
+                self.page.locator(".pane .tp-lblv", has_text=label).locator("input").nth("xyz".index(axis))
+            )
+            field.fill(str(value))
+            field.press("Enter")
+
+        return self.changed(type_in)
+
+    def said(self, words: str) -> str:
+        """The line that the page shows, once it has these words."""
+        self.until(f"document.querySelector('.status .message').textContent.includes({words!r})")
+        return cast(str, self.page.inner_text(".status .message"))
+
+    def tab(self, link: str) -> EditorPage:
+        """One more page of the same browser."""
+        page = self.page.context.new_page()
+        page.goto(link)
+        return EditorPage(page)
 
     def press(self, *keys: str) -> None:
         for key in keys:
@@ -112,8 +149,10 @@ class EditorPage:
         mouse.down()
         for n in range(1, steps + 1):
             mouse.move(start[0] + by[0] * n / steps, start[1] + by[1] * n / steps)
-        yield
-        mouse.up()
+        try:
+            yield
+        finally:
+            mouse.up()
 
     def drag(self, start: Point, by: Point) -> dict[str, Any]:
         """The selected edit after a drag."""
@@ -127,6 +166,7 @@ class EditorPage:
 
     def pixels(self, cages: bool = False) -> NDArray[np.float64]:
         """The picture on the screen [H,W,3] in [0,1]; the cages are taken off for it, unless wanted."""
+        self.page.bring_to_front()
         if not cages:
             self.press("o")
         self.page.mouse.move(2, 2)
@@ -151,7 +191,10 @@ def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[Edit
     complaints: list[str] = []
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": width, "height": height})
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, permissions=["clipboard-read", "clipboard-write"]
+        )
+        page = context.new_page()
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("dialog", lambda dialog: dialog.accept())
         page.goto(link)

@@ -1,15 +1,14 @@
 """The editor in a real browser against the real server: what a user does, seen in pixels and in the state.
 
 One small trained field of the digger, one server and one page for all tests; each loads the same edit file
-first. The traffic cone is the only thing of its orange-red in the picture: where it is, how large and how it
-leans is read off the pixels.
+first. Where the traffic cone is, how large and how it leans is read off the pixels.
 """
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,34 +16,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield import Scene, load_dataset
 from cagefield.cages import EDGES
-from cagefield.datasets.procedural import make_scene
 from cagefield.edits import load_edits
-from cagefield.training.voxel import VoxelConfig, train_voxel
+from editor_cone import EDITS, cone, difference, moved
 from editor_page import PATIENCE, EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
-EDITS = """\
-version: 1
-edits:
-  - name: cone
-    inner: {center: [0.65, 0.5, -0.215], size: [0.34, 0.32, 0.36]}
-    outer: {margin: 0.35}
-    lattice: 32
-"""
-"""The cone stands on the ground at z = -.4; its tip is at z = -.05."""
-
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The digger, trained for a few seconds on 20 small photos."""
+def scene(trained_digger: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The digger, and an edit file beside it."""
     folder = tmp_path_factory.mktemp("editor")
-    data = load_dataset(make_scene("digger", folder / "photos", views=20, size=80, test_views=1))
-    result = train_voxel(data, VoxelConfig(steps=200, resolution=72, batch_rays=2048))
-    Scene.trained(result, data).save(folder / "digger")
+    shutil.copytree(trained_digger, folder / "digger")
     (folder / "cone.yaml").write_text(EDITS)
     return folder / "digger"
 
@@ -67,53 +52,16 @@ def opened(server: EditorServer) -> Iterator[EditorPage]:
 @pytest.fixture
 def editor(opened: EditorPage, scene: Path) -> EditorPage:
     """The page with one edit around the cone, selected, in Edit mode."""
-    file = scene.parent / "cone.yaml"
-    opened.changed(lambda: opened.page.set_input_files("input[type=file]", file))
-    edit = opened.state["edits"][0]
-    if opened.state["selected"] != edit["id"]:
-        opened.changed(lambda: opened.page.dispatch_event(f'.edit[data-edit="{edit["id"]}"]', "click"))
-    opened.tools(mode="edit", tool="translate", axes="world")
-    return opened
-
-
-@dataclass
-class Cone:
-    """What is orange-red in a picture: how many pixels, their middle (column, row), their lean in degrees."""
-
-    area: int
-    at: NDArray[np.float64]
-    lean: float
-
-
-def cone(picture: NDArray[np.float64]) -> Cone:
-    red, green, blue = np.moveaxis(picture, -1, 0)
-    rows, columns = np.nonzero((red > 0.7) & (green < 0.5 * red) & (blue < 0.45 * red))
-    if len(rows) < 5:
-        return Cone(len(rows), np.full(2, np.nan), np.nan)
-    points = np.stack([columns, rows], axis=1).astype(np.float64)
-    values, vectors = np.linalg.eigh(np.cov(points.T))
-    long = vectors[:, np.argmax(values)]
-    return Cone(len(rows), points.mean(axis=0), float(np.degrees(np.arctan2(long[0], long[1])) % 180.0))
-
-
-def moved(before: Any, after: Any) -> NDArray[np.float64]:
-    """How a cage's corners moved [8,3]."""
-    return np.asarray(after, dtype=np.float64) - np.asarray(before, dtype=np.float64)
-
-
-def difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Largest difference of two pictures."""
-    return float(np.abs(a - b).max())
+    return opened.loaded(scene.parent / "cone.yaml")
 
 
 def test_double_click_sets_both_cages_and_they_move_without_the_field(editor: EditorPage) -> None:
     editor.changed(lambda: editor.press("Escape"))  # else the gizmo is in the way
     before = editor.pixels()
     column, row = cone(before).at
-    state = editor.changed(
-        lambda: editor.page.mouse.dblclick(editor.box["x"] + column, editor.box["y"] + row)
-    )
-    assert len(state["edits"]) == 2 and editor.page.evaluate("cagefield.now.mode") == "set"
+    editor.page.mouse.dblclick(editor.box["x"] + column, editor.box["y"] + row)
+    editor.until("cagefield.now.state.edits.length === 2 && cagefield.now.mode === 'set'")
+    editor.settle()
     placed = editor.edit
     low, high = np.min(placed["inner"], axis=0), np.max(placed["inner"], axis=0)
     outer_low, outer_high = np.min(placed["outer"], axis=0), np.max(placed["outer"], axis=0)
@@ -208,19 +156,20 @@ def test_a_drag_stops_at_the_outer_cage_and_says_why(editor: EditorPage) -> None
     with editor.held(editor.grip("Z"), (0, -170)):
         # In the same frame, before the server's answer: the page knows the outer cage.
         assert "outer cage" in editor.page.inner_text(".status .message")
-        editor.until("cagefield.drag.why !== null && cagefield.drag.why.includes('outside face +z')")
+        editor.until("cagefield.picture.drag > 0 && cagefield.picture.seq === cagefield.drag.seq")
+        assert "stay inside the outer cage; enlarge the outer cage (Set mode)" in editor.said("stops here")
     editor.until("cagefield.drag === null")
     top = np.max(editor.edit["deformed"], axis=0)[2]
     assert top <= outer[:, 2].max() and top > outer[:, 2].max() - 0.01
 
 
 def test_escape_gives_a_drag_up(editor: EditorPage) -> None:
-    before, state = editor.pixels(), editor.state
+    before, edits, history = editor.pixels(), editor.edits, editor.state["history"]
     with editor.held(editor.grip("Z"), (0, -30)):
         editor.until("cagefield.picture.drag > 0")
         editor.press("Escape")
     editor.settle()
-    assert editor.state["edits"] == state["edits"] and editor.state["history"] == state["history"]
+    assert editor.edits == edits and editor.state["history"] == history
     assert cone(editor.pixels()).at == pytest.approx(cone(before).at, abs=1.0)
 
 
@@ -252,20 +201,23 @@ def test_discrete_and_continuous_copy_and_delete(editor: EditorPage) -> None:
 
 
 def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
-    first, before = editor.state, editor.pixels()
+    first, clean, before = editor.state, editor.edits, editor.pixels()
     for n in range(10):
         revision = editor.state["revision"]
         with editor.held(editor.grip("Z"), (0, 6 if n % 2 else -12), steps=2):
             pass
         editor.until(f"cagefield.now.state.revision > {revision} && cagefield.drag === null")
     editor.settle()
-    last, after = editor.state, editor.pixels()
+    last, done, after = editor.state, editor.edits, editor.pixels()
     assert last["entry"] == first["entry"] + 10
-    for key, wanted, seen in (("Control+z", first, before), ("Control+Shift+Z", last, after)):
+    for key, wanted, edits, seen in (
+        ("Control+z", first, clean, before),
+        ("Control+Shift+Z", last, done, after),
+    ):
         editor.press(*[key] * 10)
         editor.until(f"cagefield.now.state.entry === {wanted['entry']}")
         editor.settle()
-        assert editor.state["edits"] == wanted["edits"]
+        assert editor.edits == edits
         assert difference(editor.pixels(), seen) < 0.1  # JPEG's
     assert cone(after).at[1] < cone(before).at[1] - 15
 
@@ -291,7 +243,7 @@ def sees(editor: EditorPage, at: NDArray[np.float64]) -> None:
 def test_lines_are_solid_before_the_field_and_dashed_behind_it(editor: EditorPage, scene: Path) -> None:
     file = scene.parent / "low.yaml"
     file.write_text(EDITS.replace("-0.215]", "-0.27]").replace("0.36]}", "0.46]}"))  # 0.1 into the ground
-    editor.changed(lambda: editor.page.set_input_files("input[type=file]", file))
+    editor.load(file)
     editor.tools(tool="select")
     lines = np.abs(editor.pixels(cages=True) - editor.pixels()).max(axis=2) > 0.1
 
@@ -313,7 +265,7 @@ def test_lines_are_solid_before_the_field_and_dashed_behind_it(editor: EditorPag
 
 def test_saved_edits_are_found_again_after_a_reload(editor: EditorPage, scene: Path) -> None:
     editor.drag(editor.grip("Z"), (0, -30))
-    before, edits = editor.pixels(), editor.state["edits"]
+    before, edits = editor.pixels(), editor.edits
     assert editor.state["saved"] is False
     editor.changed(lambda: editor.press("Control+s"))
     assert editor.state["saved"] is True
@@ -321,7 +273,7 @@ def test_saved_edits_are_found_again_after_a_reload(editor: EditorPage, scene: P
     assert stored.name == "cone" and np.allclose(stored.deformed.corners, edits[0]["deformed"], atol=1e-6)
     editor.page.reload()
     editor.ready()
-    assert editor.state["edits"] == edits
+    assert editor.edits == edits
     assert editor.page.evaluate("cagefield.now.mode") == "edit"
     assert difference(editor.pixels(), before) < 0.15
 

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from cagefield.cages import Cage
-from cagefield.edits import Edit, Rotate, Scale, Translate
+from cagefield.edits import Edit, EditStack, MoveCorner, Rotate, Scale, Translate, dump_edits
 from cagefield.edits import operations as ops
+from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.keyframes import Keyframe
+from cagefield.server import reasons
 from cagefield.server.document import Document
 from cagefield.server.history import History
-from cagefield.server.moving import move_corners
+from cagefield.server.moving import Target, move_corners
 from cagefield.server.session import Session
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
@@ -58,7 +60,7 @@ def test_the_outer_cage_stops_a_drag_and_says_why() -> None:
     moved = s.drag(1, 1, Translate((0.6, 0.0, 0.0)))
     # The gap is 0.3 of the 0.6 asked for; safe_fraction is good to 1e-3 and never beyond the limit.
     assert 0.49 < moved.part <= 0.5
-    assert moved.why is not None and "outer cage must contain the inner cage" in moved.why
+    assert moved.why is not None and "must stay inside the outer cage; enlarge" in moved.why
     assert moved.edit.outer is not None and moved.edit.outer.contains(moved.edit.deformed.corners).all()
     s.drag_end(1, 1, Translate((0.6, 0.0, 0.0)))
     assert s.problem(s.document.entry(1).edit) is None
@@ -127,9 +129,29 @@ def test_in_set_mode_the_outer_cage_stops_at_the_inner_one() -> None:
     assert moved.edit.inner == INNER
 
 
+@pytest.mark.parametrize(
+    ("edit", "target", "operation", "why"),
+    [
+        (ARM, "field", Translate((2.0, 0, 0)), reasons.OUTSIDE),
+        (ARM.replace(shell="trilinear"), "field", Rotate((0, 0, 80)), reasons.FOLDED),
+        (ARM, "field", Translate((0.299999, 0, 0)), reasons.CLOSE),
+        (ARM, "field", MoveCorner(0, (2.0, 2.0, 2.0)), reasons.INSIDE_OUT),
+        (ARM, "outer", Translate((2.0, 0, 0)), "the inner cage must stay inside the outer cage"),
+        (ARM, "inner", MoveCorner(0, (2.0, 2.0, 2.0)), reasons.INSIDE_OUT),
+    ],
+)
+def test_why_a_drag_stops_is_said_in_the_editors_words(
+    edit: Edit, target: Target, operation: Operation, why: str
+) -> None:
+    s = session(edit)
+    s.drag_begin(1, 1, 1, target)
+    moved = s.drag(1, 1, operation)
+    assert moved.part < 1.0 and moved.why == why
+
+
 def test_an_operation_from_numbers_is_done_whole_or_not_at_all() -> None:
     s = session(ARM)
-    with pytest.raises(EditError, match=r"outer cage must contain.*% of it is possible"):
+    with pytest.raises(EditError, match=r"must stay inside the outer cage.*% of it is possible"):
         s.apply(1, "field", Translate((0.6, 0, 0)))
     assert s.document == Document.of([ARM])
 
@@ -269,7 +291,7 @@ def test_an_edit_that_is_impossible_is_left_out_and_says_why() -> None:
     s = session(ARM, CUP.translate((0, 0.1, 0)))
     s.set_cage(1, "outer", Cage.box((0, 0, 0), 0.3))
     edit = s.document.entry(1).edit
-    assert "outer cage must contain the inner cage" in (s.problem(edit.translate((0.01, 0, 0))) or "")
+    assert "must stay inside the outer cage" in (s.problem(edit.translate((0.01, 0, 0))) or "")
     s.apply(1, "field", Translate((0.01, 0, 0)))
     assert [drawn.name for drawn in s.drawn()] == ["cup"]
 
@@ -330,6 +352,20 @@ def test_the_outer_margin_holds_the_inner_cage_before_and_after() -> None:
     outer = s.document.entry(1).edit.outer
     assert outer is not None
     np.testing.assert_allclose(outer.aabb, [[-0.3, -0.3, -0.3], [0.5, 0.3, 0.3]])
+
+
+def test_colours_stay_with_the_order_of_the_edits() -> None:
+    s = session(ARM, CUP)
+    first = [entry.colour for entry in s.document.entries]
+    assert len(set(first)) == 2
+    s.duplicate(1)
+    assert len({entry.colour for entry in s.document.entries}) == 3
+    for _ in range(2):
+        s.load_edits(dump_edits(EditStack([ARM, CUP])), append=False)
+        assert [entry.colour for entry in s.document.entries] == first
+    s.remove(s.document.entries[0].id)
+    s.load_edits(dump_edits(EditStack([ARM])), append=True)
+    assert sorted(entry.colour for entry in s.document.entries) == sorted(first)
 
 
 def test_edit_texts_go_out_and_come_in() -> None:

@@ -121,7 +121,7 @@ def test_a_drag_stops_at_the_outer_cage(server: EditorServer) -> None:
         client.send("drag_begin", drag=3, edit=state["edits"][0]["id"], target="field")
         client.send("drag", drag=3, seq=1, operation={"kind": "translate", "by": [0.8, 0, 0]})
         answer = client.until(lambda m: m["type"] == "dragged")
-        assert 0.45 < answer["part"] <= 0.5 and "outer cage must contain" in answer["why"]
+        assert 0.45 < answer["part"] <= 0.5 and "must stay inside the outer cage" in answer["why"]
         client.send("drag_cancel", drag=3)
         state = client.state(lambda s: s["edits"][0]["deformed"] == s["edits"][0]["inner"])
         assert state["edits"][0]["operations"] == []
@@ -288,6 +288,11 @@ def test_cages_are_placed_on_the_surface_and_fitted(server: EditorServer) -> Non
         fitted = np.array(state["edits"][0]["inner"])
         # The ball's radius is 0.5, its edge fades over one voxel of 0.125, and a probe is 1.8 / 40.
         assert 0.45 < fitted.max() < 0.7 and -0.7 < fitted.min() < -0.45
+        for what, edit_id in (("grid", 999), ("edit_text", None)):
+            client.send("ask", request=8, what=what, edit=edit_id)
+            answer = client.until(lambda m: m["type"] in ("answer", "notice") and m.get("request", 8) == 8)
+            assert answer["type"] == "answer" and answer["failed"]
+            assert client.notice()["level"] == "error"
         client.send("ask", request=7, what="grid", edit=edit["id"])
         assert client.until(lambda m: m["type"] == "answer" and m["request"] == 7)
 

@@ -185,6 +185,7 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
         0.25,
         0.3,
         0.01,
+        0.05,
         grid.terms,
     )
     density, sh, running, weight = grid.arrays()
@@ -192,8 +193,10 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
     touched = r[:, 2] > 0
     change = np.clip(0.5 * r[:, 0] / (r[:, 1] + 0.01 * h**2), -0.3 / h, 0.3 / h) * touched
     np.testing.assert_allclose(density, before_density - change, rtol=1e-4, atol=1e-5)
-    expected = before_sh.reshape(len(sh), -1) - 0.25 * r[:, HEAD:] / (r[:, 2:3] + 0.01) * touched[:, None]
-    np.testing.assert_allclose(sh.reshape(len(sh), -1), expected, rtol=1e-4, atol=1e-5)
+    slope = r[:, HEAD:].reshape(before_sh.shape)
+    slope[:, 1:] += 0.05 * r[:, 2, None, None] * before_sh[:, 1:]
+    expected = before_sh - 0.25 * slope / (r[:, 2, None, None] + 0.01) * touched[:, None, None]
+    np.testing.assert_allclose(sh, expected, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(running, r[:, 1:3], rtol=1e-5)
     assert weight.max() > 0
     assert not grid.accumulator.to_numpy().any()

@@ -1,12 +1,15 @@
-"""Draws the tutorial's pictures: one session on the digger in the editor, in headless Chromium.
+"""Draws the tutorial's pictures: sessions in the editor, in headless Chromium, with the mouse.
 
-    python docs/tutorial/pictures.py SCENE
+    python docs/tutorial/pictures.py digger SCENE
+    python docs/tutorial/pictures.py chair SCENE
 
-SCENE is the built-in digger, trained; it is copied first and left as it is.
+SCENE is the built-in digger, or the chair of NeRF's synthetic scenes, trained; it is copied first and left as it
+is. Cages are pasted as text; everything else is done with the mouse.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import tempfile
@@ -15,74 +18,155 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 import cagefield
-from editor_page import EditorPage, editor_page
+from editor_page import EditorPage, Point, editor_page
 from editor_server import editor_server
 
 HERE = Path(__file__).parent
+ARM = (Path(cagefield.__file__).parent / "examples" / "digger.yaml").read_text(encoding="utf-8")
 
-FILE = Path(cagefield.__file__).parent / "examples" / "digger.yaml"
-
-COPY = """\
+CONE = """\
+edits:
   - name: second cone
     adjustment: discrete
     keep_source: true
     inner: {center: [0.65, 0.5, -0.2175], size: [0.255, 0.255, 0.365]}
-    operations:
-      - translate: [-1.4, -1, 0]
 """
 
-DELETE = """\
+BEACON = """\
+edits:
   - name: no beacon
     delete: true
     inner: {center: [-0.12, 0.2, 0.56], size: [0.12, 0.12, 0.08]}
 """
 
+BACK = """\
+edits:
+  - name: raise the back
+    lattice: 64
+    inner: {center: [0, 0.57, 0.78], size: [1.1, 0.34, 0.68]}
+    outer: {center: [0, 0.68, 0.85], size: [1.5, 1.16, 1.7]}
+"""
+
+CHAIR = """\
+edits:
+  - name: small chair
+    adjustment: discrete
+    keep_source: true
+    inner: {center: [0, 0.1, 0.16], size: [1.5, 1.7, 2.4]}
+"""
+
+ARM_REST = """\
+edits:
+  - name: no arm rest
+    delete: true
+    inner: {center: [0.5, 0.11, 0.2], size: [0.28, 0.62, 0.42]}
+"""
+
 
 def main() -> None:
-    """Run the session."""
+    """Runs a session."""
+    name, path = sys.argv[1:]
+    session = {"digger": digger, "chair": chair}[name]
     with tempfile.TemporaryDirectory() as folder:
-        scene = Path(folder) / "digger"
-        shutil.copytree(sys.argv[1], scene)
+        scene = Path(folder) / name
+        shutil.copytree(path, scene)
         (scene / "edits.yaml").write_text("version: 1\nedits: []\n")
         with editor_server(scene) as server, editor_page(server.link, 1280, 800) as editor:
             editor.ready()
-            session(editor, Path(folder))
+            session(editor)
 
 
-def session(editor: EditorPage, folder: Path) -> None:
+def digger(editor: EditorPage) -> None:
     """Cages set, the arm raised, the cone copied, the beacon deleted: a picture of each."""
-
-    def shot(name: str) -> None:
-        editor.settle()
-        editor.page.mouse.move(640, 790)
-        editor.page.wait_for_timeout(400)
-        editor.page.screenshot(path=HERE / f"{name}.jpg", type="jpeg", quality=82)
-
-    def load(text: str) -> None:
-        file = folder / "edits.yaml"
-        file.write_text(text)
-        editor.changed(lambda: editor.page.set_input_files("input[type=file]", file))
-
-    def turned(by: tuple[float, float]) -> None:
-        with editor.held((150, 690), by, steps=8):
-            pass
-        editor.settle()
-
-    edits = FILE.read_text(encoding="utf-8")
-    turned((-230, -20))
-    shot("open")
-    load(edits[: edits.index("    operations:")])
+    turned(editor, (-230, -20))
+    shot(editor, "open")
+    pasted(editor, ARM[: ARM.index("    operations:")])
     editor.tools(mode="set", tool="select", cage="both")
-    shot("cages")
-    editor.tools(mode="edit", tool="rotate")
-    editor.drag(editor.grip("Y"), (0, -13))
+    shot(editor, "cages")
+    editor.tools(mode="edit", tool="translate")
+    dragged(editor, "Z", (0, -1), axis=2, by=0.25)
+    editor.tools(tool="rotate")
+    dragged(editor, "Y", (0, -1), axis=1, by=-15)
+    shot(editor, "raised")
+    pasted(editor, CONE)
+    editor.tools(mode="edit", tool="translate")
+    dragged(editor, "X", (1, 0), axis=0, by=-1.4)
+    dragged(editor, "Y", (1, 0), axis=1, by=-1)
+    shot(editor, "copied")
+    pasted(editor, BEACON)
+    shot(editor, "deleted")
+
+
+def chair(editor: EditorPage) -> None:
+    """Cages set, the back raised and leant back, the chair copied, an arm rest deleted: a picture of each."""
+    turned(editor, (300, -50))
+    pasted(editor, BACK)
+    editor.tools(mode="set", tool="select", cage="both")
+    shot(editor, "chair-cages")
+    editor.tools(mode="edit", tool="translate")
+    dragged(editor, "Z", (0, -1), axis=2, by=0.2)
+    editor.tools(tool="rotate")
+    dragged(editor, "X", (0, -1), axis=0, by=-15)
+    shot(editor, "chair-raised")
+    pasted(editor, CHAIR)
+    editor.tools(mode="edit", tool="scale")
+    dragged(editor, "XYZ", (-1, 0), axis=0, by=0.5)
     editor.tools(tool="translate")
-    editor.drag(editor.grip("Z"), (0, -55))
-    shot("raised")
-    load(edits + COPY)
-    shot("copied")
-    load(edits + COPY + DELETE)
-    shot("deleted")
+    dragged(editor, "Z", (0, 1), axis=2, by=-0.6)
+    dragged(editor, "X", (1, 0), axis=0, by=-1.1)
+    shot(editor, "chair-copied")
+    pasted(editor, ARM_REST)
+    shot(editor, "chair-deleted")
+
+
+def shot(editor: EditorPage, name: str) -> None:
+    """A picture of the window."""
+    editor.settle()
+    editor.page.mouse.move(640, 790)
+    editor.page.wait_for_timeout(400)
+    editor.page.screenshot(path=HERE / f"{name}.jpg", type="jpeg", quality=82)
+
+
+def pasted(editor: EditorPage, text: str) -> None:
+    """Pastes edits after those there are."""
+    editor.page.evaluate("text => navigator.clipboard.writeText(text)", text)
+    editor.changed(lambda: editor.press("Control+v"))
+
+
+def turned(editor: EditorPage, by: Point) -> None:
+    """Turns the view."""
+    with editor.held((150, 690), by, steps=8):
+        pass
+    editor.settle()
+
+
+def dragged(editor: EditorPage, grip: str, towards: Point, *, axis: int, by: float) -> None:
+    """Drags a handle of the gizmo, snapping, until the number beside the mouse is reached.
+
+    Where that number moves away from it, the mouse goes the other way.
+    """
+    page, at = editor.page, editor.grip(grip)
+    page.mouse.move(*at)
+    page.keyboard.down("Control")
+    page.mouse.down()
+    way, pixels = 1.0, 0
+    while abs((now := number(editor, axis)) - by) > 1e-6:
+        if now * by < 0 and way > 0:
+            way, pixels = -1.0, 0
+        pixels += 5
+        assert pixels < 1200, f"the drag came to {now}, not to {by}"
+        page.mouse.move(at[0] + way * towards[0] * pixels, at[1] + way * towards[1] * pixels)
+        page.wait_for_timeout(5)
+    page.mouse.up()
+    page.keyboard.up("Control")
+    editor.until("cagefield.drag === null")
+    editor.settle()
+
+
+def number(editor: EditorPage, axis: int) -> float:
+    """A number of those beside the mouse, 0 before there are any."""
+    found = re.findall(r"-?\d+(?:\.\d+)?", editor.page.text_content(".readout") or "")
+    return float(found[axis]) if len(found) == 3 else 0.0
 
 
 if __name__ == "__main__":

@@ -110,8 +110,9 @@ export class Actions {
       return;
     }
     const { width, height } = this.app.stage.points;
-    void this.app.ask({ what: "surface", x: x / width, y: y / height }).then(({ point }) => {
-      if (point === null) return;
+    void this.app.ask({ what: "surface", x: x / width, y: y / height }).then((answer) => {
+      if (!answer?.point) return;
+      const { point } = answer;
       const eye = this.app.stage.camera.position.toArray();
       this.app.stage.focus(point, 0.2 * Math.hypot(...point.map((c, i) => c - eye[i])));
     });
@@ -133,10 +134,10 @@ export class Actions {
 
   copy(): void {
     this.withSelected((edit) => {
-      void this.app.ask({ what: "edit_text", edit: edit.id }).then(async ({ text }) => {
-        if (text === null) return;
+      void this.app.ask({ what: "edit_text", edit: edit.id }).then(async (answer) => {
+        if (!answer?.text) return;
         try {
-          await navigator.clipboard.writeText(text);
+          await navigator.clipboard.writeText(answer.text);
           this.app.say(`“${edit.name}” is copied as text`);
         } catch {
           this.app.say("the browser does not let this page write to the clipboard", "error");

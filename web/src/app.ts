@@ -5,6 +5,7 @@ import { CameraFeed } from "./camera_feed";
 import { Connection, socketAddress } from "./connection";
 import { Drag, leading } from "./drag";
 import { Gizmo } from "./gizmo";
+import { Grid } from "./grid";
 import { Handles } from "./handles";
 import { Latency } from "./latency";
 import { Lines } from "./lines";
@@ -31,8 +32,8 @@ export class App {
   private readonly lines: Lines;
   private readonly handles: Handles;
   private readonly connection: Connection;
-  private grid: { key: string; lines: Vec3[][] } = { key: "", lines: [] };
-  private readonly questions = new Map<number, (answer: Answer) => void>();
+  private readonly grid: Grid;
+  private readonly questions = new Map<number, (answer: Answer | null) => void>();
   private requests = 0;
   private drags = 0;
   private pictureChain: Promise<void> = Promise.resolve();
@@ -46,13 +47,13 @@ export class App {
     this.handles = new Handles(this.stage);
     this.gizmo = new Gizmo(this.stage.scene, this.stage.camera);
     this.camera = new CameraFeed(this.stage, (message) => this.send(message));
+    this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
     this.stage.beforeFrame.push(() => this.arrange());
     this.stage.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
       this.stage.invalidate();
     });
-    this.store.watch(["grid", "state"], () => this.askGrid());
     this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
       opened: () => this.store.set({ connection: "open" }),
       lost: () => this.lost(),
@@ -66,12 +67,12 @@ export class App {
     return this.connection.send(message);
   }
 
-  /** Asks the server; the answer comes, or nothing does. */
-  ask(question: Omit<Ask, "type" | "request">): Promise<Answer> {
+  /** The server's answer; null, and a line says why, where it has none or is not there. */
+  ask(question: Omit<Ask, "type" | "request">): Promise<Answer | null> {
     const request = ++this.requests;
     return new Promise((resolve) => {
-      this.questions.set(request, resolve);
-      this.send({ type: "ask", request, ...question });
+      if (this.send({ type: "ask", request, ...question })) this.questions.set(request, resolve);
+      else resolve(null);
     });
   }
 
@@ -133,7 +134,7 @@ export class App {
     const { now } = this.store;
     const edit = selected(now);
     const eye = this.stage.camera.position.toArray();
-    const grid = this.drag === null ? this.grid.lines : [];
+    const grid = now.grid && edit !== null ? this.grid.of(edit, shownCages(edit, this.drag)) : [];
     const { segments, dots } = scenery(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
@@ -160,7 +161,7 @@ export class App {
         this.stage.invalidate();
         break;
       case "answer":
-        this.questions.get(message.request)?.(message);
+        this.questions.get(message.request)?.(message.failed ? null : message);
         this.questions.delete(message.request);
         break;
       case "notice":
@@ -203,7 +204,9 @@ export class App {
   private lost(): void {
     const dragging = this.drag !== null;
     this.drag = null;
+    for (const resolve of this.questions.values()) resolve(null);
     this.questions.clear();
+    this.grid.forget();
     this.store.set({ connection: "lost", limit: null });
     if (dragging) this.say("the server went away in the middle of a drag, which is lost", "warning");
     this.stage.invalidate();
@@ -258,19 +261,6 @@ export class App {
       final,
     };
     this.store.set({ figures });
-  }
-
-  private askGrid(): void {
-    const edit = selected(this.store.now);
-    if (!this.store.now.grid || edit === null || edit.kind !== "continuous") return;
-    const key = JSON.stringify([edit.id, edit.deformed, edit.outer, edit.inner, edit.shell, edit.falloff, edit.width]);
-    if (key === this.grid.key) return;
-    this.grid = { key, lines: [] };
-    void this.ask({ what: "grid", edit: edit.id }).then(({ grid }) => {
-      if (this.grid.key !== key) return;
-      this.grid.lines = grid;
-      this.stage.invalidate();
-    });
   }
 
   /** The cages of an edit as they are shown now. */

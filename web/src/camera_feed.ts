@@ -29,6 +29,11 @@ export class CameraFeed {
     });
   }
 
+  /** Whether the server knows the camera, and that it rests. */
+  get resting(): boolean {
+    return !this.changed && !this.moving;
+  }
+
   /** Sends the camera as it is, at rest: after connecting, say. */
   restate(): void {
     this.moving = false;

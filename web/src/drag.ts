@@ -8,6 +8,9 @@ import { middle } from "./cage";
 import type { Corners, Dragged, EditState, PageMessage } from "./protocol";
 import type { Target } from "./store";
 
+/** What the server says, too, where a continuous edit is confined. */
+const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
+
 /** The cages of an edit, as they are shown. */
 export interface Cages {
   inner: Posed;
@@ -34,6 +37,8 @@ export class Drag {
   readonly start: Cages;
   shown: Cages;
   operation: Operation | null = null;
+  /** As much of the operation as the cages follow. */
+  followed: Operation | null = null;
   seq = 0;
   /** Why the drag stopped, or null while all of it is followed. */
   why: string | null = null;
@@ -62,8 +67,8 @@ export class Drag {
     const byCage = this.confined ? containedPart(operation, this.start.deformed, this.outerCorners) : 1;
     const byServer = expectedPart(operation, this.last);
     const share = Math.min(byCage, byServer);
-    this.why = share >= 1 ? null : (this.last?.why ?? "the inner cage stops at the outer cage");
-    this.shown = this.after(share < 1 ? part(operation, share) : operation);
+    this.why = share >= 1 ? null : (this.last?.why ?? AT_OUTER_CAGE);
+    this.follow(operation, share);
   }
 
   /** Takes the server's answer over. */
@@ -74,7 +79,8 @@ export class Drag {
     this.last = { operation, part: message.part, why: message.why };
     if (message.seq !== this.seq) return;
     this.why = message.why;
-    const pivots = this.after(message.part < 1 ? part(operation, message.part) : operation);
+    this.follow(operation, message.part);
+    const pivots = this.shown;
     this.shown = {
       inner: { corners: message.inner, pivot: pivots.inner.pivot },
       deformed: { corners: message.deformed, pivot: pivots.deformed.pivot },
@@ -96,6 +102,11 @@ export class Drag {
     this.ended = true;
     this.shown = this.start;
     this.send({ type: "drag_cancel", drag: this.id });
+  }
+
+  private follow(operation: Operation, share: number): void {
+    this.followed = share < 1 ? part(operation, share) : operation;
+    this.shown = this.after(this.followed);
   }
 
   private get confined(): boolean {

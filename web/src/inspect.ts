@@ -14,7 +14,7 @@ export interface Inspector {
   readonly camera: { c2w: number[]; seq: number };
   /** Why the last drag stopped, what it was. */
   readonly drag: { id: number; seq: number; ended: boolean; why: string | null } | null;
-  /** Whether the last picture is final, and shows the camera as it is and no drag. */
+  /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag. */
   readonly settled: boolean;
   /** Milliseconds since a picture or a state came. */
   readonly quiet: number;
@@ -56,7 +56,10 @@ export function inspector(app: App): Inspector {
     },
     get settled() {
       const picture = app.lastPicture;
-      return app.drag === null && picture?.final === true && picture.drag === 0 && picture.camera === app.camera.seq;
+      const { state, view, before, split } = app.store.now;
+      if (app.drag !== null || picture === null || state === null || !app.camera.resting) return false;
+      const seen = picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
+      return picture.final && seen && picture.view === view && picture.before === before && picture.split === split;
     },
     get quiet() {
       return performance.now() - app.lastNews;

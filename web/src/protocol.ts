@@ -325,6 +325,7 @@ export interface Answer {
   normal: Vec3 | null;
   text: string | null;
   grid: Vec3[][];
+  failed: boolean;
 }
 /**
  * What became of a `drag`: `part` of the operation was followed; `why` where that is less than all.
@@ -408,6 +409,7 @@ export interface Notice {
 export interface State {
   type: "state";
   revision: number;
+  pictured: number;
   edits: EditState[];
   selected: number | null;
   history: string[];
@@ -434,6 +436,8 @@ export interface PictureHeader {
   seq: number;
   revision: number;
   view: "colour" | "depth" | "opacity" | "normals";
+  before: boolean;
+  split: number | null;
   x: number;
   y: number;
   width: number;

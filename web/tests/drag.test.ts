@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { Drag } from "../src/drag";
-import type { Vec3 } from "../src/protocol";
+import type { TranslateBy, Vec3 } from "../src/protocol";
 import { box, expectClose } from "./cages";
 import { FakeServer, edit } from "./fake_server";
 
@@ -26,6 +26,7 @@ describe("a drag", () => {
     const { drag } = begin();
     drag.move(by(1));
     expect(drag.shown.deformed.corners[1][0]).toBeCloseTo(0.8, 2);
+    expect((drag.followed as TranslateBy).by[0]).toBeCloseTo(0.5, 2);
     expect(drag.why).toMatch(/outer cage/);
     drag.move(by(0.4));
     expect(drag.why).toBeNull();

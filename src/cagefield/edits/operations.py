@@ -241,4 +241,4 @@ def _times(v: Triple, t: float) -> Triple:
 
 
 def _show(v: Triple) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
+    return "(" + ", ".join(f"{x + 0.0:.4g}" for x in v) + ")"  # no "-0"

@@ -87,15 +87,15 @@ def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | N
 
 
 def state_of(
-    session: Session, path: str, errors: dict[int, tuple[float, float]] | None = None
+    session: Session, path: str, pictured: int, errors: dict[int, tuple[float, float]]
 ) -> protocol.State:
-    """Everything that pages show of the edits, drags included."""
+    """Everything that pages show of the edits, drags included; `errors` of lattices by edit, where known."""
     document = session.shown
-    measured = errors or {}
     return protocol.State(
         revision=session.revision,
+        pictured=pictured,
         edits=[
-            edit_state(entry, session.problem(entry.edit), measured.get(entry.id))
+            edit_state(entry, session.problem(entry.edit), errors.get(entry.id))
             for entry in document.entries
         ],
         selected=session.selected,

@@ -11,7 +11,7 @@ from cagefield.errors import EditError
 from cagefield.keyframes import Keyframe
 
 COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
-"""Colours of cage pairs, given out in turn."""
+"""Colours of cage pairs."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,10 @@ class Document:
         loop: bool = False,
     ) -> Document:
         """The document of an edit stack, its edits numbered from 1."""
-        entries = tuple(
-            Entry(number, edit, COLOURS[(number - 1) % len(COLOURS)])
-            for number, edit in enumerate(edits, start=1)
-        )
-        return cls(entries, preserve_opacity, keys, loop)
+        document = cls((), preserve_opacity, keys, loop)
+        for number, edit in enumerate(edits, start=1):
+            document = document.insert(Entry(number, edit, document.next_colour))
+        return document
 
     @property
     def stack(self) -> EditStack:
@@ -72,6 +71,12 @@ class Document:
             replace(key, parts={places[name]: part for name, part in key.parts.items() if name in places})
             for key in self.keys
         )
+
+    @property
+    def next_colour(self) -> str:
+        """The first of the colours that the fewest entries have: the same edits in order get the same."""
+        taken = [entry.colour for entry in self.entries]
+        return min(COLOURS, key=taken.count)
 
     def place(self, number: int) -> int:
         """Where in the list the edit of that number is. Raises EditError where it is not there any more."""

@@ -20,7 +20,7 @@ POINTS = 33
 """Points of a line."""
 
 NODES = 25
-"""Lattice nodes along an axis at which the map is looked at."""
+"""Lattice nodes along an axis at which the map is looked at; an edit's own finer lattice shows no more."""
 
 ROUNDS = 30
 """Iterations of the inverse, damped by one half."""
@@ -33,7 +33,7 @@ def grid_lines(edit: Edit) -> list[list[list[float]]]:
     if edit.outer is None or edit.adjustment != "continuous":
         return []
     origin, frame = edit.outer.frame
-    stack = DeviceStack.from_stack(EditStack([edit]))
+    stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=NODES)]))
     axis = np.linspace(0.0, 1.0, NODES)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     at = (origin + nodes @ frame.T).astype(np.float32)

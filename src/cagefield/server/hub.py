@@ -50,6 +50,8 @@ class Hub:
         self._shown = self._what_is_shown()
         self._shown_revision = session.revision
         """The revision that `_shown` was taken from."""
+        self._pictured = session.revision
+        """The first revision that is shown as `_shown`."""
         self._pictures = 0
         self._trouble: str | None = None
 
@@ -108,7 +110,8 @@ class Hub:
 
     def state(self) -> protocol.State:
         """Everything that pages show of the edits."""
-        return state_of(self.session, str(self.keeper.path), self.chores.errors())
+        self._look_again()
+        return state_of(self.session, str(self.keeper.path), self._pictured, self.chores.errors())
 
     def changed(self, but: Page | None = None) -> None:
         """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
@@ -144,11 +147,7 @@ class Hub:
 
     def pump(self) -> None:
         """Has rendered what is new to see."""
-        shown = self._what_is_shown()
-        self._shown_revision = self.session.revision
-        if shown != self._shown:
-            self._shown = shown
-            self._pictures += 1
+        self._look_again()
         self.desk.scheduler.edits(self._pictures, bool(self.session.drags), time.monotonic())
         if not self.desk.scheduler.idle():
             self.desk.interrupt()
@@ -182,6 +181,14 @@ class Hub:
         """What may be done now that no page waits for anything."""
         return self.chores.next(self.desk.scheduler.generation)
 
+    def _look_again(self) -> None:
+        shown = self._what_is_shown()
+        self._shown_revision = self.session.revision
+        if shown != self._shown:
+            self._shown = shown
+            self._pictures += 1
+            self._pictured = self.session.revision
+
     def _measured(self) -> None:
         self.broadcast(self.state())
 
@@ -199,6 +206,8 @@ def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
         seq=stamp.seq,
         revision=stamp.revision,
         view=request.look.view,
+        before=request.look.before,
+        split=request.look.split,
         x=region.x,
         y=region.y,
         width=region.width,

@@ -13,7 +13,7 @@ from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
 from cagefield.keyframes import Still, stills
 from cagefield.server.document import Document
-from cagefield.server.moving import problem
+from cagefield.server.reasons import problem
 from cagefield.server.tasks import FrameTask, Shown, values_of
 
 What: TypeAlias = Literal["test_views", "camera_path"]

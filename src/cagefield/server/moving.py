@@ -16,6 +16,7 @@ from cagefield.edits.edit import largest_safe
 from cagefield.edits.operations import Operation, Triple
 from cagefield.errors import CagefieldError, EditError
 from cagefield.server.document import Entry
+from cagefield.server.reasons import INSIDE_OUT, cause, problem
 
 _ROUNDING = 1e-3
 """Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
@@ -83,8 +84,8 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
         raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
     try:
         whole = edit.replace(operations=joined(edit.operations, operation))
-    except CagefieldError as error:
-        why = _short(str(error))
+    except CagefieldError:
+        why = INSIDE_OUT
     else:
         found = problem(whole)
         if found is None or problem(edit) is not None:
@@ -97,11 +98,6 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
             return Moved(done, part, why)
         part -= _ROUNDING
     return Moved(edit, 0.0, why)
-
-
-def _short(message: str) -> str:
-    """An error's message without the edit's name."""
-    return message.split(": ", 1)[1] if message.startswith("edit") and ": " in message else message
 
 
 def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
@@ -121,9 +117,9 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
     if part >= 1.0:
         return Moved(at(1.0), problem=None if was_fine else problem(at(1.0)))
     try:
-        why = problem(at(1.0)) or "the cages would not fit together on the way there"
-    except CagefieldError as error:
-        why = _short(str(error))
+        why = cause(problem(at(1.0)) or "the cages would not fit together on the way there")
+    except CagefieldError:
+        why = INSIDE_OUT
     return Moved(at(part) if part > 0.0 else edit, part, why)
 
 
@@ -136,12 +132,3 @@ def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
         about = operation.apply(Cage(outer.corners, pivot=edit.inner.pivot))
         outer = Cage(about.corners)
     return edit.replace(inner=inner, outer=outer)
-
-
-def problem(edit: Edit) -> str | None:
-    """Why an edit cannot be shown, in a sentence with its cure, or None."""
-    try:
-        edit.check()
-    except CagefieldError as error:
-        return _short(str(error))
-    return None

@@ -385,6 +385,8 @@ class State(Message):
 
     type: Literal["state"] = "state"
     revision: int
+    pictured: int
+    """The first revision whose picture is that of this one."""
     edits: list[EditState]
     selected: EditId | None
     history: list[str]
@@ -421,6 +423,8 @@ class Answer(Message):
     text: str | None = None
     grid: list[list[Vec3]] = []
     """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
+    failed: bool = False
+    """True where it could not be found out; a notice says why."""
 
 
 class Notice(Message):
@@ -467,6 +471,8 @@ class PictureHeader(Message):
     """The drag, and its newest `seq`, that it shows; 0, 0 where none goes on."""
     revision: int
     view: View
+    before: bool
+    split: float | None
     x: int
     y: int
     width: int

@@ -48,7 +48,8 @@ def mirrored_operation(operation: Operation, axis: int) -> Operation:
         return operation
     if isinstance(operation, ops.Shear):
         name = "xyz"[axis]
-        values = {pair: -value if name in pair else value for pair, value in operation.factors.items()}
+        factors = operation.factors.items()
+        values = {pair: -value if name in pair and value else value for pair, value in factors}
         return ops.Shear(**values, axes=operation.axes)
     by = _flipped(operation.by, axis)
     if isinstance(operation, ops.MoveCorner):
@@ -67,7 +68,7 @@ def _other_face(face: str, axis: int) -> str:
 
 
 def _flipped(by: Triple, axis: int) -> Triple:
-    x, y, z = (-value if n == axis else value for n, value in enumerate(by))
+    x, y, z = (-value if n == axis and value else value for n, value in enumerate(by))
     return x, y, z
 
 

@@ -16,13 +16,14 @@ from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
 from cagefield.keyframes import Keyframe
-from cagefield.server.document import COLOURS, Document, Entry
+from cagefield.server.document import Document, Entry
 from cagefield.server.drags import Drags
 from cagefield.server.history import History
 from cagefield.server.kinds import Kind, with_kind, with_shell
-from cagefield.server.moving import Moved, Target, move, problem
+from cagefield.server.moving import Moved, Target, move
 from cagefield.server.naming import fresh_name, named, of
 from cagefield.server.placing import outer_around, pair_around
+from cagefield.server.reasons import problem
 from cagefield.server.reflecting import mirrored
 
 LATTICE = 64
@@ -244,7 +245,7 @@ class Session:
         edits = list(parse_edits(text, format=form, source="the text", check=False))
         document = self.document if append else replace(self.document, entries=())
         for edit in edits:
-            document = document.insert(self._entry(edit))
+            document = document.insert(self._entry(edit, document))
         self._push("Paste" if append else "Load edits", document)
         self.selected = document.entries[-1].id if document.entries else None
         return len(edits)
@@ -294,13 +295,13 @@ class Session:
             raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
         return entry
 
-    def _entry(self, edit: Edit) -> Entry:
+    def _entry(self, edit: Edit, document: Document) -> Entry:
         number = self._next
         self._next += 1
-        return Entry(number, edit, COLOURS[(number - 1) % len(COLOURS)])
+        return Entry(number, edit, document.next_colour)
 
     def _add(self, name: str, edit: Edit, at: int | None = None) -> int:
-        entry = self._entry(edit)
+        entry = self._entry(edit, self.document)
         self._push(name, self.document.insert(entry, at))
         self.selected = entry.id
         return entry.id

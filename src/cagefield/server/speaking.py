@@ -51,20 +51,24 @@ class Speaker:
         self._hub.presented(self._page, message.picture)
 
     async def _ask(self, message: protocol.Ask) -> None:
-        answer = protocol.Answer(request=message.request)
+        try:
+            answer = await self._answer(message)
+        except Exception:
+            self._page.outbox.put(protocol.Answer(request=message.request, failed=True))
+            raise
+        self._page.outbox.put(answer)
+
+    async def _answer(self, message: protocol.Ask) -> protocol.Answer:
         if message.what == "edit_text":
             if message.edit is None:
                 raise CagefieldError("choose an edit to copy")
-            answer = protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
-        elif message.what == "grid":
-            answer = protocol.Answer(request=message.request, grid=await self._grid(message.edit))
-        else:
-            found = await self._surface(message.x, message.y)
-            if found is not None:
-                answer = protocol.Answer(
-                    request=message.request, point=tuple(found[0]), normal=tuple(found[1])
-                )
-        self._page.outbox.put(answer)
+            return protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
+        if message.what == "grid":
+            return protocol.Answer(request=message.request, grid=await self._grid(message.edit))
+        found = await self._surface(message.x, message.y)
+        if found is None:
+            return protocol.Answer(request=message.request)
+        return protocol.Answer(request=message.request, point=tuple(found[0]), normal=tuple(found[1]))
 
     async def _grid(self, number: int | None) -> Any:
         if number is None:

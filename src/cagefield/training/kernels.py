@@ -307,6 +307,7 @@ def gauss_newton(
     colour_rate: qd.f32,
     largest_step: qd.f32,
     damping: qd.f32,
+    plain: qd.f32,
     K: qd.template(),
 ):
     """One diagonal Gauss-Newton step of every slot the batch touched; empties the accumulators.
@@ -314,7 +315,9 @@ def gauss_newton(
     state: [slots, 2] running sums of density and colour curvature, decayed on each touch.
     weight: [slots] the largest weight seen since the last pruning. cell: [slots] world-space voxel size h.
     The density moves by at most largest_step / h; `damping` is added to the colour curvature, and times h^2
-    to the density curvature.
+    to the density curvature. Coefficients c that make a colour depend on the view get the gradient of
+    plain/2 * c^2 for each unit of colour curvature: where photos from many sides say what they are it does
+    little, where they do not it keeps them small.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
@@ -349,7 +352,10 @@ def gauss_newton(
                     at = worker * record + slot * stride + HEAD + j
                     g += accumulator[at]
                     accumulator[at] = 0.0
-                sh[slot * (3 * K) + j] = sh[slot * (3 * K) + j] - rate * g
+                c = sh[slot * (3 * K) + j]
+                if qd.static(j >= 3):
+                    g += plain * h_colour * c
+                sh[slot * (3 * K) + j] = c - rate * g
 
 
 @qd.kernel

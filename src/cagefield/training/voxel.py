@@ -4,7 +4,8 @@ A run is a sequence of stages. Each stage is a grid: the stored vertices of the 
 largest weight they got in any training ray, cropped to what is left (bounded scenes) and refined. Within a
 stage, batches of pixel patches are marched (`kernels.march_batch`) and every voxel that they met is updated
 (`kernels.gauss_newton`). Patches that meet no occupied block any more are left out of the batches: their
-gradients are zero. At the end, specks are taken out of a bounded scene's field.
+gradients are zero. At the end, specks are taken out of a bounded scene's field, and
+what no photo showed of it is filled.
 
 On a CPU a run of given `steps` gives the same field for the same seed and number of threads.
 """
@@ -28,6 +29,7 @@ from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
+from cagefield.training.filling import filled
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress, Snapshots
 from cagefield.training.running import run_to_end
@@ -68,6 +70,8 @@ class VoxelConfig:
         damping: added to every curvature.
         largest_step: largest change of a voxel's optical depth in one step.
         smooth: weight of the Laplacian regularisation; None takes 2e-4, or 2e-3 for an unbounded capture.
+        plain: weight of a penalty on the colour's dependence on the view, relative to what the photos say:
+            what was seen from one side alone keeps its colour on the others, where it would take a wild one.
         prune: vertices whose largest weight stayed under this are dropped.
         step: distance between samples, in voxels.
         distortion: weight of mip-NeRF 360's distortion loss, against floaters.
@@ -88,6 +92,7 @@ class VoxelConfig:
     damping: float = 0.05
     largest_step: float = 0.3
     smooth: float | None = None
+    plain: float = 2e-2
     prune: float = 0.01
     step: float = 0.7
     exposure: bool | None = None
@@ -146,6 +151,8 @@ def train_voxel(
         DatasetError: no photos, or photos that cannot be read.
         CagefieldError: a checkpoint that cannot be read or was written with another configuration.
     """
+    from cagefield.training.unseen import unseen
+
     devices.start()
     run = _Run(dataset, config or VoxelConfig())
 
@@ -157,6 +164,8 @@ def train_voxel(
         run, checkpoint=checkpoint, resume=resume, on_progress=on_progress, after_step=snapshot
     )
     field = run.field()
+    if not field.contracted:
+        field = filled(field, unseen(field, [view.camera for view in dataset.train]))
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
@@ -428,6 +437,7 @@ class _Run:
             rate,
             config.largest_step,
             config.damping,
+            config.plain,
             grid.terms,
         )
         loss = float(losses.to_numpy().mean()) / 3.0

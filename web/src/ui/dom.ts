@@ -31,6 +31,11 @@ export function iconButton(node: IconNode, title: string, onclick: () => void, n
   return button;
 }
 
+/** A link with an icon that downloads a file. */
+export function iconLink(node: IconNode, title: string, href: string, download: string): HTMLAnchorElement {
+  return h("a", { class: "icon", title, href, download, ariaLabel: title }, icon(node));
+}
+
 export function section(title: string, ...children: (Node | null)[]): HTMLDetailsElement {
   return h("details", { class: "section", open: true }, h("summary", {}, title), ...children);
 }

@@ -34,10 +34,10 @@ function readout(app: App, pointer: Pointer): HTMLElement {
   label.hidden = true;
   app.stage.beforeFrame.push(() => {
     const { drag } = app;
-    const shown = drag !== null && !drag.ended && drag.operation !== null;
-    label.hidden = !shown;
-    if (!shown) return;
-    label.textContent = described(drag.operation!);
+    const followed = drag === null || drag.ended ? null : drag.followed;
+    label.hidden = followed === null;
+    if (drag === null || followed === null) return;
+    label.textContent = described(followed);
     label.classList.toggle("limit", drag.why !== null);
     const { width, height } = app.stage.points;
     const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);

@@ -1,10 +1,10 @@
 /** The camera path: keyframes, how far each edit has gone at them, playing, and rendering to a video. */
-import { Crosshair, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
+import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import { duration, viewAt } from "../path";
 import type { Key, Vec3 } from "../protocol";
-import { h, icon, iconButton, section } from "./dom";
+import { h, icon, iconButton, iconLink, section } from "./dom";
 
 export function pathList(app: App, actions: Actions, dialogs: { render: (what: "test_views" | "camera_path") => void }): HTMLElement {
   const list = h("ol", { class: "keys" });
@@ -18,6 +18,7 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   const play = iconButton(Play, "Play the path in this page", () => playing.toggle(), "play");
   const loop = iconButton(Repeat, "Back to the first keyframe: a loop", () => send(keys(), !app.store.now.state?.loop), "loop");
   const film = h("button", { type: "button", class: "text", onclick: () => dialogs.render("camera_path") }, "Render video…");
+  const file = iconLink(Download, "Download the camera path, as nerfstudio has it", `camera_path.json${location.search}`, "camera_path.json");
   const views = h("button", { type: "button", class: "text", onclick: () => dialogs.render("test_views") }, "Render test views…");
 
   app.store.watch(["state"], ({ state }) => {
@@ -53,12 +54,13 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
     const total = duration(state.keys, state.loop);
     length.textContent = state.keys.length === 0 ? "no keyframes" : `${total.toFixed(1)} s`;
     play.disabled = film.disabled = state.keys.length < 2;
+    file.hidden = state.keys.length === 0;
     loop.classList.toggle("on", state.loop);
   });
   playing.changed = (on) => play.replaceChildren(icon(on ? Square : Play));
   return section(
     "Camera path",
-    h("div", { class: "bar" }, iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"), play, loop, h("span", { class: "space" }), length),
+    h("div", { class: "bar" }, iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"), play, loop, file, h("span", { class: "space" }), length),
     list,
     h("div", { class: "bar" }, film, views),
   );
@@ -79,13 +81,13 @@ function player(app: App): { toggle: () => void; changed: (on: boolean) => void 
     const { state } = app.store.now;
     if (started === null || state === null) return;
     const seconds = (performance.now() - started) / 1000;
-    if (state.keys.length < 2 || (seconds > duration(state.keys, state.loop) && !state.loop)) {
-      self.toggle();
-      return;
+    const whole = duration(state.keys, state.loop);
+    if (whole > 0) {
+      const view = viewAt(state.keys, state.loop, state.loop ? seconds % whole : seconds);
+      look(app, view.c2w, view.fov_y_deg);
     }
-    const view = viewAt(state.keys, state.loop, seconds % Math.max(duration(state.keys, state.loop), 1e-3));
-    look(app, view.c2w, view.fov_y_deg);
-    requestAnimationFrame(step);
+    if (whole > 0 && (state.loop || seconds < whole)) requestAnimationFrame(step);
+    else self.toggle();
   }
   return self;
 }

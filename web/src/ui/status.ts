@@ -14,7 +14,7 @@ export function status(app: App): HTMLElement {
     const notice = now.notice;
     message.className = `message ${now.limit !== null ? "limit" : (notice?.level ?? "")}`;
     message.title = now.limit ?? notice?.text ?? "";
-    message.textContent = now.limit !== null ? `The drag stops here: ${now.limit.split(";")[0]}` : message.title;
+    message.textContent = now.limit !== null ? `The drag stops here: ${now.limit}` : message.title;
   });
   app.store.watch(["notice"], (now) => {
     clearTimeout(until);

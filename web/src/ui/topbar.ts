@@ -3,7 +3,7 @@ import { Camera, CircleQuestionMark, Columns2, Download, FolderOpen, Grid3x3, Pa
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import type { View } from "../store";
-import { h, icon, iconButton } from "./dom";
+import { h, iconButton, iconLink } from "./dom";
 
 const VIEWS: [View, string][] = [
   ["colour", "Colour"],
@@ -44,8 +44,12 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
     mode.textContent = now.mode === "set" ? "Set cages" : "Edit field";
     mode.dataset.mode = now.mode;
   });
-  const link = (node: typeof Download, title: string, href: string, download: string): HTMLAnchorElement =>
-    h("a", { class: "icon", title, href, download, ariaLabel: title }, icon(node));
+  const screenshot = iconLink(Camera, "Screenshot of the field", "screenshot.png", "screenshot.png");
+  app.store.watch(["hello"], ({ hello }) => {
+    const query = new URLSearchParams(location.search);
+    if (hello !== null) query.set("page", String(hello.page));
+    screenshot.search = query.toString();
+  });
   return h(
     "header",
     { class: "top" },
@@ -64,8 +68,8 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
       save,
       iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as"),
       iconButton(FolderOpen, "Load an edit file…", () => file.click(), "load"),
-      link(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
-      link(Camera, "Screenshot of the field", `screenshot.png${location.search}`, "screenshot.png"),
+      iconLink(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
+      screenshot,
     ),
     h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),
     file,

@@ -1,0 +1,28 @@
+"""Why cages cannot be where they are put, for who sees the editor: no numbers, and a cure that it has."""
+
+from __future__ import annotations
+
+from cagefield.edits import Edit
+from cagefield.errors import CagefieldError
+
+OUTSIDE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)"
+FOLDED = "the space between the cages would fold; enlarge the outer cage (Set mode), or choose the flow shell"
+CLOSE = "the inner cage is too close to the outer cage or bent too far; enlarge the outer cage (Set mode)"
+INSIDE_OUT = "the cage would turn inside out; keep its corners apart"
+
+
+def problem(edit: Edit) -> str | None:
+    """Why an edit cannot be shown, in a sentence with its cure, or None."""
+    try:
+        edit.check()
+    except CagefieldError:
+        outer = edit.outer
+        if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+            return OUTSIDE
+        return FOLDED if edit.shell == "trilinear" else CLOSE
+    return None
+
+
+def cause(reason: str) -> str:
+    """A reason without its cure."""
+    return reason.split(";")[0]

@@ -1,0 +1,21 @@
+"""What several test modules share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cagefield import Scene, load_dataset
+from cagefield.datasets.procedural import make_scene
+from cagefield.training.voxel import VoxelConfig, train_voxel
+
+
+@pytest.fixture(scope="session")
+def trained_digger(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scene folder of a digger, trained for seconds on 20 small photos; to be copied."""
+    folder = tmp_path_factory.mktemp("digger")
+    data = load_dataset(make_scene("digger", folder / "photos", views=20, size=80, test_views=1))
+    result = train_voxel(data, VoxelConfig(steps=120, resolution=64, batch_rays=2048))
+    Scene.trained(result, data).save(folder / "digger")
+    return folder / "digger"

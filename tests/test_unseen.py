@@ -1,0 +1,153 @@
+"""What no photo showed: found behind surfaces as the closed form says, filled as the surfaces around say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cagefield import devices
+from cagefield.cameras import Camera
+from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.renderer import Renderer
+from cagefield.training.filling import DEPTH, OPAQUE, filled
+from cagefield.training.unseen import LEAST_TRANSMITTANCE, unseen
+
+devices.start("cpu")
+
+N = 41
+BOUNDS = np.array([[-1.0] * 3, [1.0] * 3])
+VOXEL = 2.0 / (N - 1)
+
+
+def grid() -> np.ndarray:
+    axis = np.linspace(-1.0, 1.0, N)
+    return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+
+
+def field_of(density: np.ndarray, colour: np.ndarray, degree: int = 1) -> VoxelField:
+    """The field with density [N,N,N] and the same colour coefficients [N,N,N,3] in all directions."""
+    vertices = np.flatnonzero(density.reshape(-1) > 0)
+    sh = np.zeros((len(vertices), (degree + 1) ** 2, 3), np.float32)
+    sh[:, 0] = colour.reshape(-1, 3)[vertices]
+    return VoxelField(BOUNDS, density.shape, vertices, density.reshape(-1)[vertices], sh)
+
+
+def dense(field: VoxelField) -> tuple[np.ndarray, np.ndarray]:
+    """(density [N,N,N], constant colour coefficients [N,N,N,3])."""
+    density, colour = np.zeros(N**3, np.float32), np.zeros((N**3, 3), np.float32)
+    density[field.vertices], colour[field.vertices] = field.density, field.sh[:, 0]
+    return density.reshape(N, N, N), colour.reshape(N, N, N, 3)
+
+
+def ring(count: int = 12, height: float = 2.0) -> list[Camera]:
+    angles = 2 * np.pi * np.arange(count) / count
+    return [
+        Camera.look_at((3 * np.cos(a), 3 * np.sin(a), height), (0, 0, 0), width=96, height=96, fov_x=0.8)
+        for a in angles
+    ]
+
+
+@pytest.mark.parametrize("sigma", [8.0, 20.0])
+def test_behind_a_wall_photos_show_as_deep_as_its_light_comes(sigma: float) -> None:
+    p = grid()
+    density = np.where(p[..., 0] <= 0.5, sigma, 0.0).astype(np.float32)
+    # Head-on rays: T = exp(-sigma depth) falls under the least at depth = -ln(least) / sigma. The wall's
+    # front is a ramp of one voxel beyond 0.5, which counts as half a voxel.
+    camera = Camera.look_at((12.0, 0, 0), (0, 0, 0), width=160, height=160, fov_x=0.18, up=(0, 0, 1))
+    hidden = unseen(field_of(density, np.zeros((N, N, N, 3))), [camera])
+    shown_to = 0.5 + 0.5 * VOXEL + np.log(LEAST_TRANSMITTANCE) / sigma
+    middle = hidden[:, N // 2, N // 2]
+    x = np.linspace(-1, 1, N)
+    # A cell that is crossed shows its 8 vertices: the edge is one voxel behind the closed form, at most two.
+    assert not middle[x > shown_to - VOXEL + 1e-6].any()
+    assert middle[x < shown_to - 2.5 * VOXEL].all()
+
+
+def test_all_is_unseen_from_a_camera_that_looks_away() -> None:
+    density = np.ones((N, N, N), np.float32)
+    away = Camera.look_at((3, 0, 0), (6, 0, 0), width=16, height=16, fov_x=0.5)
+    field = field_of(density, np.zeros((N, N, N, 3)))
+    assert unseen(field, [away]).all()
+    assert not unseen(field, ring())[-1, N // 2].any()
+
+
+@pytest.fixture(scope="module")
+def ball() -> tuple[VoxelField, np.ndarray]:
+    """A ball, hollow as a trained one, and what is unseen of it: its colour runs from red to blue along x."""
+    p = grid()
+    r = np.linalg.norm(p, axis=-1)
+    density = np.where((r < 0.7) & (r > 0.55), 3.0 / VOXEL, 0.0).astype(np.float32)
+    share = (p[..., :1] + 1) / 2
+    colour = share * np.array([1.0, 0.0, -1.0]) + (1 - share) * np.array([-1.0, 0.0, 1.0])
+    field = field_of(density, colour.astype(np.float32))
+    return field, unseen(field, ring())
+
+
+def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
+    field, hidden = ball
+    after = filled(field, hidden)
+    (before_density, before_colour), (density, colour) = dense(field), dense(after)
+    np.testing.assert_array_equal(density[~hidden], before_density[~hidden])
+    np.testing.assert_array_equal(colour[~hidden], before_colour[~hidden])
+    for camera in ring(3):
+        one, two = (np.asarray(Renderer(f).render(camera, background="white").rgb) for f in (field, after))
+        # What is filled lies behind what leaves less than LEAST_TRANSMITTANCE of the light.
+        assert np.abs(one - two).max() < LEAST_TRANSMITTANCE
+        assert np.abs(one - two).mean() < 0.005
+
+
+def test_it_is_opaque_to_its_depth_and_no_deeper(ball) -> None:
+    field, hidden = ball
+    density, _ = dense(filled(field, hidden))
+    r = np.linalg.norm(grid(), axis=-1)
+    inside = hidden & (r < 0.5)
+    assert inside.any()
+    # Rays end at 0.65, one voxel into the shell; the nearest vertex there may be a cell's diagonal off.
+    near = inside & (r > 0.65 - (DEPTH - 3) * VOXEL)
+    assert near.any()
+    np.testing.assert_allclose(density[near], OPAQUE / VOXEL, rtol=1e-6)
+    far = inside & (r < 0.55 - (DEPTH + 1) * VOXEL)
+    assert far.any()
+    assert (density[far] == 0).all()
+
+
+def test_colours_go_on_from_the_surfaces_and_stay_between_them(ball) -> None:
+    field, hidden = ball
+    after = filled(field, hidden)
+    density, colour = dense(after)
+    new = hidden & (density > 0) & (np.linalg.norm(grid(), axis=-1) < 0.55)
+    given = field.sh[:, 0]
+    assert (colour[new] >= given.min(axis=0) - 1e-3).all()
+    assert (colour[new] <= given.max(axis=0) + 1e-3).all()
+    x = grid()[..., 0]
+    right, left = new & (x > 0.3), new & (x < -0.3)
+    # The shell there is (x + 1)/2 of the way from blue to red: above 0.25 right, under -0.25 left.
+    assert colour[right, 0].min() > 0.25
+    assert colour[left, 0].max() < -0.25
+    at = np.searchsorted(after.vertices, np.flatnonzero(new))
+    assert (after.sh[at, 1:] == 0).all()
+
+
+def test_under_a_block_the_ground_goes_on() -> None:
+    p = grid()
+    ground = p[..., 2] <= -0.5
+    block = (np.abs(p[..., :2]).max(axis=-1) <= 0.3) & (p[..., 2] > -0.5) & (p[..., 2] <= 0.3)
+    density = np.where(ground | block, 3.0 / VOXEL, 0.0).astype(np.float32)
+    colour = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
+    field = field_of(density, colour)
+    hidden = unseen(field, ring())
+    _, after = dense(filled(field, hidden))
+    k = int(np.argmin(np.abs(np.linspace(-1, 1, N) + 0.5))) - 1
+    under = hidden[:, :, k] & (np.abs(p[:, :, k, :2]).max(axis=-1) < 0.25)
+    assert under.any()
+    green, red = after[:, :, k][under][:, 1], after[:, :, k][under][:, 0]
+    # Two planes meet here: the ground's, and those of the block's sides, which end at it.
+    assert (green > red).all()
+    assert green.mean() > 0.7
+
+
+def test_nothing_unseen_and_nothing_solid_leave_the_field_as_it_is(ball) -> None:
+    field, _ = ball
+    assert filled(field, np.zeros(field.resolution, bool)) is field
+    mist = field_of(np.full((N, N, N), 1e-4, np.float32), np.zeros((N, N, N, 3), np.float32))
+    assert filled(mist, np.ones((N, N, N), bool)) is mist
