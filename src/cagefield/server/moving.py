@@ -87,7 +87,7 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
     except CagefieldError:
         why = INSIDE_OUT
     else:
-        found = whole.reason()
+        found = problem(whole)
         if found is None or problem(edit) is not None:
             return Moved(whole, problem=found)
         why = found
