@@ -1,6 +1,13 @@
 """Edits a field that cagefield has never seen: any PyTorch module, through the Field protocol.
 
-pip install 'cagefield[nerf]' && python examples/own_field.py edited.png
+    pip install 'cagefield[nerf]' && python examples/own_field.py edited.png
+
+writes two pictures of the same edit side by side: left the module itself, asked at every sample (any field
+can be rendered so, slowly), right the voxels that were baked from it (what the editor and `cagefield render`
+show).
+
+For a module of your own replace Torus, and in OwnField the box that holds the scene. Positions are in the
+module's own units, directions point from the camera into the scene, density is per unit of length.
 """
 
 import sys

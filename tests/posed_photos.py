@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from cagefield.cameras import Camera
 from cagefield.datasets import View
 
 POINT = np.array([0.15, -0.1, 0.2])
@@ -76,3 +78,43 @@ def assert_spot_is_where_the_camera_says(view: View, point=POINT) -> None:
     positions, depth = view.camera.project(np.asarray(point, dtype=float)[None])
     assert depth[0] > 0
     np.testing.assert_allclose((x, y), positions[0], atol=0.05)
+
+
+def save_llff(folder: Path, cameras: Sequence[Camera], photos: Sequence[np.ndarray], depths) -> None:
+    """An LLFF folder: photos uint8 [H,W,3] in `images`, poses_bounds.npy with one (near, far) for all."""
+    rows = []
+    for index, (camera, photo) in enumerate(zip(cameras, photos, strict=True)):
+        save(folder / "images" / f"{index:02}.png", photo)
+        right, up, back, eye = camera.c2w[:3].T
+        matrix = np.stack([-up, right, back, eye, (camera.height, camera.width, camera.fx)], axis=1)
+        rows.append(np.concatenate([matrix.ravel(), depths]))
+    np.save(folder / "poses_bounds.npy", np.array(rows))
+
+
+def photo_of_a_room(camera: Camera) -> np.ndarray:
+    """uint8 [H,W,3] of a ball of radius 1.5 at (0.5, 0, -6) before a wall z = -12 in soft stripes."""
+    origins, toward = (values.astype(np.float64) for values in camera.rays())
+    t = (-12.0 - origins[:, 2]) / np.where(toward[:, 2] < 0, toward[:, 2], -1e-9)
+    x, y, _ = (origins + t[:, None] * toward).T
+    rgb = 0.5 + 0.4 * np.stack([np.sin(0.5 * x), np.cos(0.4 * y), np.sin(0.3 * (x + y))], axis=1)
+    rgb[toward[:, 2] >= -1e-6] = 0.5
+    middle = origins - (0.5, 0.0, -6.0)
+    b = (middle * toward).sum(axis=1)
+    root = b**2 - (middle**2).sum(axis=1) + 1.5**2
+    hit = (root > 0) & (b < 0)
+    normal = (middle + (-b - np.sqrt(np.maximum(root, 0)))[:, None] * toward) / 1.5
+    rgb[hit] = (np.array([0.9, 0.3, 0.1]) * (0.6 + 0.4 * normal[:, 1:2]))[hit]
+    return np.rint(255 * rgb.clip(0, 1)).astype(np.uint8).reshape(camera.height, camera.width, 3)
+
+
+def room_capture(folder: Path, forward_facing: bool = True) -> Path:
+    """An LLFF capture of that room: nine cameras side by side, or nine on a half circle around the ball."""
+    places = [(x, y, 0.3 * x * y) for y in (-0.8, 0, 0.8) for x in (-1.0, 0, 1.0)]
+    if not forward_facing:
+        places = [(0.5 + 5 * np.sin(a), 0.0, -6 + 5 * np.cos(a)) for a in np.linspace(-1.5, 1.5, 9)]
+    target = (0.2, 0, -9.0) if forward_facing else (0.5, 0, -6.0)
+    cameras = [
+        Camera.look_at(place, target, up=(0, 1, 0), width=24, height=18, fov_x=1.0) for place in places
+    ]
+    save_llff(folder, cameras, [photo_of_a_room(camera) for camera in cameras], (3.5, 14.0))
+    return folder

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -119,17 +118,6 @@ def test_a_field_without_fine_samples_has_one_network(photos) -> None:
     assert result.field.fine is None
 
 
-def test_near_and_far_hold_the_box(photos) -> None:
-    dataset = load_dataset(photos)
-    near, far = training._depths(dataset)
-    box = dataset.bounds
-    rng = np.random.default_rng(0)
-    points = rng.uniform(box[0], box[1], (500, 3))
-    for view in dataset.train:
-        depth = (points - view.camera.origin) @ view.camera.forward
-        assert near <= depth.min() and depth.max() <= far
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -144,12 +132,6 @@ def test_near_and_far_hold_the_box(photos) -> None:
 def test_impossible_options_are_refused(options, message) -> None:
     with pytest.raises(CagefieldError, match=message):
         NerfConfig(**options)
-
-
-def test_an_unbounded_capture_is_refused(photos) -> None:
-    dataset = dataclasses.replace(load_dataset(photos), unbounded=True)
-    with pytest.raises(CagefieldError, match="is an unbounded capture"):
-        train_nerf(dataset, tiny())
 
 
 def test_no_views_have_no_psnr(photos) -> None:

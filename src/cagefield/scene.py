@@ -189,9 +189,6 @@ class Scene:
         "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
         sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference; where
         the scene has an original field, that one, by its own hierarchical sampling.
-
-        Raises:
-            SceneError: normals of an original field, which are not computed.
         """
         colour = self.background if background is None else background_rgb(background)
         if not exact:
@@ -223,14 +220,17 @@ class Scene:
     def _render_original(
         self, original: NerfField, camera: Camera, background: Background, normals: bool
     ) -> Frame:
-        if normals:
-            raise SceneError("normals of the original field are not computed; leave out normals, or exact")
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
         from cagefield.rendering.nerf import render_nerf
 
         edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
         return render_nerf(
-            original, camera, edits=edits, background=background, preserve_opacity=self.preserve_opacity
+            original,
+            camera,
+            edits=edits,
+            background=background,
+            preserve_opacity=self.preserve_opacity,
+            normals=normals,
         )
 
     @cached_property

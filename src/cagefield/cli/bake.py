@@ -51,7 +51,12 @@ class Bake:
         check_destination(destination, self.overwrite)
         devices.start(self.device)
         baked, figures = bake_scene(
-            scene.original, scene.cameras, scene.background, self.baking, edits=scene.edits
+            scene.original,
+            scene.cameras,
+            scene.background,
+            self.baking,
+            edits=scene.edits,
+            unbounded=scene.field.contracted,
         )
         baked.save(destination, overwrite=self.overwrite)
         print(f"{figures}\nscene written to {destination}")
@@ -64,26 +69,34 @@ def bake_scene(
     options: BakingOptions,
     *,
     edits: EditStack | None = None,
+    unbounded: bool = False,
 ) -> tuple[Scene, str]:
-    """The scene of a NeRF baked into voxels, with a progress bar on stderr, and a line of figures."""
+    """The scene of a NeRF baked into voxels, with a progress bar on stderr, and a line of figures.
+
+    Of an `unbounded` one what the cameras see is baked.
+    """
     import time
+    from functools import partial
 
     import numpy as np
 
     from cagefield.edits import EditStack
     from cagefield.fields.baking import bake
+    from cagefield.fields.seen import seen_by
     from cagefield.rendering.agreement import agreement
     from cagefield.scene import Scene
 
     began = time.perf_counter()
-    eyes = [camera.origin for group in cameras.values() for camera in group]
+    every = [camera for group in cameras.values() for camera in group]
+    near = original.near if original.ndc is None else 0.0
     with progress_bar("Baking") as move:
         voxels = bake(
             original,
             options.resolution,
             sh_degree=options.sh_degree,
-            eyes=np.array(eyes) if eyes else None,
-            contracted=original.ndc is not None,
+            eyes=np.array([camera.origin for camera in every]) if every else None,
+            contracted=unbounded,
+            seen=partial(seen_by, every, near=near) if unbounded and every else None,
             on_progress=lambda done: move(done, 1.0, ""),
         )
     seconds = time.perf_counter() - began

@@ -53,7 +53,13 @@ class ImportNerf:
         fov = None if self.fov_deg is None else math.radians(self.fov_deg)
         imported = import_nerf(found, settings, dataset, fov)
         devices.start(self.device)
-        scene, figures = bake_scene(imported.field, imported.cameras, imported.background, self.baking)
+        scene, figures = bake_scene(
+            imported.field,
+            imported.cameras,
+            imported.background,
+            self.baking,
+            unbounded=imported.field.ndc is not None,
+        )
         scene.save(self.out, overwrite=self.overwrite)
         step = "" if found.step is None else f", step {found.step}"
         print(f"{found.project}{step}: coarse {found.coarse}; fine {found.fine or 'none'}")

@@ -36,6 +36,8 @@ class Train:
     """voxel is what the editor shows; nerf is the original NeRF, needs PyTorch, and is baked at the end."""
     preset: Literal["auto", "paper", "small"] = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
+    ndc: Literal["auto", "on", "off"] = "auto"
+    """--field nerf in normalised device coordinates: auto where an LLFF or COLMAP capture looks one way."""
     training: Training = dataclasses.field(default_factory=TrainingOptions)
     device: Device = "auto"
     resume: Flag = False
@@ -86,6 +88,7 @@ class Train:
         config = (NerfConfig.small if small else NerfConfig)(
             steps=NerfConfig.steps if steps is None else steps,
             minutes=minutes if steps is None else None,
+            ndc={"auto": None, "on": True, "off": False}[self.ndc],
             seed=self.training.seed,
         )
         with progress_bar("Training") as move:
@@ -96,17 +99,19 @@ class Train:
                 resume=self.resume,
                 on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
             )
-        splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
+        moved = result.space.dataset
+        splits = {"train": moved.train, "test": moved.test, "val": moved.val}
         cameras = {name: tuple(view.camera for view in views) for name, views in splits.items() if views}
         scene, baked = bake_scene(
             result.field,
             cameras,
             (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
             BakingOptions(self.training.resolution),
+            unbounded=dataset.unbounded,
         )
         line = (
-            f"trained {result.seconds:.0f} s, {result.steps} steps, networks of {result.field.coarse}; "
-            f"train PSNR {result.train_psnr:.2f} dB"
+            f"trained {result.seconds:.0f} s, {result.steps} steps, networks of {result.field.coarse}, "
+            f"{result.space}; train PSNR {result.train_psnr:.2f} dB"
         )
         if result.test_psnr == result.test_psnr:
             line += f"; test PSNR {result.test_psnr:.2f} dB"

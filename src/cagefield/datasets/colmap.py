@@ -17,7 +17,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.colmap_files import check_whole
 from cagefield.datasets.llff import stored_camera, unbounded_capture
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
-from cagefield.datasets.region import cube_of_interest, levelling_rotation
+from cagefield.datasets.region import cube_of_interest, depths_of_points, levelling_rotation
 from cagefield.datasets.views import Dataset, View, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
@@ -76,8 +76,11 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         views.append(view.downscaled(factor // stored))
     report_missing(root, sorted(missing), len(images))
     points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3) @ levelling[:3, :3].T
-    bounds = cube_of_interest([view.camera for view in views], points=points)
-    return unbounded_capture(root, views, holdout, bounds, levelling)
+    seen_by = [view.camera for view in views]
+    bounds = cube_of_interest(seen_by, points=points)
+    found = depths_of_points(seen_by, points)
+    depths = None if found is None else (float(found[:, 0].min()), float(found[:, 1].max()))
+    return unbounded_capture(root, views, holdout, bounds, levelling, depths)
 
 
 def _read_model(folder: Path) -> tuple[Any, list[Any]]:

@@ -63,8 +63,9 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             raise DatasetError(f"{where}: {error}") from error
         view = View(photo.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
+    bounds = cube_of_interest([view.camera for view in views], rows[:, 15:])
     return unbounded_capture(
-        folder, views, holdout, cube_of_interest([view.camera for view in views], rows[:, 15:]), levelling
+        folder, views, holdout, bounds, levelling, (float(rows[:, 15].min()), float(rows[:, 16].max()))
     )
 
 
@@ -74,6 +75,7 @@ def unbounded_capture(
     holdout: int,
     bounds: npt.NDArray[np.float64],
     levelling: npt.NDArray[np.float64],
+    depths: tuple[float, float] | None,
 ) -> Dataset:
     """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
     train, test = hold_out(views, holdout)
@@ -87,6 +89,7 @@ def unbounded_capture(
         bounds=bounds,
         white_background=False,
         source_to_world=levelling,
+        depths=depths,
     )
 
 

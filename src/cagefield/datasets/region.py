@@ -83,7 +83,7 @@ def cube_of_interest(
     middle = origins.mean(axis=0)
     spread = float(np.median(np.linalg.norm(origins - middle, axis=1))) or 1.0
     if depths is None and points is not None:
-        depths = _depths_of_points(cameras, points)
+        depths = depths_of_points(cameras, points)
     point, conditioning = focus_point(origins, directions)
     if conditioning > (_PARALLEL if depths is None else _PARALLEL_WITH_DEPTHS):
         ahead = np.einsum("ni,ni->n", point - origins, directions)
@@ -107,7 +107,7 @@ def _cube(center: FloatArray, half: float) -> FloatArray:
     return np.stack([center - half, center + half])
 
 
-def _depths_of_points(cameras: Sequence[Camera], points: FloatArray) -> FloatArray | None:
+def depths_of_points(cameras: Sequence[Camera], points: FloatArray) -> FloatArray | None:
     """Near and far depths [N,2] of the points in each picture (1 % and 99 %); None where too few are seen."""
     sample = points[:: max(1, len(points) // 5000)]
     found = []

@@ -59,7 +59,8 @@ class Dataset:
     cube of interest: the inner box of a contraction. `white_background` says that the photos are cut-outs
     (RGBA), composited on white by convention. `source_to_world` [4,4] maps the coordinates of the
     reconstruction that the files came from to this data set's world: the levelling rotation for LLFF and
-    COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity.
+    COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity. `depths`
+    are the nearest and the farthest depth of content along the cameras' axes, where the reconstruction knows.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Dataset:
     bounds: FloatArray
     white_background: bool
     source_to_world: FloatArray = field(default_factory=_identity)
+    depths: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for name, shape in (("bounds", (2, 3)), ("source_to_world", (4, 4))):
@@ -81,6 +83,8 @@ class Dataset:
             object.__setattr__(self, name, array)
         if not np.all(self.bounds[0] < self.bounds[1]):
             raise DatasetError(f"bounds must grow from bounds[0] to bounds[1], got {self.bounds.tolist()}")
+        if self.depths is not None and not 0.0 < self.depths[0] < self.depths[1] < np.inf:
+            raise DatasetError(f"depths must be 0 < nearest < farthest, got {self.depths}")
         if not self.train:
             raise DatasetError(f"{self.path}: no training views; check the split")
 

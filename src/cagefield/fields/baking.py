@@ -51,6 +51,7 @@ def bake(
     views: int = 16,
     opacity: float = 2e-3,
     contracted: bool = False,
+    seen: Callable[[Float32], NDArray[np.bool_]] | None = None,
     seed: int = 0,
     on_progress: Callable[[float], None] | None = None,
 ) -> VoxelField:
@@ -62,6 +63,7 @@ def bake(
     - views: directions for each vertex.
     - opacity: vertices whose voxel absorbs less are empty.
     - contracted: bake all of space, with `bounds` as the box of interest.
+    - seen: True [N] for positions [N,3] that are worth baking; all are where left out.
 
     Raises:
         FieldError: options outside their range, infinite bounds, a field that is empty in them.
@@ -83,7 +85,7 @@ def bake(
         box = _content(density, box, opacity, lambda done: report(0.1 * done))
         grid = _Grid.within(box, resolution)
     least = -np.log1p(-opacity) / grid.edge
-    candidates = _candidates(density, grid, least, lambda done: report(0.1 + 0.2 * done))
+    candidates = _candidates(density, grid, least, seen, lambda done: report(0.1 + 0.2 * done))
     sigma = np.zeros(grid.shape, np.float32)
     sigma[candidates] = density(grid.positions(np.argwhere(candidates)))
     report(0.4)
@@ -173,14 +175,21 @@ def _content(density: _Density, box: Array, opacity: float, report: Callable[[fl
 
 
 def _candidates(
-    density: _Density, grid: _Grid, least: float, report: Callable[[float], None]
+    density: _Density,
+    grid: _Grid,
+    least: float,
+    seen: Callable[[Float32], NDArray[np.bool_]] | None,
+    report: Callable[[float], None],
 ) -> NDArray[np.bool_]:
-    """Vertices of the grid around those of every `_STEP`-th that hold density."""
+    """Vertices of the grid around those of every `_STEP`-th that hold density and are seen."""
     shape = tuple(-(-n // _STEP) for n in grid.shape)
     occupied = np.zeros(shape, bool)
     for index in _reported(shape[0], report):
-        plane = _plane(shape, index)
-        occupied[index] = (density(grid.positions(_STEP * plane)) > 0.5 * least).reshape(shape[1:])
+        positions = grid.positions(_STEP * _plane(shape, index))
+        look = np.ones(len(positions), bool) if seen is None else seen(positions)
+        holds = np.zeros(len(positions), bool)
+        holds[look] = density(positions[look]) > 0.5 * least
+        occupied[index] = holds.reshape(shape[1:])
     fine = grown(occupied)
     for axis in range(3):
         fine = np.repeat(fine, _STEP, axis=axis)

@@ -160,6 +160,17 @@ class TorchNerf:
         own, stretch = to_ndc(positions, viewdirs, self.field.ndc)
         return self.network.trunk(own)[0] * stretch
 
+    def density_gradient(self, positions: Tensor, viewdirs: Tensor) -> Tensor:
+        """Gradient [N,3] of `signed` by canonical position, world units, viewdirs kept; in chunks."""
+        block, parts = BLOCK.get(self.device.type, 1 << 16), []
+        for start in range(0, len(positions), block):
+            rows = slice(start, start + block)
+            with torch.enable_grad():
+                own = positions[rows].detach().requires_grad_()
+                total = self.signed(own, viewdirs[rows]).sum()
+                parts.append(torch.autograd.grad(total, own)[0])
+        return torch.cat(parts) if parts else torch.zeros_like(positions)
+
     def numpy_signed(self, positions: ArrayLike, viewdirs: ArrayLike) -> Float32:
         """`signed` as numpy arrays, in chunks."""
         p, d = self.tensor(positions), self.tensor(viewdirs)

@@ -10,7 +10,24 @@ from numpy.typing import NDArray
 
 @runtime_checkable
 class Field(Protocol):
-    """Density and colour of canonical space.
+    """Density and colour of canonical space: any object with `bounds` that can be called.
+
+        class Fog:
+            bounds = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+
+            def __call__(self, positions, viewdirs):
+                n = len(positions)
+                return np.full(n, 2.0, np.float32), np.full((n, 3), 0.5, np.float32)
+
+    It is asked at canonical positions, already taken through the edits: it need not know of them. Arrays are
+    numpy's, float32, N up to half a million in one call; split them where memory is short. A PyTorch module
+    is called under `torch.no_grad()` and its tensors handed back as `.cpu().numpy()`; `examples/own_field.py`
+    is a whole program. sigma is per world unit, absorption over a length s being 1 - exp(-sigma s): a module
+    that works in coordinates of its own, u = c x, must return c times its density.
+
+    `render_sampled(field, camera, edits=...)` renders any field, and `fields.baking.bake(field)` makes the
+    voxels for the fast renderer and the editor. A plain function works too, where `far` (or, to bake,
+    `bounds`) is given.
 
     A field may also have, for baking: `signed_density(positions, viewdirs)` [N], negative where it is empty,
     which keeps surfaces sharper than sigma does; and `seen_along(positions [N,3], viewdirs [N,K,3])`, the

@@ -17,19 +17,14 @@ from numpy.typing import NDArray
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets import Dataset
 from cagefield.datasets.llff import POSES_FILE
+from cagefield.datasets.nerf_worlds import Similarity, all_cameras, ndc_box, ndc_ratios, to_mean_camera
 from cagefield.errors import FieldError
 from cagefield.fields.nerf import NerfField
 from cagefield.formats.nerf_pytorch import Checkpoint
 from cagefield.formats.nerf_pytorch_config import Settings
 
-BOUND_FACTOR = 0.75
-"""nerf-pytorch scales a capture until this share of its nearest bound is 1."""
-
 BLENDER_FOV = 0.6911112070083618
 """Horizontal field of view of the NeRF-synthetic cameras, radians."""
-
-NDC_DEPTH = 6.0
-"""Depth to which the box of a forward-facing capture reaches, in near planes."""
 
 Cameras = dict[str, tuple[Camera, ...]]
 
@@ -59,16 +54,12 @@ def import_nerf(
     elif settings.ndc:
         cameras = _llff_cameras(dataset)
     else:
-        cameras = _cameras(dataset, np.eye(4), 1.0)
+        cameras = _cameras(dataset, Similarity(np.eye(4), 1.0))
     bounds = _bounds(settings, dataset)
     ndc = None
     if settings.ndc:
-        seen = next(group for group in cameras.values() if group)[0]
-        ndc = (seen.width / (2.0 * seen.fx), seen.height / (2.0 * seen.fy))
-        bounds = np.array(
-            [[-ndc[0] * NDC_DEPTH, -ndc[1] * NDC_DEPTH, -NDC_DEPTH],
-             [ndc[0] * NDC_DEPTH, ndc[1] * NDC_DEPTH, -1.0]]
-        )  # fmt: skip
+        ndc = ndc_ratios([camera for group in cameras.values() for camera in group])
+        bounds = ndc_box(ndc)
     field = NerfField(
         checkpoint.coarse,
         checkpoint.fine,
@@ -94,34 +85,23 @@ def _bounds(settings: Settings, dataset: Dataset | None) -> NDArray[np.float64]:
     return np.array([[-half] * 3, [half] * 3])
 
 
-def _cameras(dataset: Dataset, to_field: NDArray[np.float64], scale: float) -> Cameras:
-    """The data set's cameras after a rigid motion, their positions scaled first."""
-
-    def moved(camera: Camera) -> Camera:
-        pose = camera.c2w.copy()
-        pose[:3, 3] *= scale
-        return shifted(camera.with_c2w(to_field @ pose))
-
+def _cameras(dataset: Dataset, to_field: Similarity) -> Cameras:
+    """The data set's cameras in the field's world."""
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
-    return {name: tuple(moved(view.camera) for view in views) for name, views in splits.items() if views}
+    return {
+        name: tuple(shifted(to_field.camera(view.camera)) for view in views)
+        for name, views in splits.items()
+        if views
+    }
 
 
 def _llff_cameras(dataset: Dataset) -> Cameras:
-    file = dataset.path / POSES_FILE
-    if not file.is_file():
+    if not (dataset.path / POSES_FILE).is_file() or dataset.depths is None:
         raise FieldError(
             f"the checkpoint was trained in NDC, which needs the capture's depth bounds; {dataset.path} has "
             f"no {POSES_FILE}: give the LLFF folder it was trained on"
         )
-    near = float(np.load(file, allow_pickle=False)[:, 15].min())
-    scale = 1.0 / (near * BOUND_FACTOR)
-    poses = np.stack([view.camera.c2w for view in (*dataset.train, *dataset.test, *dataset.val)])
-    mean = np.eye(4)
-    mean[:3, 3] = scale * poses[:, :3, 3].mean(axis=0)
-    back = _unit(poses[:, :3, 2].sum(axis=0))
-    right = _unit(np.cross(poses[:, :3, 1].sum(axis=0), back))
-    mean[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
-    return _cameras(dataset, np.asarray(np.linalg.inv(mean), np.float64), scale)
+    return _cameras(dataset, to_mean_camera(all_cameras(dataset), dataset.depths[0]))
 
 
 def _guessed_cameras(settings: Settings, fov_x: float | None) -> Cameras:
@@ -145,7 +125,3 @@ def _guessed_cameras(settings: Settings, fov_x: float | None) -> Cameras:
         pose[:2, 3] = x, y
         cameras.append(Camera.from_fov(pose, 504, 378, fov_x))
     return {"train": tuple(cameras), "test": (cameras[4],)}
-
-
-def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(vector / np.linalg.norm(vector))

@@ -6,6 +6,9 @@ last one endless. Every sample's position and view direction go through the edit
 them; emptied samples have sigma 0. The coarse network's weights place the fine samples, so they gather where
 the edited scene is.
 
+Normals are -J^T g / |J^T g| at the samples, g the gradient of sigma by canonical position (automatic
+differentiation) and J the edits' Jacobian, weighted like the colour.
+
 Without edits the sums are those of nerf-pytorch for the same rays. Source: Mildenhall et al., "NeRF" (2020),
 sections 4 and 5.2; Li & Pan, section 3 (sample points are deformed).
 """
@@ -34,6 +37,9 @@ LAST_NDC = 1.0 - 1e-6
 LEAST_COSINE = 0.05
 """Rays further from the camera's axis are sampled as if they were this close to it."""
 
+NORMAL_WEIGHT = 1e-4
+"""Samples that contribute less than this to a pixel do not get a normal."""
+
 
 class Rays(NamedTuple):
     """Origins [N,3], unit directions [N,3] and cosines [N] to the camera's axis."""
@@ -57,12 +63,16 @@ class Rays(NamedTuple):
 
 
 class Sums(NamedTuple):
-    """Along rays: premultiplied rgb [N,3], opacity [N], sum of weights times distance [N], weights [N,S]."""
+    """Along rays: premultiplied rgb [N,3], opacity [N], sum of weights times distance [N].
+
+    Their samples have the weights [N,S] and the distances t [N,S].
+    """
 
     premultiplied: Tensor
     opacity: Tensor
     distance: Tensor
     weights: Tensor
+    t: Tensor
 
 
 @dataclass(frozen=True)
@@ -80,37 +90,65 @@ def render_nerf(
     background: Background = "white",
     chunk: int = 2048,
     preserve_opacity: bool = True,
+    normals: bool = False,
 ) -> Frame:
     """Frame of a NerfField seen by a camera through an edit stack, `chunk` rays at a time.
 
     `preserve_opacity` multiplies sigma by |J d|, which keeps optical depth under the edits' stretch.
     """
     rays = Rays.of(camera, field.torch.device)
-    premultiplied, opacity, depth = (
-        values.cpu().numpy() for values in trace(field.torch, rays, edits, chunk, preserve_opacity)
-    )
+    parts = _traced(field.torch, rays, edits, chunk, preserve_opacity, normals)
     shape = (camera.height, camera.width)
-    return Frame.from_premultiplied(
-        premultiplied.reshape(*shape, 3), opacity.reshape(shape), depth.reshape(shape), background=background
+    premultiplied, opacity, depth, normal = (
+        None if values is None else values.cpu().numpy().reshape(*shape, *values.shape[1:])
+        for values in parts
     )
+    return Frame.from_premultiplied(premultiplied, opacity, depth, normals=normal, background=background)
 
 
 def trace(
     field: TorchNerf, rays: Rays, edits: Any = None, chunk: int = 2048, preserve_opacity: bool = True
 ) -> tuple[Tensor, Tensor, Tensor]:
     """(premultiplied colour [N,3], opacity [N], depth [N]) of rays; depth is inf at opacity 0."""
+    return _traced(field, rays, edits, chunk, preserve_opacity, False)[:3]
+
+
+def _traced(
+    field: TorchNerf, rays: Rays, edits: Any, chunk: int, preserve_opacity: bool, normals: bool
+) -> tuple[Any, Any, Any, Any]:
+    """What `trace` returns, and normals [N,3] or None."""
     mapped = None
     if edits is not None and len(edits.active):
         mapped = TensorMap(edits, field.device, preserve_opacity=preserve_opacity)
     parts = []
     with torch.no_grad():
         for start in range(0, len(rays.origins), chunk):
-            _coarse, sums = march(field, rays.part(slice(start, start + chunk)), mapped)
+            some = rays.part(slice(start, start + chunk))
+            _coarse, sums = march(field, some, mapped)
             depth = sums.distance / sums.opacity.clamp_min(1e-10)
             depth = torch.where(sums.opacity > 1e-6, depth, torch.full_like(depth, float("inf")))
             parts.append((sums.premultiplied, sums.opacity, depth))
+            if normals:
+                parts[-1] += (_normals(field, some, sums, mapped),)
     columns = [torch.cat(column) for column in zip(*parts, strict=True)]
-    return columns[0], columns[1], columns[2]
+    return columns[0], columns[1], columns[2], columns[3] if normals else None
+
+
+def _normals(field: TorchNerf, rays: Rays, sums: Sums, mapped: TensorMap | None) -> Tensor:
+    """Unit normals [N,3] in deformed space, 0 where nothing is seen."""
+    seen = sums.weights > NORMAL_WEIGHT
+    rows = torch.nonzero(seen)[:, 0]
+    points = rays.origins[rows] + sums.t[seen][:, None] * rays.directions[rows]
+    viewdirs = rays.directions[rows]
+    if mapped is None:
+        slopes = field.density_gradient(points, viewdirs)
+    else:
+        canonical, along, _ = mapped(points, viewdirs)
+        slopes = (mapped.jacobian(points) * field.density_gradient(canonical, along)[:, :, None]).sum(dim=1)
+    # slopes far away in NDC are tiny
+    own = -torch.nn.functional.normalize(slopes, dim=1, eps=1e-30) * sums.weights[seen][:, None]
+    total = torch.zeros_like(rays.origins).index_add_(0, rows, own)
+    return torch.nn.functional.normalize(total, dim=1)
 
 
 def march(
@@ -207,4 +245,5 @@ def _integrate(
         weights.sum(dim=1),
         (weights * t).sum(dim=1),
         weights,
+        t,
     )

@@ -47,14 +47,23 @@ class TensorMap:
 
         Density is multiplied by the gain: 0 where a sample is emptied, else 1, or |J d| to preserve opacity.
         """
+        return self._mapped(points, viewdirs, self.preserve_opacity)
+
+    def jacobian(self, points: Any) -> Any:
+        """The map's Jacobian [N,3,3] at deformed points [N,3]; 0 where a sample is emptied."""
+        columns = []
+        for axis in torch.eye(3, device=self.device):
+            _, along, stretch = self._mapped(points, axis.expand(points.shape), True)
+            columns.append(along * stretch[:, None])
+        return torch.stack(columns, dim=2)
+
+    def _mapped(self, points: Any, viewdirs: Any, preserve_opacity: bool) -> tuple[Any, Any, Any]:
         devices.start()
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
         if len(samples):
             arguments = [values.numpy() if self._as_arrays else values for values in (samples, out)]
-            _map_tensors(
-                *arguments, self._params, self._lattice, self.count, self.flows, self.preserve_opacity
-            )
+            _map_tensors(*arguments, self._params, self._lattice, self.count, self.flows, preserve_opacity)
         return out[:, :3], out[:, 3:6], out[:, 6]
 
 

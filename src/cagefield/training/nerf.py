@@ -2,7 +2,9 @@
 
 Each step takes random rays of the training photos (in the first `precrop` steps from their middles), renders
 them with stratified samples, and descends on |C_coarse - C|^2 + |C_fine - C|^2 with Adam; the learning rate
-falls to a tenth over `decay` steps. Photos with alpha are composited on white.
+falls to a tenth over `decay` steps. Photos with alpha are composited on white. A batch's rays are of one
+photo, as nerf-pytorch's are for Blender scenes, or, of an unbounded capture, of PHOTOS photos; such a capture
+is moved to a world of its own first (see `training.nerf_space`), and its `precrop` is left out.
 
 On CUDA the networks run in bfloat16 where the device has it; weights, encodings and sums stay in float32.
 
@@ -28,6 +30,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.nerf import Linear, Mlp, NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.rendering.nerf import Jitter, Rays, march, trace
+from cagefield.training.nerf_space import Space, space_of
 from cagefield.training.running import run_to_end
 
 SKIP = 5
@@ -35,6 +38,9 @@ SKIP = 5
 
 GAIN = 0.1
 """The learning rate falls to this share over `decay` steps."""
+
+PHOTOS = 8
+"""Photos whose rays a batch of an unbounded capture holds."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +57,8 @@ class NerfConfig:
         rate: learning rate at the start.
         decay: steps over which it falls to a tenth; left out, `steps`, or as far as `minutes` got.
         precrop: steps in which rays are taken from the middle half of the photos.
-        noise: standard deviation of the noise on raw densities.
+        noise: standard deviation of the noise on raw densities; nerf-pytorch's LLFF scenes have 1.
+        ndc: train in normalised device coordinates; None does where they suit the capture.
         seed: of weights, rays and jitter.
         half: bfloat16 for the networks; None uses it on a GPU that has it.
     """
@@ -67,6 +74,7 @@ class NerfConfig:
     decay: int | None = None
     precrop: int = 500
     noise: float = 0.0
+    ndc: bool | None = None
     seed: int = 0
     half: bool | None = None
 
@@ -112,9 +120,13 @@ class NerfProgress:
 
 @dataclass(frozen=True, eq=False)
 class NerfResult:
-    """A trained field and its figures; PSNRs are means over views, NaN where there are none."""
+    """A trained field and its figures; PSNRs are means over views, NaN where there are none.
+
+    `space` holds the data set as the field's world has it, and says how rays were sampled.
+    """
 
     field: NerfField
+    space: Space
     steps: int
     seconds: float
     train_psnr: float
@@ -136,20 +148,17 @@ def train_nerf(
     is then False); `resume` goes on from it.
 
     Raises:
-        CagefieldError: an unbounded capture, or a checkpoint that cannot be read or has other options.
+        CagefieldError: NDC that do not suit the capture, or a checkpoint that cannot be read or has other
+            options.
     """
     run = _Run(dataset, config or NerfConfig())
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
-    some = dataset.train[:: max(1, len(dataset.train) // 4)]
-    return NerfResult(
-        field,
-        run.step,
-        run.seconds,
-        evaluate_nerf(field, some[:4]),
-        evaluate_nerf(field, dataset.test[:: max(1, len(dataset.test) // 4)][:4]),
-        finished,
+    train, test = (
+        evaluate_nerf(field, views[:: max(1, len(views) // 4)][:4])
+        for views in (run.dataset.train, run.dataset.test)
     )
+    return NerfResult(field, run.space, run.step, run.seconds, train, test, finished)
 
 
 def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500) -> float:
@@ -194,26 +203,23 @@ class _Run:
     """The state of one training run."""
 
     def __init__(self, dataset: Dataset, config: NerfConfig) -> None:
-        if dataset.unbounded:
-            raise CagefieldError(
-                f"{dataset.path} is an unbounded capture; --field nerf trains on bounded scenes, "
-                "train it with --field voxel"
-            )
-        self.config, self.dataset = config, dataset
+        self.config, self.space = config, space_of(dataset, config.ndc)
+        self.dataset = dataset = self.space.dataset
         self.device = torch_device()
         self.half = config.half
         if self.half is None:
             self.half = self.device.type == "cuda" and torch.cuda.is_bf16_supported()
         torch.manual_seed(config.seed)
         chance = np.random.default_rng(config.seed)
-        near, far = _depths(dataset)
         self.start = NerfField(
             initial_network(config, chance),
             initial_network(config, chance) if config.samples[1] else None,
             dataset.bounds,
-            near,
-            far,
+            self.space.near,
+            self.space.far,
             config.samples,
+            self.space.lindisp,
+            self.space.ndc,
         )
         self.torch = TorchNerf(self.start, self.device, trainable=True)
         self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)
@@ -253,19 +259,25 @@ class _Run:
         self.seconds += time.perf_counter() - began
 
     def _batch(self) -> tuple[Rays, Tensor]:
-        """Random rays of one photo, and the photo's colours [N,3] there."""
+        """Random rays of one photo or a few, and the photos' colours [N,3] there."""
         chance = np.random.default_rng((self.config.seed, self.step))
+        count, unbounded = self.config.batch_rays, self.dataset.unbounded
+        photos = min(PHOTOS, count) if unbounded else 1
+        middle = not unbounded and self.step < self.config.precrop
+        parts = [self._rays(chance, len(rows), middle) for rows in np.array_split(np.arange(count), photos)]
+        rays, targets = zip(*parts, strict=True)
+        return Rays(*(torch.cat(column) for column in zip(*rays, strict=True))), torch.cat(targets)
+
+    def _rays(self, chance: np.random.Generator, count: int, middle: bool) -> tuple[Rays, Tensor]:
+        """`count` rays of a random photo, or of its middle half, and the photo's colours there."""
         number = int(chance.integers(len(self.photos)))
         camera: Camera = self.dataset.train[number].camera
         columns, rows = camera.width, camera.height
-        low_i = low_j = 0
-        if self.step < self.config.precrop:
-            low_i, low_j = columns // 4, rows // 4
-        i = chance.integers(low_i, columns - low_i, self.config.batch_rays)
-        j = chance.integers(low_j, rows - low_j, self.config.batch_rays)
-        pixels = np.stack([i, j], axis=1)
+        low_i, low_j = (columns // 4, rows // 4) if middle else (0, 0)
+        i = chance.integers(low_i, columns - low_i, count)
+        j = chance.integers(low_j, rows - low_j, count)
         target = self.photos[number][torch.from_numpy(j).to(self.device), torch.from_numpy(i).to(self.device)]
-        return Rays.of(camera, self.device, pixels), target
+        return Rays.of(camera, self.device, np.stack([i, j], axis=1)), target
 
     def progress(self) -> NerfProgress:
         """Where the run stands."""
@@ -341,11 +353,3 @@ def _composited(view: View) -> np.ndarray[Any, np.dtype[np.float32]]:
     if photo.shape[2] == 4:
         return np.asarray(photo[..., :3] * photo[..., 3:] + (1.0 - photo[..., 3:]), np.float32)
     return photo
-
-
-def _depths(dataset: Dataset) -> tuple[float, float]:
-    """Planar depths between which the training cameras may see the box of the data set."""
-    corners = np.array([[dataset.bounds[b, a] for a, b in enumerate(bits)] for bits in np.ndindex(2, 2, 2)])
-    depths = np.concatenate([(corners - view.camera.origin) @ view.camera.forward for view in dataset.train])
-    nearest = max(float(depths.min()), 0.02 * float(depths.max()))
-    return nearest, float(depths.max())
