@@ -47,8 +47,6 @@ export class App {
   private placedAfter: number | null = null;
   /** When the figures below the picture were last set. */
   private figured = -Infinity;
-  /** When the reason for a stopped drag was last set. */
-  private limited = -Infinity;
 
   constructor(host: HTMLElement) {
     this.stage = new Stage(host);
@@ -110,17 +108,8 @@ export class App {
     if (this.drag === null) return;
     this.drag.move(operation);
     this.latency.moved(this.drag.id, this.drag.seq, time);
-    this.showLimit(this.drag.why);
+    this.store.set({ limit: this.drag.why });
     this.stage.invalidate();
-  }
-
-  /** Says why a drag stopped, at once; that it stopped elsewhere, a little later. */
-  private showLimit(why: string | null): void {
-    const { limit } = this.store.now;
-    const now = performance.now();
-    if (why !== null && limit !== null && now - this.limited < FIGURES_EVERY) return;
-    this.limited = now;
-    this.store.set({ limit: why });
   }
 
   endDrag(): void {
@@ -176,7 +165,7 @@ export class App {
         break;
       case "dragged":
         if (this.drag?.answered(message)) this.stage.invalidate();
-        if (this.drag && !this.drag.ended) this.showLimit(this.drag.why);
+        if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
         break;
       case "answer":
         this.questions.get(message.request)?.(message.failed ? null : message);

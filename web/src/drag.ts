@@ -8,11 +8,11 @@ import { extent, middle } from "./cage";
 import type { Corners, Dragged, EditState, PageMessage } from "./protocol";
 import type { Target } from "./store";
 
-/** What the server says, too, where a continuous edit is confined. */
-const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
-
 /** How far apart cages are that count as the same, as a share of their size. */
 const ROUNDING = 1e-5;
+
+/** What the server says, too, where a continuous edit is confined. */
+const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
 
 /** The cages of an edit, as they are shown. */
 export interface Cages {

@@ -1,7 +1,8 @@
 """The occupancy of an edited field, in deformed space.
 
-Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again, in two passes. A probe at a
-lattice point p maps it to canonical space and looks for an occupied cell within
+Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again. Where no edit is discrete,
+`smooth_occupancy` does it; else two passes. A probe at a lattice point p maps it to canonical space and looks
+for an occupied cell within
 
     r = |J|_inf * spacing / 2
 

@@ -12,12 +12,12 @@ INSIDE_OUT = "the cage would turn inside out; keep its corners apart"
 
 def problem(edit: Edit) -> str | None:
     """Why an edit cannot be shown, in a sentence with its cure, or None."""
-    if edit.reason() is not None:
-        outer = edit.outer
-        if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
-            return OUTSIDE
-        return FOLDED if edit.shell == "trilinear" else CLOSE
-    return None
+    if edit.is_possible:
+        return None
+    outer = edit.outer
+    if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+        return OUTSIDE
+    return FOLDED if edit.shell == "trilinear" else CLOSE
 
 
 def cause(reason: str) -> str:

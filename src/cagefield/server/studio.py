@@ -109,6 +109,9 @@ class Studio:
         if stage == 3:
             edit.lattice_error(samples=64)
             return
+        if stage == 4:
+            self.plain.with_edits(EditStack([Edit.delete(inner)]))
+            return
         renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
         if stage == 1:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius

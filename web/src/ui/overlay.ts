@@ -36,11 +36,18 @@ function readout(app: App, pointer: Pointer): HTMLElement {
   const label = h("div", { class: "readout" });
   label.hidden = true;
   let written = -Infinity;
+  let later: ReturnType<typeof setTimeout> | null = null;
   app.stage.beforeFrame.push(() => {
     const { drag } = app;
     const followed = drag === null || drag.ended ? null : drag.followed;
     const now = performance.now();
-    if (followed !== null && !label.hidden && app.stage.software && now - written < TEXT_EVERY) return;
+    if (followed !== null && !label.hidden && app.stage.software && now - written < TEXT_EVERY) {
+      later ??= setTimeout(() => {
+        later = null;
+        app.stage.invalidate();
+      }, TEXT_EVERY);
+      return;
+    }
     written = now;
     label.hidden = followed === null;
     if (drag === null || followed === null) return;
