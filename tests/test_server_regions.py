@@ -85,6 +85,7 @@ class Played:
         self.rng = np.random.default_rng(seed)
         self.rects: dict[int, Rect] = {}
         self.canvas = np.full((SIDE, SIDE), -1)
+        self.fine = np.zeros((SIDE, SIDE), bool)
         self.showing = Showing()
         self.view = "first"
         self.revision = 0
@@ -110,9 +111,12 @@ class Played:
         high = low + self.rng.integers(1, 9, 2) / SIDE
         self.rects[self.revision] = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
 
-    def paint(self, part: tuple[int, int, int, int]) -> None:
+    def paint(self, part: tuple[int, int, int, int], fine: bool) -> Rect:
+        """The area painted with the revision as it is."""
         x, y, w, h = part
         self.canvas[y : y + h, x : x + w] = self.picture(self.revision)[y : y + h, x : x + w]
+        self.fine[y : y + h, x : x + w] = fine
+        return x / SIDE, y / SIDE, (x + w) / SIDE, (y + h) / SIDE
 
 
 EVENTS = {"edit": 0.4, "moving": 0.35, "rest": 0.1, "broken off": 0.11, "view": 0.02, "lost": 0.02}
@@ -136,24 +140,26 @@ def test_a_page_shows_what_it_should_once_what_it_wants_is_drawn(seed: int) -> N
             continue
         view, showing = played.view, played.showing
         exact = event != "moving"
-        rect = showing.wanting(1, view, played.revision, played.differing)
-        part = pixels(rect, SIDE, SIDE)
-        if exact and not showing.exact:
-            part = (0, 0, SIDE, SIDE)
+        rect = showing.wanting(1, view, played.revision, played.differing, exact=exact)
+        # Moving pictures have fewer pixels, and a part's edges lie further out then.
+        coarseness = 1 if exact else int(played.rng.choice([1, 2, 4]))
+        x, y, w, h = (coarseness * n for n in pixels(rect, SIDE // coarseness, SIDE // coarseness))
+        part = x, y, w, h
         whole = part == (0, 0, SIDE, SIDE)
         parts += not whole
         pieces = tiles(part, 4) if exact else [part]
         if event == "broken off":
             pieces = pieces[: len(pieces) // 2]
             for piece in pieces:
-                played.paint(piece)
-                showing.drawn(view, played.revision, whole=False, all_wanting=False, exact=exact)
+                area = played.paint(piece, exact)
+                showing.drawn(view, played.revision, area, whole=False, all_wanting=False, exact=exact)
             continue
         for number, piece in enumerate(pieces, start=1):
-            played.paint(piece)
+            area = played.paint(piece, exact)
             last = number == len(pieces)
-            showing.drawn(view, played.revision, whole=whole and last, all_wanting=last, exact=exact)
+            showing.drawn(view, played.revision, area, whole=whole and last, all_wanting=last, exact=exact)
         assert np.array_equal(played.canvas, played.picture(played.revision))
+        assert played.fine.all() or not exact
     assert parts > 20
 
 

@@ -3,7 +3,8 @@
 A page draws what arrives over what is there. After a whole picture, its *base*, it shows the base everywhere,
 but where later pictures of parts were drawn; those show other revisions of the edits, the *later* ones. What
 two revisions show is the same outside a rectangle. So to show a revision it is enough to render what differs
-between the base and that one, and between the base and each of the later ones.
+between the base and that one, and between the base and each of the later ones. At rest what was drawn
+coarsely is drawn anew, too.
 """
 
 from __future__ import annotations
@@ -101,32 +102,47 @@ def tiles(part: tuple[int, int, int, int], count: float) -> list[tuple[int, int,
 
 @dataclass
 class Showing:
-    """What a page shows: a view (camera and look), the base's revision, and the later ones."""
+    """What a page shows: a view (camera and look), the base's revision, and the later ones.
+
+    `coarse` is where it was drawn coarsely since the base.
+    """
 
     view: object = None
     base: int | None = None
     exact: bool = False
     """Whether the base is as fine as it can be."""
     later: set[int] = field(default_factory=set)
+    coarse: Rect | None = None
 
-    def wanting(self, page: int, view: object, revision: int, differing: Differing) -> Rect | None:
-        """Where the page must be drawn anew to show a revision in a view; None for nowhere."""
-        if self.base is None or view != self.view:
+    def wanting(
+        self, page: int, view: object, revision: int, differing: Differing, *, exact: bool = False
+    ) -> Rect | None:
+        """Where the page must be drawn anew to show a revision in a view; None for nowhere.
+
+        With `exact`, to show it as fine as can be.
+        """
+        if self.base is None or view != self.view or (exact and not self.exact):
             return WHOLE
-        found: Rect | None = None
+        found = self.coarse if exact else None
         for other in (revision, *self.later):
             if other != self.base:
                 found = joined(found, differing(page, self.base, other))
         return found
 
-    def drawn(self, view: object, revision: int, *, whole: bool, all_wanting: bool, exact: bool) -> None:
-        """A picture was drawn: the `whole` one, or `all_wanting` (the last part of `wanting`), or less."""
+    def drawn(
+        self, view: object, revision: int, area: Rect, *, whole: bool, all_wanting: bool, exact: bool
+    ) -> None:
+        """A picture was drawn in an area: the `whole` one, `all_wanting` (the last part of it), or less."""
         if whole:
-            self.view, self.base, self.exact, self.later = view, revision, exact, set()
-        elif view != self.view or self.base is None:
+            self.view, self.base, self.exact, self.later, self.coarse = view, revision, exact, set(), None
+            return
+        if view != self.view or self.base is None:
             self.base = None
-        elif all_wanting and exact and self.exact:
-            self.base, self.later = revision, set()
+            return
+        if not exact:
+            self.coarse = joined(self.coarse, area)
+        if all_wanting and exact and self.exact:
+            self.base, self.later, self.coarse = revision, set(), None
         elif all_wanting:
             self.later = {revision} - {self.base}
         else:

@@ -20,7 +20,7 @@ from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixel
 MOST_UNSHOWN = 2
 """Pictures sent and not yet shown, at most, per page."""
 
-MOVING_SECONDS = 0.045
+MOVING_SECONDS = 0.05
 """Time that a picture may take while something moves."""
 
 TILE_SECONDS = 0.25
@@ -153,14 +153,14 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends the picture at full resolution comes at once.
+        Where a drag ends with what is shown already, or on a fine picture, the fine one comes at once.
         """
         if revision == self._revision and dragging == self._dragging:
             return
-        let_go = self._dragging and not dragging
+        let_go, same = self._dragging and not dragging, revision == self._revision
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
-            was_shown = p.shown_version == p.version
+            was_shown = same and p.shown_version == p.version
             self._changed(page, now)
             if let_go and (was_shown or p.showing.exact):
                 p.shown_version, p.changed = p.version, -math.inf
@@ -187,6 +187,12 @@ class Scheduler:
             page.showing.drawn(
                 (request.camera, request.look),
                 request.revision,
+                (
+                    region.x / region.full_width,
+                    region.y / region.full_height,
+                    (region.x + region.width) / region.full_width,
+                    (region.y + region.height) / region.full_height,
+                ),
                 whole=whole or (request.complete and page.whole and not request.moving),
                 all_wanting=request.complete,
                 exact=request.exact,
@@ -310,10 +316,9 @@ class Scheduler:
     def _cut(self, page: int, exact: bool) -> None:
         """Cuts what of the view is not as it should be into tiles of about TILE_SECONDS."""
         p = self._pages[page]
-        rect = p.showing.wanting(page, (p.camera, p.look), self._revision, self._differing)
+        view = p.camera, p.look
+        rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
         part = pixels(rect, p.width, p.height)
-        if not p.showing.exact and exact:
-            part = (0, 0, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)
         count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)
         p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
