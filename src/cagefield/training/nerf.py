@@ -57,7 +57,8 @@ class NerfConfig:
         rate: learning rate at the start.
         decay: steps over which it falls to a tenth; left out, `steps`, or as far as `minutes` got.
         precrop: steps in which rays are taken from the middle half of the photos.
-        noise: standard deviation of the noise on raw densities; nerf-pytorch's LLFF scenes have 1.
+        noise: standard deviation of the noise on raw densities; None takes nerf-pytorch's, 1 for a capture
+            without bounds, which without it may end empty (density below its ReLU everywhere), else 0.
         ndc: train in normalised device coordinates; None does where they suit the capture.
         seed: of weights, rays and jitter.
         half: bfloat16 for the networks; None uses it on a GPU that has it.
@@ -73,7 +74,7 @@ class NerfConfig:
     rate: float = 5e-4
     decay: int | None = None
     precrop: int = 500
-    noise: float = 0.0
+    noise: float | None = None
     ndc: bool | None = None
     seed: int = 0
     half: bool | None = None
@@ -211,6 +212,8 @@ class _Run:
             self.half = self.device.type == "cuda" and torch.cuda.is_bf16_supported()
         torch.manual_seed(config.seed)
         chance = np.random.default_rng(config.seed)
+        noise = (1.0 if dataset.unbounded else 0.0) if config.noise is None else config.noise
+        self.jitter = Jitter(noise)
         self.start = NerfField(
             initial_network(config, chance),
             initial_network(config, chance) if config.samples[1] else None,
@@ -243,7 +246,7 @@ class _Run:
             group["lr"] = config.rate * GAIN**passed
         rays, target = self._batch()
         with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.half):
-            coarse, fine = march(self.torch, rays, jitter=Jitter(config.noise))
+            coarse, fine = march(self.torch, rays, jitter=self.jitter)
         behind = 1.0 if self.white else 0.0
         errors = [
             ((sums.premultiplied + behind * (1.0 - sums.opacity[:, None]) - target) ** 2).mean()
