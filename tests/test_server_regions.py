@@ -230,6 +230,19 @@ def test_another_view_is_rendered_as_a_whole(what: str) -> None:
     assert share(bench.all()[:1]) < 0.16
 
 
+def test_revisions_that_a_page_may_show_are_remembered() -> None:
+    bench = Bench()
+    bench.all()
+    bench.scheduler.edits(1, True, bench.now)
+    request = bench.scheduler.next(bench.now)
+    assert request is not None and request.revision == 1
+    for revision in (2, 3):
+        bench.scheduler.edits(revision, True, bench.now)
+        assert bench.scheduler.remembered() == {0, 1, revision}
+    bench.scheduler.finished(request, 1000, 0.01, 0.0)
+    assert bench.scheduler.remembered() == {0, 1, 3}
+
+
 # ---- pictures ----
 
 

@@ -244,6 +244,8 @@ class Scheduler:
     def remembered(self) -> set[int]:
         """The revisions that `differing` may still be asked about."""
         found = {self._revision}
+        if self._running is not None:
+            found.add(self._running[0].revision)
         for p in self._pages.values():
             found |= p.showing.later | ({p.showing.base} if p.showing.base is not None else set())
         return found
