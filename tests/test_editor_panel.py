@@ -485,10 +485,10 @@ def test_a_camera_path_is_recorded_played_and_rendered(editor: EditorPage, folde
 def render(editor: EditorPage, out: Path, width: int, height: int, fps: int) -> None:
     """Answers the question that "Render video" asks."""
     editor.page.click("text=Render video…")
-    fields = editor.page.locator("dialog input")
+    fields = editor.page.locator("dialog[open] input")
     for n, value in enumerate((out, width, height, fps)):
         fields.nth(n).fill(str(value))
-    editor.page.click("dialog .primary")
+    editor.page.click("dialog[open] .primary")
 
 
 def read_video(path: Path) -> list[NDArray[np.float64]]:
@@ -508,12 +508,12 @@ def test_save_as_goes_on_with_the_new_folder(editor: EditorPage, folder: Path) -
     shutil.copytree(folder / "digger", folder / "second")
     for overwrite in (False, True):
         editor.press("Control+Shift+S")
-        page.locator('dialog input[type="text"]').fill(str(folder / "second"))
-        page.locator('dialog input[type="checkbox"]').set_checked(overwrite)
+        page.locator('dialog[open] input[type="text"]').fill(str(folder / "second"))
+        page.locator('dialog[open] input[type="checkbox"]').set_checked(overwrite)
         if overwrite:
-            editor.changed(lambda: page.click("dialog .primary"))
+            editor.changed(lambda: page.click("dialog[open] .primary"))
         else:
-            page.click("dialog .primary")
+            page.click("dialog[open] .primary")
             editor.said("choose to overwrite")
             assert not editor.state["saved"] and editor.state["path"] == str(folder / "digger")
     assert editor.state["saved"] and editor.state["path"] == str(folder / "second")
