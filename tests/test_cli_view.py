@@ -40,6 +40,28 @@ def test_a_missing_scene_is_one_line(capsys: pytest.CaptureFixture[str], tmp_pat
 
 
 @pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        (
+            "edits.yaml",
+            "version: 1\nedits:\n  - inner: {center: [.nan, 0, 0], size: 1}\n",
+            "numbers must be finite",
+        ),
+        ("camera_path.json", "{", "holds no camera path's keyframes"),
+        ("field.safetensors", "cut off", "it may be truncated"),
+        ("scene.json", "{}", "give a scene folder"),
+        ("cameras.json", "{", "is not readable JSON"),
+    ],
+)
+def test_a_damaged_scene_is_one_line_that_names_the_file(
+    capsys: pytest.CaptureFixture[str], scene: Path, file: str, content: str, message: str
+) -> None:
+    (scene / file).write_text(content)
+    line = refused(capsys, "view", scene, "--no-browser", "--port", "0")
+    assert message in line and str(scene / file) in line
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         (("--port", "70000"), "--port is 70000; give a number from 0 to 65535"),

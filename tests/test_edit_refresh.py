@@ -107,15 +107,15 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int
 
 
 def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.rendering import deformed_occupancy
+    from cagefield.rendering import smooth_occupancy
     from cagefield.warps import flow_lattice
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
         start = Renderer(field(), stack)
         counts = [
             counted(monkeypatch, flow_lattice, "sample"),
-            counted(monkeypatch, deformed_occupancy, "_corners"),
-            counted(monkeypatch, deformed_occupancy, "_refined"),
+            counted(monkeypatch, smooth_occupancy, "_images"),
+            counted(monkeypatch, smooth_occupancy, "_refined"),
         ]
         # Another edit each time: an equal one would find its lattice there.
         start.with_edits(stack.set(number, stack[number].translate((0.01 * len(stack), 0, 0))))
@@ -124,8 +124,9 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
     alone, chain = work(EditStack([small(4)]), 0), work(APART, 4)
     assert chain[0] == alone[0] == [3 * 8**3]
-    # Occupancy: as many corners probed; how many blocks pass depends on the little that differs.
-    assert chain[1] == alone[1] and len(chain[1]) == 1
+    # Occupancy: as many points mapped, first for bricks, then for blocks; how many of those pass depends on
+    # the little that differs.
+    assert chain[1] == alone[1] and len(chain[1]) == 2
     assert sum(chain[2]) == pytest.approx(sum(alone[2]), rel=0.1)
 
 
@@ -142,3 +143,38 @@ def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> Non
     others = [n for n in range(10) if n != 6]
     before, after = (stack.lattice.reshape(10, -1) for stack in (packed, again))
     assert np.array_equal(before[others], after[others]) and not np.array_equal(before[6], after[6])
+
+
+@pytest.mark.parametrize("place", [0, 6, 9])
+def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
+    monkeypatch: pytest.MonkeyPatch, place: int
+) -> None:
+    from cagefield.rendering import smooth_occupancy
+
+    mapped: list[tuple[int, int]] = []
+    images = smooth_occupancy._images
+
+    def counting(grid: Any, stack: Any, *rest: Any) -> Any:
+        found = images(grid, stack, *rest)
+        mapped.append((stack.n_edits, len(found)))
+        return found
+
+    def drag(stack: EditStack, number: int) -> tuple[Renderer, list[tuple[int, int]]]:
+        renderer = Renderer(field(), stack).with_edits(stack, coarse=True)
+        for step in range(1, 4):
+            mapped.clear()
+            moved = stack[number].translate((0.01 * step, 0.02 * step, 0))
+            renderer = renderer.with_edits(stack.set(number, moved), coarse=True)
+        return renderer, list(mapped)
+
+    monkeypatch.setattr(smooth_occupancy, "_images", counting)
+    chain = EditStack(HALF.rotate((0, 0, 0.02 * number)) for number in range(10))
+    _, alone = drag(EditStack([HALF]), 0)
+    quick, together = drag(chain, place)
+    assert alone == together and alone[0][0] == 1 and len(alone) == 1
+    # It holds what all ten, looked at closely, hold; and is not much larger than what they hold by bricks.
+    fine = Renderer(field(), quick.edits)._occupancy
+    whole = Renderer(field(), EditStack([])).with_edits(quick.edits, coarse=True)._occupancy
+    np.testing.assert_array_equal(fine.origin, quick._occupancy.origin)
+    assert not (fine.blocks & ~quick._occupancy.blocks).any()
+    assert quick._occupancy.blocks.sum() < 1.6 * whole.blocks.sum()

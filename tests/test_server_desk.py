@@ -12,6 +12,7 @@ from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.server import desk as module
 from cagefield.server.desk import RESTARTS, Chore, Desk, Stamp
+from cagefield.server.regions import WHOLE, Rect
 from cagefield.server.scheduler import Request
 from cagefield.server.tasks import (
     Answered,
@@ -73,6 +74,9 @@ class PlayedOffice:
             generation,
         )
         return task, Stamp(1)
+
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        return WHOLE
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         self.delivered.append(request.number)

@@ -3,13 +3,12 @@
     python docs/tutorial/pictures.py digger SCENE
     python docs/tutorial/pictures.py chair SCENE
 
-SCENE is the built-in digger, or the chair of NeRF's synthetic scenes, trained; it is copied first and left as it
-is. Cages are pasted as text; everything else is done with the mouse.
+SCENE is the built-in digger, or the chair of NeRF's synthetic scenes, trained; it is copied first and left as
+it is. Cages are pasted as text; everything else is done with the mouse.
 """
 
 from __future__ import annotations
 
-import re
 import shutil
 import sys
 import tempfile
@@ -141,7 +140,7 @@ def turned(editor: EditorPage, by: Point) -> None:
 
 
 def dragged(editor: EditorPage, grip: str, towards: Point, *, axis: int, by: float) -> None:
-    """Drags a handle of the gizmo, snapping, until the number beside the mouse is reached.
+    """Drags a handle of the gizmo, snapping, until the operation's number is reached.
 
     Where that number moves away from it, the mouse goes the other way.
     """
@@ -164,9 +163,9 @@ def dragged(editor: EditorPage, grip: str, towards: Point, *, axis: int, by: flo
 
 
 def number(editor: EditorPage, axis: int) -> float:
-    """A number of those beside the mouse, 0 before there are any."""
-    found = re.findall(r"-?\d+(?:\.\d+)?", editor.page.text_content(".readout") or "")
-    return float(found[axis]) if len(found) == 3 else 0.0
+    """A number of the drag's operation, 0 before there is one."""
+    operation = editor.page.evaluate("cagefield.drag?.followed") or {}
+    return float(operation.get("rotation_deg", operation.get("by", [0, 0, 0]))[axis])
 
 
 if __name__ == "__main__":

@@ -289,6 +289,12 @@ def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -
     """Signed distance of p from the bilinear face with corners `ids`, along its normal nearest to p."""
     v = cage.corners[list(ids)]
     axis = next(a for a in range(3) if len({k >> a & 1 for k in ids}) == 1)
+    # The face's two directions taken in cyclic order span the axis' positive normal; y has them swapped.
+    sign = outward if axis != 1 else -outward
+    normal = np.cross(v[3] - v[0], v[2] - v[1])
+    size = float(np.linalg.norm(normal))
+    if abs(float((v[1] - v[0]) @ normal)) <= 1e-9 * size**1.5:
+        return sign * float((p - v[0]) @ normal) / size
     a, b = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9))
     s, t = a.ravel(), b.ravel()
     grid = np.outer((1 - s) * (1 - t), v[0]) + np.outer(s * (1 - t), v[1])
@@ -299,10 +305,12 @@ def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -
         ds = (1 - st[1]) * (v[1] - v[0]) + st[1] * (v[3] - v[2])
         dt = (1 - st[0]) * (v[2] - v[0]) + st[0] * (v[3] - v[1])
         x = v[0] + st[0] * (v[1] - v[0]) + st[1] * dt
+        before = st
         st = np.clip(st + np.linalg.lstsq(np.stack([ds, dt], axis=1), p - x, rcond=None)[0], 0.0, 1.0)
-    # The face's two directions taken in cyclic order span the axis' positive normal; y has them swapped.
-    normal = np.cross(ds, dt) * (outward if axis != 1 else -outward)
-    return float((p - x) @ normal / np.linalg.norm(normal))
+        if np.abs(st - before).max() < 1e-12:
+            break
+    normal = np.cross(ds, dt)
+    return sign * float((p - x) @ normal) / float(np.linalg.norm(normal))
 
 
 def _read_only(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

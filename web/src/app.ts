@@ -18,6 +18,12 @@ import { unpack } from "./wire";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, ServerMessage, State, Vec3 } from "./protocol";
 
+/** What of the page's state shows in the canvas. */
+const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection"] as const;
+
+/** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
+const FIGURES_EVERY = 300;
+
 export class App {
   readonly store = new Store(recallTools());
   readonly stage: Stage;
@@ -39,6 +45,8 @@ export class App {
   private pictureChain: Promise<void> = Promise.resolve();
   private pending: (() => void)[] = [];
   private placedAfter: number | null = null;
+  /** When the figures below the picture were last set. */
+  private figured = -Infinity;
 
   constructor(host: HTMLElement) {
     this.stage = new Stage(host);
@@ -52,7 +60,7 @@ export class App {
     this.stage.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
-      this.stage.invalidate();
+      if (DRAWN.some((key) => now[key] !== before[key])) this.stage.invalidate();
     });
     this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
       opened: () => this.store.set({ connection: "open" }),
@@ -156,9 +164,8 @@ export class App {
         this.takeState(message);
         break;
       case "dragged":
-        this.drag?.answered(message);
+        if (this.drag?.answered(message)) this.stage.invalidate();
         if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
-        this.stage.invalidate();
         break;
       case "answer":
         this.questions.get(message.request)?.(message.failed ? null : message);
@@ -252,6 +259,8 @@ export class App {
       { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
       received, decoded, render_ms, encode_ms,
     ); // prettier-ignore
+    if (!final && time - this.figured < FIGURES_EVERY) return;
+    this.figured = time;
     const figures = {
       perSecond: this.latency.perSecond(time),
       renderMs: render_ms,

@@ -4,9 +4,12 @@
  */
 import { apply, part, type Operation, type Posed } from "./operations";
 import { containedPart, expectedPart } from "./limits";
-import { middle } from "./cage";
+import { extent, middle } from "./cage";
 import type { Corners, Dragged, EditState, PageMessage } from "./protocol";
 import type { Target } from "./store";
+
+/** How far apart cages are that count as the same, as a share of their size. */
+const ROUNDING = 1e-5;
 
 /** What the server says, too, where a continuous edit is confined. */
 const AT_OUTER_CAGE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)";
@@ -31,6 +34,15 @@ export function cagesOf(edit: EditState): Cages {
 export function leading(cages: Cages, target: Target): Posed {
   if (target === "field") return cages.deformed;
   return target === "outer" && cages.outer ? cages.outer : cages.inner;
+}
+
+/** Whether cages are where others are, but for rounding. */
+function alike(a: Cages, b: Cages): boolean {
+  const size = extent(a.deformed.corners);
+  const near = (p: Posed, q: Posed): boolean =>
+    p.corners.every((corner, k) => corner.every((x, i) => Math.abs(x - q.corners[k][i]) < ROUNDING * size));
+  const outer = a.outer === null || b.outer === null ? a.outer === b.outer : near(a.outer, b.outer);
+  return near(a.inner, b.inner) && near(a.deformed, b.deformed) && outer;
 }
 
 export class Drag {
@@ -71,14 +83,15 @@ export class Drag {
     this.follow(operation, share);
   }
 
-  /** Takes the server's answer over. */
-  answered(message: Dragged): void {
+  /** Takes the server's answer over; true where the cages are elsewhere than they were shown. */
+  answered(message: Dragged): boolean {
     const operation = this.sent.get(message.seq);
-    if (message.drag !== this.id || operation === undefined) return;
+    if (message.drag !== this.id || operation === undefined) return false;
     for (const seq of this.sent.keys()) if (seq < message.seq) this.sent.delete(seq);
     this.last = { operation, part: message.part, why: message.why };
-    if (message.seq !== this.seq) return;
+    if (message.seq !== this.seq) return false;
     this.why = message.why;
+    const before = this.shown;
     this.follow(operation, message.part);
     const pivots = this.shown;
     this.shown = {
@@ -86,6 +99,7 @@ export class Drag {
       deformed: { corners: message.deformed, pivot: pivots.deformed.pivot },
       outer: message.outer && { corners: message.outer, pivot: pivots.outer?.pivot ?? middle(message.outer) },
     };
+    return !alike(before, this.shown);
   }
 
   /** Ends the drag: what was dragged becomes an entry of the history. A drag that moved nothing is none. */

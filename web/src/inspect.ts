@@ -2,6 +2,7 @@
 import { cornersOf, middle, type Part } from "./cage";
 import type { App } from "./app";
 import type { Latency } from "./latency";
+import type { Operation } from "./operations";
 import type { PictureHeader } from "./protocol";
 import { pickCorner } from "./picking";
 import { draggable } from "./scenery";
@@ -12,8 +13,8 @@ export interface Inspector {
   readonly picture: PictureHeader | null;
   readonly latency: Latency;
   readonly camera: { c2w: number[]; seq: number };
-  /** Why the last drag stopped, what it was. */
-  readonly drag: { id: number; seq: number; ended: boolean; why: string | null } | null;
+  /** The drag that goes on: what the cages follow of it, and why not all. */
+  readonly drag: { id: number; seq: number; ended: boolean; why: string | null; followed: Operation | null } | null;
   /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag. */
   readonly settled: boolean;
   /** Milliseconds since a picture or a state came. */
@@ -52,7 +53,9 @@ export function inspector(app: App): Inspector {
       return { c2w: stage.c2w, seq: app.camera.seq };
     },
     get drag() {
-      return app.drag && { id: app.drag.id, seq: app.drag.seq, ended: app.drag.ended, why: app.drag.why };
+      if (app.drag === null) return null;
+      const { id, seq, ended, why, followed } = app.drag;
+      return { id, seq, ended, why, followed };
     },
     get settled() {
       const picture = app.lastPicture;

@@ -2,13 +2,12 @@
  * Thick lines that know what of them the field hides: the visible part solid, the hidden part thin and dashed.
  *
  * A point of a line is hidden where the picture's distance along the same ray, seen from where the picture
- * was taken, is shorter. Widths are CSS pixels, edges are smoothed in the shader.
+ * was taken, is shorter. Widths are CSS pixels, edges are smoothed in the shader. Segments are drawn in order.
  */
 import {
   Color,
   DynamicDrawUsage,
   GLSL3,
-  Group,
   InstancedBufferAttribute,
   InstancedBufferGeometry,
   Float32BufferAttribute,
@@ -39,13 +38,13 @@ export interface Segment {
 
 const VERTEX = `
 uniform vec2 viewport;
-uniform bool hiddenPass;
 in vec3 from;
 in vec3 to;
 in vec4 paint;
 in vec2 stroke;
 out vec3 world;
 out vec4 tint;
+out float hiddenAlpha;
 out float side;
 out float halfWidth;
 out vec2 run;
@@ -62,7 +61,7 @@ void main() {
   vec2 sb = 0.5 * viewport * b.xy / b.w;
   float reach = length(sb - sa);
   vec2 direction = reach > 0.0 ? (sb - sa) / reach : vec2(1.0, 0.0);
-  halfWidth = 0.5 * (hiddenPass ? min(stroke.x, 1.2) : stroke.x);
+  halfWidth = 0.5 * stroke.x;
   float outer = halfWidth + 1.0;
   bool first = position.x < 0.5;
   vec4 clip = first ? a : b;
@@ -73,17 +72,18 @@ void main() {
   world = first ? p : q;
   side = position.y * outer * clip.w;
   run = vec2((first ? 0.0 : reach) * clip.w, clip.w);
-  tint = vec4(paint.rgb, hiddenPass ? stroke.y : paint.a);
+  tint = paint;
+  hiddenAlpha = stroke.y;
 }`;
 const FRAGMENT = `
 uniform sampler2D depthMap;
 uniform mat4 pictureProjection;
 uniform vec3 pictureEye;
 uniform float slack;
-uniform bool hiddenPass;
 uniform float scale;
 in vec3 world;
 in vec4 tint;
+in float hiddenAlpha;
 in float side;
 in float halfWidth;
 in vec2 run;
@@ -99,16 +99,23 @@ bool isHidden() {
   return own > seen * 1.003 + slack;
 }
 void main() {
-  if (isHidden() != hiddenPass) discard;
-  if (hiddenPass && mod(run.x / run.y, 8.0 * scale) > 4.5 * scale) discard;
-  float alpha = tint.a * clamp(halfWidth + 0.5 - abs(side / run.y), 0.0, 1.0);
+  float away = abs(side / run.y);
+  if (away > halfWidth + 0.5) discard;
+  float alpha = tint.a;
+  float reach = halfWidth;
+  if (isHidden()) {
+    if (mod(run.x / run.y, 8.0 * scale) > 4.5 * scale) discard;
+    alpha = hiddenAlpha;
+    reach = min(halfWidth, 0.6);
+  }
+  alpha *= clamp(reach + 0.5 - away, 0.0, 1.0);
   if (alpha < 0.01) discard;
   colour = vec4(tint.rgb, alpha);
 }`;
 
 export class Lines {
-  readonly group = new Group();
   private readonly geometry = new InstancedBufferGeometry();
+  private readonly mesh: Mesh;
   private buffers: { from: InstancedBufferAttribute; to: InstancedBufferAttribute; paint: InstancedBufferAttribute; stroke: InstancedBufferAttribute };
   private capacity = 0;
   private readonly shared: Record<string, IUniform>;
@@ -128,22 +135,19 @@ export class Lines {
     this.geometry.setAttribute("position", new Float32BufferAttribute([0, -1, 0, 0, 1, 0, 1, -1, 0, 1, 1, 0], 3));
     this.geometry.setIndex([0, 2, 1, 1, 2, 3]);
     this.buffers = this.grow(64);
-    for (const hiddenPass of [true, false]) {
-      const material = new ShaderMaterial({
-        vertexShader: VERTEX,
-        fragmentShader: FRAGMENT,
-        glslVersion: GLSL3,
-        transparent: true,
-        depthTest: false,
-        depthWrite: false,
-        uniforms: { ...this.shared, hiddenPass: { value: hiddenPass } },
-      });
-      const mesh = new Mesh(this.geometry, material);
-      mesh.frustumCulled = false;
-      mesh.renderOrder = hiddenPass ? 1 : 2;
-      this.group.add(mesh);
-    }
-    stage.scene.add(this.group);
+    const material = new ShaderMaterial({
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      glslVersion: GLSL3,
+      transparent: true,
+      depthTest: false,
+      depthWrite: false,
+      uniforms: this.shared,
+    });
+    this.mesh = new Mesh(this.geometry, material);
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = 1;
+    stage.scene.add(this.mesh);
     stage.beforeFrame.push(() => this.follow());
   }
 
@@ -166,7 +170,7 @@ export class Lines {
     });
     for (const buffer of Object.values(this.buffers)) buffer.needsUpdate = true;
     this.geometry.instanceCount = segments.length;
-    this.group.visible = segments.length > 0;
+    this.mesh.visible = segments.length > 0;
   }
 
   private grow(capacity: number): Lines["buffers"] {

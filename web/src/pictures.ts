@@ -155,8 +155,9 @@ export class Pictures {
     if (old?.width === width && old.height === height) return;
     this.target = new WebGLRenderTarget(width, height, {
       depthBuffer: false,
-      minFilter: LinearFilter,
-      magFilter: LinearFilter,
+      // As large as the canvas: between pixels there is nothing to interpolate, which costs much in software.
+      minFilter: NearestFilter,
+      magFilter: NearestFilter,
       generateMipmaps: false,
     });
     if (old) {

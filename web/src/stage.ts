@@ -16,8 +16,23 @@ function isSoftware(): boolean {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
+/** A renderer whose canvas lets nothing through: the browser then need not blend it with what is behind. */
+function opaqueRenderer(antialias: boolean): WebGLRenderer {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("webgl2", {
+    alpha: false,
+    depth: true,
+    stencil: false,
+    antialias,
+    powerPreference: "high-performance",
+  });
+  return new WebGLRenderer({ canvas, context: context ?? undefined });
+}
+
 export class Stage {
-  readonly renderer = new WebGLRenderer({ antialias: !isSoftware(), powerPreference: "high-performance" });
+  /** Whether the processor draws the page. */
+  readonly software = isSoftware();
+  readonly renderer = opaqueRenderer(!this.software);
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;

@@ -189,6 +189,11 @@ class Edit:
             message, cure = self._problem(self.deformed)
             raise self._error(message + self._safe_part() + cure)
 
+    @property
+    def is_possible(self) -> bool:
+        """True where the edit can be evaluated: where `check` raises nothing. Sooner than its message."""
+        return self._is_safe(self.inner) and self._is_safe(self.deformed)
+
     def safe_fraction(self, operation: Operation | None = None) -> float:
         """Largest t in [0,1], to 1e-3, at which the share t of an operation can follow this edit.
 

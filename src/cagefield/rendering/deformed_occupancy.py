@@ -1,7 +1,8 @@
 """The occupancy of an edited field, in deformed space.
 
-Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again, in two passes. A probe at a
-lattice point p maps it to canonical space and looks for an occupied cell within
+Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again. Where no edit is discrete,
+`smooth_occupancy` does it; else two passes. A probe at a lattice point p maps it to canonical space and looks
+for an occupied cell within
 
     r = |J|_inf * spacing / 2
 
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.fields.voxel import VoxelField
+from cagefield.rendering import smooth_occupancy as smooth
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -32,13 +34,18 @@ from cagefield.rendering.grid import (
     contract_point,
     contract_velocity,
     ivec3,
+    transform_of,
+    uncontract_point,
     vec3,
 )
+from cagefield.rendering.links import Link
 from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
+from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
-MOST_CELLS = 12.0
-"""Largest r, in cells; a map that squeezes more than this looks that far only."""
+
+def nothing() -> None:
+    """Lets it go on."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +63,17 @@ def deform(
     jumps: bool,
     known: Known | None = None,
     coarse: bool = False,
+    proceed: Proceed | None = None,
+    link: Link | None = None,
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
     Only what `known` does not know is looked at. `coarse` takes the first pass alone, for whole bricks: it
-    holds what the fine one holds and more, for a tenth of the time.
+    holds what the fine one holds and more, for a tenth of the time; with a `link`, the stack has the edit of
+    the link in place of another one, and nothing else is looked at. `proceed` is called between the passes,
+    and may raise.
     """
-    field = grid.field
+    field, proceed = grid.field, proceed or nothing
     if stack.n_edits == 0:
         return canonical
     boxes = [_grid_box(field, box) for box in stack.boxes.astype(np.float64)]
@@ -72,29 +83,69 @@ def deform(
     leap = FEW if coarse else MAX_LEAP
     count = (last - first) // 2
     blocks = np.zeros(count, bool)
-    _paste(blocks, first, canonical, np.ones(canonical.blocks.shape, bool))
+    _paste(blocks, first, canonical)
     new = _touched(boxes, first, count)
     if known is not None:
         changed = _touched([_grid_box(field, box) for box in known.changed], first, count)
         _paste(blocks, first, known.occupancy, new & ~changed)
         new &= changed
-    if not new.any():
+    where = _where(new)
+    if where is None:
         return Occupancy.from_blocks(first, blocks, leap)
-    # Whole bricks of the blocks to look at, and one more on each side, whose corners count where a map jumps.
-    where = ndimage.find_objects(new.astype(np.int8))[0]
-    low = np.maximum([side.start // 2 * 2 - 2 for side in where], 0)
-    high = np.minimum([-(-side.stop // 2) * 2 + 2 for side in where], count)
+    # Whole bricks of the blocks to look at, and as many more on each side as their corners' reach depends on.
+    margin = 2 if coarse and not jumps else 4
+    low = np.maximum(where[0] // 2 * 2 - margin, 0)
+    high = np.minimum(-(-where[1] // 2) * 2 + margin, count)
     region = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
-    spacing = BRICK if coarse else 2
-    near = _near(canonical, field, stack, first + 2 * low, (high - low) * 2 // spacing, spacing, jumps)
-    if coarse:
-        near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
-    near &= new[region]
-    candidates = np.zeros((0, 3), np.int32) if coarse else np.argwhere(near).astype(np.int32)
-    if len(candidates):
-        near[tuple(candidates.T)] = _refined(candidates, grid, stack, first + 2 * low)
-    blocks[region] = np.where(new[region], near, blocks[region])
+    proceed()
+    begin, bricks = first + 2 * low, (high - low) // 2
+    if jumps:
+        near = _jumping(canonical, grid, stack, begin, bricks, new[region], coarse, proceed)
+    else:
+        if link is not None and coarse:
+            near = link.near_bricks(grid, begin, bricks)
+        else:
+            near = smooth.near_bricks(canonical, grid, stack, begin, bricks)
+        if coarse:
+            near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+        else:
+            near = smooth.occupied_blocks(canonical, grid, stack, begin, near, new[region], proceed)
+    np.copyto(blocks[region], near, where=new[region])
     return Occupancy.from_blocks(first, blocks, leap)
+
+
+def _jumping(
+    canonical: Occupancy,
+    grid: DeviceGrid,
+    stack: DeviceStack,
+    lower: NDArray[np.int64],
+    bricks: NDArray[np.int64],
+    new: NDArray[np.bool_],
+    coarse: bool,
+    proceed: Proceed,
+) -> NDArray[np.bool_]:
+    """The occupied blocks of bricks [count] from the grid coordinates `lower` on, some of the new ones."""
+    spacing = BRICK if coarse else 2
+    near = _near(canonical, grid.field, stack, lower, bricks * BRICK // spacing, spacing, True)
+    if coarse:
+        return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    near &= new
+    proceed()
+    candidates = np.argwhere(near).astype(np.int32)
+    if len(candidates):
+        near[tuple(candidates.T)] = _refined(candidates, grid, stack, lower)
+    return near
+
+
+def _where(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    """(first [3], last + 1 [3]) of the box around what a mask holds; None where that is nothing."""
+    bounds = []
+    for axis in range(3):
+        some = np.flatnonzero(mask.any(axis=tuple(other for other in range(3) if other != axis)))
+        if len(some) == 0:
+            return None
+        bounds.append((some[0], some[-1] + 1))
+    return np.array([low for low, _ in bounds]), np.array([high for _, high in bounds])
 
 
 def _region(
@@ -122,19 +173,18 @@ def _touched(
 
 
 def _paste(
-    blocks: NDArray[np.bool_], first: NDArray[np.int64], source: Occupancy, where: NDArray[np.bool_]
+    blocks: NDArray[np.bool_],
+    first: NDArray[np.int64],
+    source: Occupancy,
+    where: NDArray[np.bool_] | None = None,
 ) -> None:
-    """Copy what another occupancy has of the blocks, the first at the cell `first`, where a mask says so.
-
-    The mask has the shape of the blocks, or that of the source's, which then lies within them.
-    """
+    """Copy what another occupancy has of the blocks, the first at the cell `first`, where a mask says so."""
     at = (source.origin - first) // 2
     shape = np.array(source.blocks.shape)
     low, high = np.maximum(at, 0), np.minimum(at + shape, blocks.shape)
     here = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
     there = tuple(slice(a, b) for a, b in zip(low - at, high - at, strict=True))
-    mask = where[here] if where.shape == blocks.shape else where
-    blocks[here] = np.where(mask, source.blocks[there], blocks[here])
+    np.copyto(blocks[here], source.blocks[there], where=True if where is None else where[here])
 
 
 def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -184,7 +234,7 @@ def _corners(
         ivec3(*lower.tolist()),
         ivec3(*count.tolist()),
         spacing,
-        *_transform(field),
+        *transform_of(field),
         stack.params,
         stack.lattice,
         stack.n_edits,
@@ -206,7 +256,7 @@ def _refined(
         grid.index,
         grid.density,
         ivec3(*grid.field.resolution),
-        *_transform(grid.field),
+        *transform_of(grid.field),
         stack.params,
         stack.lattice,
         stack.n_edits,
@@ -214,26 +264,6 @@ def _refined(
         stack.has_flows,
     )
     return out.astype(bool)
-
-
-def _transform(field: VoxelField) -> tuple[vec3, vec3, vec3]:
-    """Origin, scale and half as in `cagefield.rendering.march`."""
-    n = np.array(field.resolution)
-    if field.contracted:
-        origin, scale = field.center, 1.0 / field.half_size
-    else:
-        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-    return vec3(*origin.tolist()), vec3(*scale.tolist()), vec3(*((n - 1) / 4).tolist())
-
-
-@qd.func
-def uncontract_point(c: vec3):
-    """The inverse of `contract_point`, up to 1e-4 from the surface at infinity."""
-    m = qd.min(qd.abs(c).max(), 2.0 - 1e-4)
-    scale = 1.0
-    if m > 1.0:
-        scale = m / qd.abs(c).max() / (m * (2.0 - m))
-    return c * scale
 
 
 @qd.func

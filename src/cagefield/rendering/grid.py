@@ -92,6 +92,16 @@ def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -
     return np.asarray(np.lexsort((vertices, brick)))
 
 
+def transform_of(field: VoxelField) -> tuple[vec3, vec3, vec3]:
+    """Origin, scale and half as in `cagefield.rendering.march`."""
+    n = np.array(field.resolution)
+    if field.contracted:
+        origin, scale = field.center, 1.0 / field.half_size
+    else:
+        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
+    return vec3(*origin.tolist()), vec3(*scale.tolist()), vec3(*((n - 1) / 4).tolist())
+
+
 @qd.func
 def sh_basis(d: vec3, K: qd.template()):
     """The K real spherical harmonics of the unit direction d, degree 0 to 2 (as `cagefield.sh.basis`)."""
@@ -158,6 +168,16 @@ def contract_point(q: vec3):
     """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
     m = qd.max(qd.abs(q).max(), 1.0)
     return ((2.0 - 1.0 / m) / m) * q
+
+
+@qd.func
+def uncontract_point(c: vec3):
+    """The inverse of `contract_point`, up to 1e-4 from the surface at infinity."""
+    m = qd.min(qd.abs(c).max(), 2.0 - 1e-4)
+    scale = 1.0
+    if m > 1.0:
+        scale = m / qd.abs(c).max() / (m * (2.0 - m))
+    return c * scale
 
 
 @qd.func

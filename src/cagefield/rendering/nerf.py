@@ -100,10 +100,11 @@ def render_nerf(
     parts = _traced(field.torch, rays, edits, chunk, preserve_opacity, normals)
     shape = (camera.height, camera.width)
     premultiplied, opacity, depth, normal = (
-        None if values is None else values.cpu().numpy().reshape(*shape, *values.shape[1:])
-        for values in parts
+        values.cpu().numpy().reshape(*shape, *values.shape[1:]) for values in parts
     )
-    return Frame.from_premultiplied(premultiplied, opacity, depth, normals=normal, background=background)
+    return Frame.from_premultiplied(
+        premultiplied, opacity, depth, normals=normal if normals else None, background=background
+    )
 
 
 def trace(
@@ -115,8 +116,8 @@ def trace(
 
 def _traced(
     field: TorchNerf, rays: Rays, edits: Any, chunk: int, preserve_opacity: bool, normals: bool
-) -> tuple[Any, Any, Any, Any]:
-    """What `trace` returns, and normals [N,3] or None."""
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """What `trace` returns, and normals [N,3], or [N,0] where none are asked for."""
     mapped = None
     if edits is not None and len(edits.active):
         mapped = TensorMap(edits, field.device, preserve_opacity=preserve_opacity)
@@ -127,11 +128,10 @@ def _traced(
             _coarse, sums = march(field, some, mapped)
             depth = sums.distance / sums.opacity.clamp_min(1e-10)
             depth = torch.where(sums.opacity > 1e-6, depth, torch.full_like(depth, float("inf")))
-            parts.append((sums.premultiplied, sums.opacity, depth))
-            if normals:
-                parts[-1] += (_normals(field, some, sums, mapped),)
-    columns = [torch.cat(column) for column in zip(*parts, strict=True)]
-    return columns[0], columns[1], columns[2], columns[3] if normals else None
+            normal = _normals(field, some, sums, mapped) if normals else some.origins[:, :0]
+            parts.append((sums.premultiplied, sums.opacity, depth, normal))
+    premultiplied, opacity, depth, normal = (torch.cat(column) for column in zip(*parts, strict=True))
+    return premultiplied, opacity, depth, normal
 
 
 def _normals(field: TorchNerf, rays: Rays, sums: Sums, mapped: TensorMap | None) -> Tensor:

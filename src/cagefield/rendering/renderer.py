@@ -17,6 +17,7 @@ from cagefield.rendering.frame import Background, Frame
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
+    from cagefield.rendering.links import Chain
     from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
@@ -61,26 +62,39 @@ class Renderer:
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
         self._coarse = False
+        self._chain: Chain | None = None
         self._pack_edits()
 
     def with_edits(
-        self, edits: EditStack, *, preserve_opacity: bool | None = None, coarse: bool = False
+        self,
+        edits: EditStack,
+        *,
+        preserve_opacity: bool | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
     ) -> Renderer:
         """A renderer of the same field under other edits; what they share with these is kept.
 
         `coarse` looks at the edited space by bricks instead of cells: ready sooner, the same picture, slower.
+        `proceed` is called now and then, and gives the renderer up by raising.
         """
         other = object.__new__(Renderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
-        other._pack_edits(self, coarse)
+        other._pack_edits(self, coarse, proceed)
         return other
 
-    def _pack_edits(self, before: Renderer | None = None, coarse: bool = False) -> None:
+    def _pack_edits(
+        self,
+        before: Renderer | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
+    ) -> None:
         from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import for_kernels
+        from cagefield.rendering.links import Chain, replaced
         from cagefield.warps.device import DeviceStack, widened
 
         stack = DeviceStack.from_stack(self.edits)
@@ -88,8 +102,15 @@ class Renderer:
         known = None
         if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
             known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
+        link = None
+        if before is not None and coarse and not jumps:
+            place = replaced(before.edits, self.edits)
+            if place is not None:
+                if self._chain is None or not self._chain.fits(self.edits, place):
+                    self._chain = Chain.of(self.edits, place, self._canonical, self._grid)
+                link = self._chain.link(self.edits.active[place])
         self._coarse = coarse
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse)
+        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed, link)
         self._codes = for_kernels(self._occupancy.codes)
         self._stack = stack
         self._boxes = for_kernels(stack.boxes.astype(np.float32))
@@ -103,10 +124,12 @@ class Renderer:
         near: float = 0.0,
         region: tuple[int, int, int, int] | None = None,
         should_stop: Callable[[], bool] | None = None,
+        step: float | None = None,
     ) -> Frame | None:
         """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
 
-        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered.
+        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
+        takes the place of the renderer's own.
         """
         from cagefield.rendering import march
         from cagefield.rendering.grid import ivec3, vec3
@@ -119,10 +142,10 @@ class Renderer:
         n = np.array(field.resolution)
         if field.contracted:
             lower, scale = field.center, 1.0 / field.half_size
-            step = self.step
+            length = step or self.step
         else:
             lower, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-            step = self.step / float(scale.max())
+            length = (step or self.step) / float(scale.max())
         rows = down if should_stop is None else BAND
         for row in range(0, down, rows):
             if should_stop is not None and should_stop():
@@ -146,7 +169,7 @@ class Renderer:
                 ivec3(*field.resolution),
                 vec3(*lower.tolist()),
                 vec3(*scale.tolist()),
-                step,
+                length,
                 near,
                 int(normals),
                 self._boxes,

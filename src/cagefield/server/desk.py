@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 from cagefield.errors import CagefieldError
+from cagefield.server.regions import Rect
 from cagefield.server.scheduler import Request, Scheduler
 from cagefield.server.tasks import Answered, Failed, PictureDone, PictureTask, Ready, Result, Stopped, Task
 from cagefield.server.worker import Worker
@@ -51,6 +52,9 @@ class Office(Protocol):
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         """The task of a picture that the scheduler wants."""
 
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        """Where two revisions differ in a page's picture; None for nowhere."""
+
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture is there."""
 
@@ -73,7 +77,7 @@ class Desk:
     """See the module."""
 
     def __init__(self, scene: str, device: str, office: Office) -> None:
-        self.scheduler = Scheduler()
+        self.scheduler = Scheduler(office.differing)
         self.worker = Worker(scene, device, self._from_thread(self._result), self._from_thread(self._lost))
         self._office = office
         self._loop: asyncio.AbstractEventLoop | None = None

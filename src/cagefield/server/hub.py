@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cagefield.cameras import Camera
+from cagefield.edits import EditStack
 from cagefield.server import protocol
 from cagefield.server.chores import Chores
 from cagefield.server.converting import state_of
 from cagefield.server.desk import Chore, Desk, Level, Stamp
 from cagefield.server.keeping import Keeper
 from cagefield.server.outbox import Outbox
+from cagefield.server.regions import WHOLE, Rect, seen
 from cagefield.server.scheduler import Look, Request
 from cagefield.server.session import Session
 from cagefield.server.tasks import PictureDone, PictureTask, Shown, Task, values_of
@@ -48,11 +50,14 @@ class Hub:
         """A line for the pages that come."""
         self._pages = 0
         self._shown = self._what_is_shown()
+        self._drawn = session.drawn()
         self._shown_revision = session.revision
         """The revision that `_shown` was taken from."""
         self._pictured = session.revision
         """The first revision that is shown as `_shown`."""
         self._pictures = 0
+        self._stacks: dict[int, tuple[EditStack, bool]] = {}
+        """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
         self._trouble: str | None = None
 
     # ---- pages ----
@@ -171,6 +176,15 @@ class Hub:
         drag, seq = (page.drag, page.seq) if page.drag else (0, 0)
         return task, Stamp(self._shown_revision, drag, seq)
 
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        """Where two revisions differ in a page's picture; None for nowhere."""
+        camera = self.pages[page].camera
+        stacks = [self._stack(revision) for revision in (one, another)]
+        if camera is None or None in stacks:
+            return WHOLE
+        (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
+        return seen(camera, after.changed_boxes(before)) if opacity == other else WHOLE
+
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""
         page = self.pages.get(request.page)
@@ -185,12 +199,25 @@ class Hub:
         shown = self._what_is_shown()
         self._shown_revision = self.session.revision
         if shown != self._shown:
+            self._keep_stack()
             self._shown = shown
             self._pictures += 1
             self._pictured = self.session.revision
+        self._drawn = self.session.drawn()
 
     def _measured(self) -> None:
         self.broadcast(self.state())
+
+    def _stack(self, revision: int) -> tuple[EditStack, bool] | None:
+        if revision == self._pictures:
+            return EditStack(self._drawn), self._shown.preserve_opacity
+        return self._stacks.get(revision)
+
+    def _keep_stack(self) -> None:
+        """Remembers what is shown, before it is something else."""
+        wanted = self.desk.scheduler.remembered()
+        self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
+        self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity
 
     def _what_is_shown(self) -> Shown:
         return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)

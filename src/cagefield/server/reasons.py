@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from cagefield.edits import Edit
-from cagefield.errors import CagefieldError
 
 OUTSIDE = "the inner cage must stay inside the outer cage; enlarge the outer cage (Set mode)"
 FOLDED = "the space between the cages would fold; enlarge the outer cage (Set mode), or choose the flow shell"
@@ -13,14 +12,12 @@ INSIDE_OUT = "the cage would turn inside out; keep its corners apart"
 
 def problem(edit: Edit) -> str | None:
     """Why an edit cannot be shown, in a sentence with its cure, or None."""
-    try:
-        edit.check()
-    except CagefieldError:
-        outer = edit.outer
-        if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
-            return OUTSIDE
-        return FOLDED if edit.shell == "trilinear" else CLOSE
-    return None
+    if edit.is_possible:
+        return None
+    outer = edit.outer
+    if outer is not None and not outer.contains([*edit.inner.corners, *edit.deformed.corners]).all():
+        return OUTSIDE
+    return FOLDED if edit.shell == "trilinear" else CLOSE
 
 
 def cause(reason: str) -> str:

@@ -5,30 +5,31 @@ no web and no renderer: it is told what happens and when, and asked for the next
   speed allows; each shows the newest input, older input that no picture showed is passed over.
 - At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
   anything changes.
+- Where the camera is the one of the last whole picture, only the part is rendered that the edits change.
 - A page is owed a picture only while fewer than two of its pictures are on their way.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field
 
 from cagefield.server.protocol import View
+from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixels, tiles
 
 MOST_UNSHOWN = 2
 """Pictures sent and not yet shown, at most, per page."""
 
-MOVING_SECONDS = 0.055
+MOVING_SECONDS = 0.05
 """Time that a picture may take while something moves."""
 
-TILE_SECONDS = 0.12
-"""Time that a tile may take at rest."""
+TILE_SECONDS = 0.25
+"""Time that a tile may take at rest; each costs the page a frame. Abandoned ones end sooner."""
 
 SETTLE_SECONDS = 0.12
 """How long nothing may have changed before the view counts as at rest."""
 
-MOST_TILES = 16
+MOST_TILES = 9
 """Tiles of a view, at most."""
 
 LEAST_SIDE = 96
@@ -64,7 +65,10 @@ class Region:
 
 @dataclass(frozen=True)
 class Request:
-    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view."""
+    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view.
+
+    `complete` says that with it everything is drawn that was not as it should be.
+    """
 
     number: int
     page: int
@@ -75,6 +79,7 @@ class Request:
     moving: bool
     exact: bool
     final: bool
+    complete: bool = True
 
 
 @dataclass
@@ -95,6 +100,9 @@ class _Page:
     """The version that the last picture of the whole view shows."""
     tiles: list[Region] | None = None
     """Tiles of the present version that are still to come; None before they are cut."""
+    whole: bool = False
+    """Whether those tiles are of the whole view."""
+    showing: Showing = field(default_factory=Showing)
     tiles_exact: bool = False
     served: float = -math.inf
 
@@ -102,7 +110,9 @@ class _Page:
 class Scheduler:
     """See the module. Times are seconds of any one clock."""
 
-    def __init__(self) -> None:
+    def __init__(self, differing: Differing = everywhere) -> None:
+        """`differing` says what of a page's picture two revisions show differently."""
+        self._differing = differing
         self._pages: dict[int, _Page] = {}
         self._numbers = 0
         self._rate = FIRST_RATE
@@ -143,16 +153,16 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends with what is shown already, the whole picture comes at once.
+        Where a drag ends with what is shown already, or on a fine picture, the fine one comes at once.
         """
         if revision == self._revision and dragging == self._dragging:
             return
-        let_go = revision == self._revision and not dragging
+        let_go, same = self._dragging and not dragging, revision == self._revision
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
-            was_shown = p.shown_version == p.version
+            was_shown = same and p.shown_version == p.version
             self._changed(page, now)
-            if let_go and was_shown:
+            if let_go and (was_shown or p.showing.exact):
                 p.shown_version, p.changed = p.version, -math.inf
 
     def presented(self, page: int, picture: int) -> None:
@@ -165,7 +175,8 @@ class Scheduler:
         """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
         self._running = None
         region = request.region
-        if (region.width, region.height) == (region.full_width, region.full_height):
+        whole = (region.width, region.height) == (region.full_width, region.full_height)
+        if whole or request.moving:
             # A tile may be empty, and says nothing of how long the whole picture takes.
             self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
         if request.moving:
@@ -173,6 +184,19 @@ class Scheduler:
         page = self._pages.get(request.page)
         if page is not None:
             page.unshown.append(request.number)
+            page.showing.drawn(
+                (request.camera, request.look),
+                request.revision,
+                (
+                    region.x / region.full_width,
+                    region.y / region.full_height,
+                    (region.x + region.width) / region.full_width,
+                    (region.y + region.height) / region.full_height,
+                ),
+                whole=whole or (request.complete and page.whole and not request.moving),
+                all_wanting=request.complete,
+                exact=request.exact,
+            )
 
     def abandoned(self, request: Request, again: bool) -> None:
         """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
@@ -183,7 +207,8 @@ class Scheduler:
 
     def refresh(self, now: float) -> None:
         """Everything is to be rendered anew."""
-        for page in self._pages:
+        for page, p in self._pages.items():
+            p.showing.lost()
             self._changed(page, now)
 
     # ---- what is next ----
@@ -216,6 +241,13 @@ class Scheduler:
         ]
         return max(0.0, min(waits)) if waits else None
 
+    def remembered(self) -> set[int]:
+        """The revisions that `differing` may still be asked about."""
+        found = {self._revision}
+        for p in self._pages.values():
+            found |= p.showing.later | ({p.showing.base} if p.showing.base is not None else set())
+        return found
+
     def unshown(self, page: int) -> int:
         """How many pictures are on their way to a page."""
         return len(self._pages[page].unshown)
@@ -243,55 +275,51 @@ class Scheduler:
     def _request(self, page: int, now: float) -> Request | None:
         p = self._pages[page]
         if self._owes_moving(p):
-            scale = self._scale(p)
-            if scale < 1.0 or p.moving or self._dragging:
-                p.shown_version = p.version
-                return self._picture(page, scale)
+            rect = p.showing.wanting(page, (p.camera, p.look), self._revision, self._differing)
+            scale = self._scale(p, rect)
             p.shown_version = p.version
-            p.tiles, p.tiles_exact = self._tiles(p), True
+            if scale < 1.0 or p.moving or self._dragging:
+                return self._picture(page, scale, rect)
+            self._cut(page, exact=True)
         if p.tiles is None:
             if p.moving or now - p.changed < SETTLE_SECONDS:
                 return None
-            p.tiles, p.tiles_exact = self._tiles(p), not self._dragging
+            self._cut(page, exact=not self._dragging)
         if not p.tiles:
             return None
         region = p.tiles.pop(0)
-        return self._ask(page, region, moving=False, exact=p.tiles_exact, final=not p.tiles)
+        last = not p.tiles
+        return self._ask(page, region, moving=False, exact=p.tiles_exact, final=last, complete=last)
 
-    def _picture(self, page: int, scale: float) -> Request:
+    def _picture(self, page: int, scale: float, rect: Rect | None) -> Request:
         p = self._pages[page]
-        width, height = max(16, round(p.width * scale)), max(16, round(p.height * scale))
-        region = Region(0, 0, width, height, width, height)
-        return self._ask(page, region, moving=True, exact=False, final=False)
+        width, height = (max(16, 2 * round(n * scale / 2)) for n in (p.width, p.height))
+        region = Region(*pixels(rect, width, height), width, height)
+        return self._ask(page, region, moving=True, exact=False, final=False, complete=True)
 
-    def _ask(self, page: int, region: Region, *, moving: bool, exact: bool, final: bool) -> Request:
+    def _ask(
+        self, page: int, region: Region, *, moving: bool, exact: bool, final: bool, complete: bool
+    ) -> Request:
         p = self._pages[page]
         self._numbers += 1
-        return Request(self._numbers, page, p.camera, self._revision, p.look, region, moving, exact, final)
+        return Request(
+            self._numbers, page, p.camera, self._revision, p.look, region, moving, exact, final, complete
+        )
 
-    def _scale(self, p: _Page) -> float:
+    def _scale(self, p: _Page, rect: Rect | None) -> float:
         rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
-        wanted = math.sqrt(rays / (p.width * p.height))
+        _, _, width, height = pixels(rect, p.width, p.height)
+        wanted = math.sqrt(rays / (width * height))
         least = min(1.0, LEAST_SIDE / min(p.width, p.height))
         return max(next((s for s in SCALES if s <= wanted), SCALES[-1]), least)
 
-    def _tiles(self, p: _Page) -> list[Region]:
-        """The view cut into tiles of about TILE_SECONDS, the middle ones first."""
-        count = min(max(1.0, p.width * p.height / (self._rate * TILE_SECONDS)), MOST_TILES)
-        side = math.sqrt(p.width * p.height / count)
-        columns, rows = max(1, round(p.width / side)), max(1, round(p.height / side))
-        xs = [8 * round(p.width * n / columns / 8) for n in range(columns)] + [p.width]
-        ys = [8 * round(p.height * n / rows / 8) for n in range(rows)] + [p.height]
-        tiles = [
-            Region(x, y, x1 - x, y1 - y, p.width, p.height)
-            for x, x1 in itertools.pairwise(xs)
-            for y, y1 in itertools.pairwise(ys)
-            if x1 > x and y1 > y
-        ]
-
-        def off_centre(tile: Region) -> float:
-            dx = (tile.x + 0.5 * tile.width) / p.width - 0.5
-            dy = (tile.y + 0.5 * tile.height) / p.height - 0.5
-            return dx * dx + dy * dy
-
-        return sorted(tiles, key=off_centre)
+    def _cut(self, page: int, exact: bool) -> None:
+        """Cuts what of the view is not as it should be into tiles of about TILE_SECONDS."""
+        p = self._pages[page]
+        view = p.camera, p.look
+        rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
+        part = pixels(rect, p.width, p.height)
+        p.whole = part == (0, 0, p.width, p.height)
+        count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)
+        p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
+        p.tiles_exact = exact

@@ -21,6 +21,9 @@ from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
 
+LONGEST_STEP = 1.5
+"""Most voxels between samples while something moves; no more than a pixel shows, either."""
+
 MOVING_QUALITY, REST_QUALITY = 85, 95
 """JPEG qualities."""
 
@@ -58,10 +61,13 @@ class Studio:
     def picture(self, task: PictureTask, stop: Stop) -> PictureDone | Stopped:
         """The part of a picture that a task asks for, encoded."""
         began = time.perf_counter()
-        renderer = self.plain if task.look.before else self.renderer(task.shown, exact=task.exact)
-        mapped = time.perf_counter()
-        if stop():
+        try:
+            renderer = (
+                self.plain if task.look.before else self.renderer(task.shown, task.exact, _giving_up(stop))
+            )
+        except _GivenUpError:
             return Stopped(task.number)
+        mapped = time.perf_counter()
         frame = self._frame(task, renderer, stop)
         if frame is None:
             return Stopped(task.number)
@@ -69,7 +75,8 @@ class Studio:
         near, far = self.reach(task.camera)
         pixels = encoding.picture_of(frame, task.look.view, (near, far))
         picture = encoding.jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
-        stride = 1 if frame.width * frame.height <= MOST_DEPTHS else 2
+        few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
+        stride = 1 if few else 2
         scale = (far if not self.scene.field.contracted else 16.0 * far) / 65_000.0
         depth = encoding.depths(frame, scale, stride)
         return PictureDone(
@@ -87,8 +94,12 @@ class Studio:
         """A whole picture, its edits exact; None where it was stopped."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
         task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
-        renderer = self.plain if look.before else self.renderer(shown, exact=True)
-        return self._frame(task, renderer, stop or (lambda: False))
+        stopping = stop or (lambda: False)
+        try:
+            renderer = self.plain if look.before else self.renderer(shown, True, _giving_up(stopping))
+        except _GivenUpError:
+            return None
+        return self._frame(task, renderer, stopping)
 
     def warm(self, stage: int) -> None:
         """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
@@ -98,6 +109,9 @@ class Studio:
         if stage == 3:
             edit.lattice_error(samples=64)
             return
+        if stage == 4:
+            self.plain.with_edits(EditStack([Edit.delete(inner)]))
+            return
         renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
         if stage == 1:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
@@ -106,18 +120,22 @@ class Studio:
             )
             renderer.render(camera)
 
-    def renderer(self, shown: Shown, *, exact: bool) -> Renderer:
-        """The renderer of the edits: one that is ready, else an exact or a quick one made now."""
+    def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> Renderer:
+        """The renderer of the edits: one that is ready, else an exact or a quick one made now.
+
+        `proceed` is called while it is made, and gives it up by raising.
+        """
         for kept in self._exact if exact else (*self._exact, *self._quick):
             if kept.shown == shown:
                 return kept.renderer
         edits = self.edits(shown.edits)
         if not exact:
-            edits = [self._quickly(edit) for edit in edits]
+            ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
+            edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
         # What the last ones share with these need not be looked at again.
         last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
         renderer = (last[0].renderer if last else self.plain).with_edits(
-            EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact
+            EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact, proceed=proceed
         )
         if exact:
             # Two: what pages show, and what a job renders.
@@ -163,7 +181,14 @@ class Studio:
             normals=task.look.view == "normals",
             region=(region.x, region.y, region.width, region.height),
             should_stop=None if task.moving else stop,
+            step=self._step(task.camera, renderer.step) if task.moving else None,
         )
+
+    def _step(self, camera: Camera, least: float) -> float:
+        """Voxels between the samples of a moving picture: what a pixel shows in the middle of the field."""
+        distance = float(np.linalg.norm(camera.origin - self._middle))
+        shown = distance / camera.fx / float(max(self.scene.field.voxel_size))
+        return min(max(shown, least), LONGEST_STEP)
 
     def _quickly(self, edit: Edit) -> Edit:
         """The edit with a coarser lattice, kept as long as the edit is."""
@@ -175,6 +200,18 @@ class Studio:
         quick = edit.replace(lattice=QUICK_LATTICE)
         self._coarse = [*self._coarse[-31:], (edit, quick)]
         return quick
+
+
+class _GivenUpError(Exception):
+    """What was being made ready is not wanted any more."""
+
+
+def _giving_up(stop: Stop) -> Callable[[], None]:
+    def proceed() -> None:
+        if stop():
+            raise _GivenUpError
+
+    return proceed
 
 
 def _beside(left: Frame, right: Frame) -> Frame:

@@ -12,7 +12,7 @@ from cagefield.edits import Edit
 from cagefield.keyframes import Still
 from cagefield.server.scheduler import Look, Region
 
-WARM_STAGES = 4
+WARM_STAGES = 5
 """Steps in which the kernels of edited pictures are made ready."""
 
 EditValues: TypeAlias = Mapping[str, Any]

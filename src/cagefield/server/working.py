@@ -95,7 +95,7 @@ class Working:
         camera = task.camera
         x = min(int(task.x * camera.width), camera.width - 1)
         y = min(int(task.y * camera.height), camera.height - 1)
-        renderer = self._studio.renderer(task.shown, exact=False)
+        renderer = self._studio.renderer(task.shown, False)
         frame = renderer.render(camera, normals=True, region=(x, y, 1, 1))
         if frame is None or frame.normals is None or frame.opacity[0, 0] < 0.5:
             return None

@@ -22,14 +22,9 @@ def weight_at(
     """w at coordinates z of the outer and xi of the inner cage: 1 / (1 + d_i / d_o) in one division."""
     H = table[7]
     height = table[moment + 8]
-    dx = H.x * (1.0 - x * x)
-    dy = H.y * (1.0 - y * y)
-    dz = H.z * (1.0 - z * z)
-    # What is nearer than NEAR to a face comes to rest there all the same.
-    rest = qd.max(qd.min(qd.min(dx, dy, dz) / NEAR, 1.0), 0.0)
-    dx = qd.max(dx, NEAR)
-    dy = qd.max(dy, NEAR)
-    dz = qd.max(dz, NEAR)
+    dx = qd.max(H.x * (1.0 - x * x), NEAR)
+    dy = qd.max(H.y * (1.0 - y * y), NEAR)
+    dz = qd.max(H.z * (1.0 - z * z), NEAR)
     ex = height.x * qd.max(qd.abs(ix) - 1.0, 0.0)
     ey = height.y * qd.max(qd.abs(iy) - 1.0, 0.0)
     ez = height.z * qd.max(qd.abs(iz) - 1.0, 0.0)
@@ -52,7 +47,7 @@ def weight_at(
     u8 = u * u
     u8 *= u8
     u8 *= u8
-    return rest * (g * (end + middle * g * (3.0 - 2.0 * g)) + (1.0 - end - middle) * u8 * u)
+    return g * (end + middle * g * (3.0 - 2.0 * g)) + (1.0 - end - middle) * u8 * u
 
 
 @qd.func

@@ -31,6 +31,12 @@ START_STEPS = 8
 LOST = 1e30
 """Written to nodes whose coordinates were not followed."""
 
+AT_REST = 1.0 - 3e-6
+"""Nodes farther out than this, in coordinates of the outer cage, stay: those on its faces, after rounding.
+
+`flow_lanes.NEAR` would let them drift.
+"""
+
 FOLLOWED = 0.05
 """Largest residual of the inner cage's coordinates, in units of xi, after the first of two steps."""
 
@@ -74,7 +80,7 @@ def _march(
 ):
     count = nodes.shape[0]
     for block in range((count + LANES - 1) // LANES):
-        # z, its rate k and the weighted sum of rates s; xi; the largest residual of xi.
+        # z, its rate k and the weighted sum of rates s; xi; the largest residual of xi; 1 where z is at rest.
         zx = lanes(0.0)
         zy = lanes(0.0)
         zz = lanes(0.0)
@@ -88,6 +94,7 @@ def _march(
         by = lanes(0.0)
         bz = lanes(0.0)
         lost = lanes(0.0)
+        still = lanes(0.0)
         for lane in range(LANES):
             p = place(qd.min(block * LANES + lane, count - 1), origin, frame, resolution) - table[3]
             Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
@@ -103,6 +110,8 @@ def _march(
             zx[lane] = x
             zy[lane] = y
             zz[lane] = z
+            if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) > AT_REST:
+                still[lane] = 1.0
             if qd.static(bent_inner):
                 ix, iy, iz = times(table, HEADER, Zx, Zy, Zz)
                 ix += table[HEADER + 3].x
@@ -188,7 +197,7 @@ def _march(
                 y = zy[lane]
                 z = zz[lane]
                 moved = vec3(0.0, 0.0, 0.0)
-                if qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) < 1.0:
+                if still[lane] == 0.0 and qd.max(qd.abs(x), qd.abs(y), qd.abs(z)) < 1.0:
                     Zx, Zy, Zz = times(table, 0, p.x, p.y, p.z)
                     if qd.static(bent_outer):
                         tx, ty, tz = bend(x, y, z, table, 10)

@@ -6,6 +6,9 @@ import { h } from "./dom";
 
 const TOAST_STAYS = 7000;
 
+/** Milliseconds between changes of the readout where the processor draws the page: each costs half a frame. */
+const TEXT_EVERY = 150;
+
 export function overlay(app: App, pointer: Pointer): HTMLElement {
   const layer = h("div", { class: "overlay" });
   layer.append(splitter(app), readout(app, pointer), toasts(app), lost(app), hint(app));
@@ -32,9 +35,20 @@ function splitter(app: App): HTMLElement {
 function readout(app: App, pointer: Pointer): HTMLElement {
   const label = h("div", { class: "readout" });
   label.hidden = true;
+  let written = -Infinity;
+  let later: ReturnType<typeof setTimeout> | null = null;
   app.stage.beforeFrame.push(() => {
     const { drag } = app;
     const followed = drag === null || drag.ended ? null : drag.followed;
+    const now = performance.now();
+    if (followed !== null && !label.hidden && app.stage.software && now - written < TEXT_EVERY) {
+      later ??= setTimeout(() => {
+        later = null;
+        app.stage.invalidate();
+      }, TEXT_EVERY);
+      return;
+    }
+    written = now;
     label.hidden = followed === null;
     if (drag === null || followed === null) return;
     label.textContent = described(followed);

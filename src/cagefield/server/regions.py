@@ -1,0 +1,153 @@
+"""Which part of a page's picture is not what it should be, so that only that part is rendered.
+
+A page draws what arrives over what is there. After a whole picture, its *base*, it shows the base everywhere,
+but where later pictures of parts were drawn; those show other revisions of the edits, the *later* ones. What
+two revisions show is the same outside a rectangle. So to show a revision it is enough to render what differs
+between the base and that one, and between the base and each of the later ones. At rest what was drawn
+coarsely is drawn anew, too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from cagefield.cameras import Camera
+from cagefield.hexahedron import Array
+
+Rect: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right, bottom, as shares of the picture's width and height."""
+
+WHOLE: Rect = (0.0, 0.0, 1.0, 1.0)
+
+Differing: TypeAlias = Callable[[int, int, int], Rect | None]
+"""(page, one revision, another) -> where they may differ in the page's picture; None for nowhere."""
+
+LEAST = 16
+"""Least width and height of a part that is rendered, pixels."""
+
+BESIDE = 2.0
+"""Pixels that a part is larger than what it must show, on each side: enlarging it smooths its edge."""
+
+
+def everywhere(page: int, one: int, another: int) -> Rect | None:
+    """The whole picture."""
+    return WHOLE
+
+
+def joined(a: Rect | None, b: Rect | None) -> Rect | None:
+    """The rectangle around both."""
+    if a is None or b is None:
+        return b if a is None else a
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+def seen(camera: Camera, boxes: Array) -> Rect | None:
+    """The rectangle in which a camera without distortion sees boxes [B,2,3] (min, max); None for nowhere."""
+    found: Rect | None = None
+    for box in boxes:
+        corners = np.array(list(itertools.product(*box.T)))
+        inside = (corners - camera.origin) @ camera.c2w[:3, :3]
+        depth = -inside[:, 2]
+        if (depth <= 0.0).all():
+            continue
+        if depth.min() <= 1e-6 * float(np.abs(inside).max()):
+            return WHOLE
+        x = (camera.cx + camera.fx * inside[:, 0] / depth) / camera.width
+        y = (camera.cy - camera.fy * inside[:, 1] / depth) / camera.height
+        left, top, right, bottom = float(x.min()), float(y.min()), float(x.max()), float(y.max())
+        if left < 1.0 and right > 0.0 and top < 1.0 and bottom > 0.0:
+            found = joined(found, (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0)))
+    return found
+
+
+def pixels(rect: Rect | None, width: int, height: int) -> tuple[int, int, int, int]:
+    """(x, y, width, height) in pixels of a part of a picture that holds a rectangle; of a few for None."""
+    spans = []
+    for low, high, n in ((0, 2, width), (1, 3, height)):
+        a, b = (0.5, 0.5) if rect is None else (rect[low], rect[high])
+        # Even, since of distances every other one is sent.
+        first = min(max(0, 2 * math.floor((a * n - BESIDE) / 2)), max(0, 2 * ((n - LEAST) // 2)))
+        last = max(min(n, 2 * math.ceil((b * n + BESIDE) / 2)), min(n, first + LEAST))
+        spans.append((first, last - first))
+    return spans[0][0], spans[1][0], spans[0][1], spans[1][1]
+
+
+def tiles(part: tuple[int, int, int, int], count: float) -> list[tuple[int, int, int, int]]:
+    """A part (x, y, width, height) of a picture cut into about `count` tiles, the middle ones first."""
+    x, y, width, height = part
+    side = math.sqrt(width * height / max(count, 1.0))
+    columns, rows = max(1, round(width / side)), max(1, round(height / side))
+    xs = [x + 8 * round(width * n / columns / 8) for n in range(columns)] + [x + width]
+    ys = [y + 8 * round(height * n / rows / 8) for n in range(rows)] + [y + height]
+    found = [
+        (x0, y0, x1 - x0, y1 - y0)
+        for x0, x1 in itertools.pairwise(xs)
+        for y0, y1 in itertools.pairwise(ys)
+        if x1 > x0 and y1 > y0
+    ]
+
+    def off_centre(tile: tuple[int, int, int, int]) -> float:
+        dx = (tile[0] + 0.5 * tile[2] - x) / width - 0.5
+        dy = (tile[1] + 0.5 * tile[3] - y) / height - 0.5
+        return dx * dx + dy * dy
+
+    return sorted(found, key=off_centre)
+
+
+@dataclass
+class Showing:
+    """What a page shows: a view (camera and look), the base's revision, and the later ones.
+
+    `coarse` is where it was drawn coarsely since the base.
+    """
+
+    view: object = None
+    base: int | None = None
+    exact: bool = False
+    """Whether the base is as fine as it can be."""
+    later: set[int] = field(default_factory=set)
+    coarse: Rect | None = None
+
+    def wanting(
+        self, page: int, view: object, revision: int, differing: Differing, *, exact: bool = False
+    ) -> Rect | None:
+        """Where the page must be drawn anew to show a revision in a view; None for nowhere.
+
+        With `exact`, to show it as fine as can be.
+        """
+        if self.base is None or view != self.view or (exact and not self.exact):
+            return WHOLE
+        found = self.coarse if exact else None
+        for other in (revision, *self.later):
+            if other != self.base:
+                found = joined(found, differing(page, self.base, other))
+        return found
+
+    def drawn(
+        self, view: object, revision: int, area: Rect, *, whole: bool, all_wanting: bool, exact: bool
+    ) -> None:
+        """A picture was drawn in an area: the `whole` one, `all_wanting` (the last part of it), or less."""
+        if whole:
+            self.view, self.base, self.exact, self.later, self.coarse = view, revision, exact, set(), None
+            return
+        if view != self.view or self.base is None:
+            self.base = None
+            return
+        if not exact:
+            self.coarse = joined(self.coarse, area)
+        if all_wanting and exact and self.exact:
+            self.base, self.later, self.coarse = revision, set(), None
+        elif all_wanting:
+            self.later = {revision} - {self.base}
+        else:
+            self.later = self.later | ({revision} - {self.base})
+
+    def lost(self) -> None:
+        """What the page shows is not known."""
+        self.base = None

@@ -1,0 +1,305 @@
+"""Which part of a page's picture is rendered anew, and that it is enough."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cagefield import devices
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.rendering.renderer import Renderer
+from cagefield.server.regions import WHOLE, Rect, Showing, joined, pixels, seen, tiles
+from cagefield.server.scheduler import SETTLE_SECONDS, Look, Region, Request, Scheduler
+from cagefield.server.studio import Studio
+from cagefield.server.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
+from scenes import ball_scene
+
+SIDE = 64
+CAMERA = Camera.look_at((0.6, -3.4, 0.9), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
+PART = Edit(Cage.box((0.5, 0, 0.2), 0.4), Cage.box((0.5, 0, 0.2), 0.9), lattice=24)
+OTHER = Edit(Cage.box((-0.2, 0, 0.2), 0.5), Cage.box((-0.2, 0, 0.2), 1.1), lattice=24).rotate((0, 0, 0.5))
+COPY = Edit(Cage.box((0.4, 0, 0), 0.5), adjustment="discrete", keep_source=True).translate((-0.6, 0, 0.6))
+
+
+# ---- rectangles ----
+
+
+def test_boxes_are_seen_within_their_rectangle() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        low = rng.uniform(-1, 0.5, (2, 3))
+        boxes = np.stack([low, low + rng.uniform(0.1, 0.8, (2, 3))], axis=1)
+        rect = seen(CAMERA, boxes)
+        assert rect is not None
+        p = rng.uniform(boxes[:, :1], boxes[:, 1:], (2, 400, 3)).reshape(-1, 3)
+        at = CAMERA.project(p)[0] / SIDE
+        inside = ((at >= 0) & (at <= 1)).all(axis=1)
+        assert (at[inside] >= np.array(rect[:2]) - 1e-9).all() and (
+            at[inside] <= np.array(rect[2:]) + 1e-9
+        ).all()
+        # As small as the boxes' corners allow.
+        corners = np.array([[x, y, z] for b in boxes for x in b[:, 0] for y in b[:, 1] for z in b[:, 2]])
+        at = CAMERA.project(corners)[0] / SIDE
+        expected = (*np.clip(at.min(axis=0), 0, 1), *np.clip(at.max(axis=0), 0, 1))
+        assert rect == pytest.approx(expected)
+
+
+def test_boxes_beside_and_behind_a_camera_are_not_seen_and_around_it_everywhere() -> None:
+    eye = CAMERA.origin
+    behind = eye - 3.0 * (np.zeros(3) - eye)
+    assert seen(CAMERA, np.array([[behind - 0.1, behind + 0.1]])) is None
+    assert seen(CAMERA, np.array([[[40.0, 0, 0], [40.5, 1, 1]]])) is None
+    assert seen(CAMERA, np.array([[eye - 0.1, eye + 0.1]])) == WHOLE
+    assert seen(CAMERA, np.zeros((0, 2, 3))) is None
+
+
+@pytest.mark.parametrize(
+    "rect", [None, WHOLE, (0.3, 0.0, 0.31, 0.2), (0.95, 0.95, 1.0, 1.0), (0.2, 0.3, 0.6, 0.9)]
+)
+def test_pixels_hold_the_rectangle_and_tiles_are_all_of_them(rect: Rect | None) -> None:
+    for width, height in ((200, 120), (754, 532), (10, 12)):
+        x, y, w, h = pixels(rect, width, height)
+        assert x >= 0 and y >= 0 and x + w <= width and y + h <= height and w > 0 and h > 0
+        if rect is not None:
+            assert x <= rect[0] * width and x + w >= rect[2] * width
+            assert y <= rect[1] * height and y + h >= rect[3] * height
+        count = np.zeros((height, width), int)
+        for tile in tiles((x, y, w, h), 7):
+            count[tile[1] : tile[1] + tile[3], tile[0] : tile[0] + tile[2]] += 1
+        assert count[y : y + h, x : x + w].min() == 1 == count.max() and count.sum() == w * h
+
+
+# ---- what a page shows: a canvas of numbers ----
+
+
+class Played:
+    """A page's canvas. Revision r shows r in its own rectangle, and 0 elsewhere."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.rects: dict[int, Rect] = {}
+        self.canvas = np.full((SIDE, SIDE), -1)
+        self.fine = np.zeros((SIDE, SIDE), bool)
+        self.showing = Showing()
+        self.view = "first"
+        self.revision = 0
+
+    def picture(self, revision: int) -> np.ndarray[Any, Any]:
+        found = np.full((SIDE, SIDE), 1000 if self.view == "first" else 2000)
+        x, y, w, h = self.exactly(self.rects.get(revision))
+        found[y : y + h, x : x + w] += revision
+        return found
+
+    def exactly(self, rect: Rect | None) -> tuple[int, int, int, int]:
+        if rect is None:
+            return 0, 0, 0, 0
+        x, y, right, bottom = (round(SIDE * value) for value in rect)
+        return x, y, right - x, bottom - y
+
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        return joined(self.rects.get(one), self.rects.get(another))
+
+    def edit(self) -> None:
+        self.revision += 1
+        low = self.rng.integers(0, SIDE - 8, 2) / SIDE
+        high = low + self.rng.integers(1, 9, 2) / SIDE
+        self.rects[self.revision] = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+
+    def paint(self, part: tuple[int, int, int, int], fine: bool) -> Rect:
+        """The area painted with the revision as it is."""
+        x, y, w, h = part
+        self.canvas[y : y + h, x : x + w] = self.picture(self.revision)[y : y + h, x : x + w]
+        self.fine[y : y + h, x : x + w] = fine
+        return x / SIDE, y / SIDE, (x + w) / SIDE, (y + h) / SIDE
+
+
+EVENTS = {"edit": 0.4, "moving": 0.35, "rest": 0.1, "broken off": 0.11, "view": 0.02, "lost": 0.02}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_page_shows_what_it_should_once_what_it_wants_is_drawn(seed: int) -> None:
+    played = Played(seed)
+    parts = 0
+    for _ in range(300):
+        event = played.rng.choice(list(EVENTS), p=list(EVENTS.values()))
+        if event == "edit":
+            played.edit()
+            continue
+        if event == "view":
+            played.view = "second" if played.view == "first" else "first"
+            continue
+        if event == "lost":
+            played.canvas[:] = -1
+            played.showing.lost()
+            continue
+        view, showing = played.view, played.showing
+        exact = event != "moving"
+        rect = showing.wanting(1, view, played.revision, played.differing, exact=exact)
+        # Moving pictures have fewer pixels, and a part's edges lie further out then.
+        coarseness = 1 if exact else int(played.rng.choice([1, 2, 4]))
+        x, y, w, h = (coarseness * n for n in pixels(rect, SIDE // coarseness, SIDE // coarseness))
+        part = x, y, w, h
+        whole = part == (0, 0, SIDE, SIDE)
+        parts += not whole
+        pieces = tiles(part, 4) if exact else [part]
+        if event == "broken off":
+            pieces = pieces[: len(pieces) // 2]
+            for piece in pieces:
+                area = played.paint(piece, exact)
+                showing.drawn(view, played.revision, area, whole=False, all_wanting=False, exact=exact)
+            continue
+        for number, piece in enumerate(pieces, start=1):
+            area = played.paint(piece, exact)
+            last = number == len(pieces)
+            showing.drawn(view, played.revision, area, whole=whole and last, all_wanting=last, exact=exact)
+        assert np.array_equal(played.canvas, played.picture(played.revision))
+        assert played.fine.all() or not exact
+    assert parts > 20
+
+
+# ---- the scheduler ----
+
+
+class Bench:
+    """A scheduler whose page shows what it is sent at once, with edits that change an eighth of its view."""
+
+    def __init__(self) -> None:
+        self.scheduler = Scheduler(lambda page, one, another: (0.25, 0.5, 0.5, 1.0))
+        self.now = 0.0
+        self.scheduler.join(1)
+        self.look(1)
+
+    def look(self, seq: int) -> None:
+        self.scheduler.camera(1, seq, 800, 800, False, self.now)
+
+    def all(self) -> list[Request]:
+        found = []
+        for _ in range(2):
+            while (request := self.scheduler.next(self.now)) is not None:
+                self.now += 0.02
+                rays = request.region.width * request.region.height
+                self.scheduler.finished(request, rays, rays / 1e6, 0.0)
+                self.scheduler.presented(1, request.number)
+                found.append(request)
+            self.now += SETTLE_SECONDS + 1e-3
+        return found
+
+
+def share(requests: list[Request]) -> float:
+    """The share of the view that the requests cover."""
+    return sum(
+        r.region.width * r.region.height / (r.region.full_width * r.region.full_height) for r in requests
+    )
+
+
+def test_a_drag_renders_the_part_that_it_changes_and_rest_too() -> None:
+    bench = Bench()
+    assert share(bench.all()[1:]) == pytest.approx(1.0)
+    bench.scheduler.edits(1, True, bench.now)
+    moving = bench.all()
+    assert moving[0].moving and 0.125 <= share(moving[:1]) < 0.16
+    bench.scheduler.edits(2, True, bench.now)
+    bench.scheduler.edits(2, False, bench.now)
+    rest = [request for request in bench.all() if not request.moving]
+    assert 0.125 <= share(rest) < 0.14 and rest[-1].final and rest[-1].exact
+    assert bench.scheduler.idle()
+    # A part has more pixels than it would have in a picture of everything.
+    assert moving[0].region.full_width > 1.2 * Bench().all()[0].region.full_width
+
+
+@pytest.mark.parametrize("what", ["camera", "look", "renderer lost"])
+def test_another_view_is_rendered_as_a_whole(what: str) -> None:
+    bench = Bench()
+    bench.all()
+    bench.scheduler.edits(1, True, bench.now)
+    bench.all()
+    if what == "camera":
+        bench.look(2)
+    elif what == "look":
+        bench.scheduler.look(1, Look("depth"), bench.now)
+    else:
+        bench.scheduler.refresh(bench.now)
+    assert share(bench.all()[:1]) == 1.0
+    bench.scheduler.edits(2, True, bench.now)
+    assert share(bench.all()[:1]) < 0.16
+
+
+# ---- pictures ----
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    devices.start("cpu")
+    return Studio(ball_scene())
+
+
+STACKS = {
+    "continuous": ((PART,), (PART.translate((0.1, 0, 0.05)),)),
+    "under another": ((PART, OTHER), (PART.translate((0.1, 0, 0.05)), OTHER)),
+    "over another": ((OTHER, PART), (OTHER, PART.translate((0.1, 0, 0.05)))),
+    "a copy": ((PART,), (PART, COPY)),
+    "under a copy": ((PART, COPY), (PART.rotate((0, 0, 0.6)), COPY)),
+    "order": ((PART.scale(1.2), OTHER), (OTHER, PART.scale(1.2))),
+}
+
+
+@pytest.mark.parametrize("name", STACKS)
+def test_pictures_are_the_same_outside_what_is_rendered(studio: Studio, name: str) -> None:
+    before, after = (EditStack(stack) for stack in STACKS[name])
+    first, second = (studio.plain.with_edits(stack).render(CAMERA) for stack in (before, after))
+    assert first is not None and second is not None
+    x, y, w, h = pixels(seen(CAMERA, after.changed_boxes(before)), SIDE, SIDE)
+    difference = np.abs(first.rgb - second.rgb).max(axis=2)
+    assert difference.max() > 0.1  # the change shows
+    difference[y : y + h, x : x + w] = 0.0
+    # Samples may lie elsewhere along a ray where the edits reach beyond the grid; nothing else differs.
+    assert difference.max() < 0.02 and w * h < 0.9 * SIDE * SIDE
+
+
+@pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
+def test_a_part_over_the_last_picture_is_the_whole_picture(studio: Studio, view: Any) -> None:
+    before, after = STACKS["under another"]
+    look = Look(view, split=0.55)
+
+    def shown(edits: tuple[Edit, ...], region: Region) -> np.ndarray[Any, Any]:
+        task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, False, True, 0)
+        done = studio.picture(task, lambda: False)
+        assert isinstance(done, PictureDone)
+        return np.asarray(Image.open(io.BytesIO(done.picture))).astype(float)
+
+    whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
+    x, y, w, h = pixels(seen(CAMERA, EditStack(after).changed_boxes(EditStack(before))), SIDE, SIDE)
+    composed = shown(before, whole)
+    composed[y : y + h, x : x + w] = shown(after, Region(x, y, w, h, SIDE, SIDE))
+    expected = shown(after, whole)
+    assert np.abs(composed - shown(before, whole)).max() > 20
+    # JPEG codes blocks of 8 by 8 pixels, which the part cuts elsewhere: a few values off at edges.
+    assert np.abs(composed - expected).mean() < 1.0 and np.abs(composed - expected).max() < 40
+
+
+def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
+    studio = Studio(ball_scene())
+    edits = (PART.translate((0.12, 0, 0)), OTHER)
+    whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
+    task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Look(), False, True, 0)
+    expected = Renderer(studio.scene.field, EditStack(edits))
+    for looks in range(1, 6):
+        left = looks
+
+        def stop() -> bool:
+            nonlocal left
+            left -= 1
+            return left <= 0
+
+        assert isinstance(studio.picture(task, stop), Stopped)
+        if looks <= 4:  # between the passes; later, between bands of the picture
+            assert studio._exact == []
+    done = studio.picture(task, lambda: False)
+    assert isinstance(done, PictureDone)
+    assert np.array_equal(studio._exact[-1].renderer._occupancy.codes, expected._occupancy.codes)
