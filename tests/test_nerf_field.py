@@ -71,7 +71,7 @@ def test_networks_that_do_not_fit_together_are_refused() -> None:
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.fields.nerf_torch import to_ndc  # noqa: E402
+from cagefield.fields.nerf_torch import TorchNerf, to_ndc  # noqa: E402
 from cagefield.rendering.nerf import Rays, march, render_nerf, sample_pdf, trace  # noqa: E402
 from cagefield.rendering.tensor_maps import TensorMap  # noqa: E402
 
@@ -323,23 +323,32 @@ def test_lindisp_samples_are_even_in_disparity() -> None:
     np.testing.assert_allclose(1 / s[0], [1.0, 0.75, 0.5, 0.25], rtol=1e-6)
 
 
-def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None, step: float) -> np.ndarray:
+def in_float64(field: NerfField) -> TorchNerf:
+    double = TorchNerf(field, torch.device("cpu"))
+    for network in (double.coarse, double.fine):
+        assert network is not None
+        network._layers = {name: (w.double(), b.double()) for name, (w, b) in network._layers.items()}
+    return double
+
+
+def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None) -> np.ndarray:
     """Normals [N,3] by central differences of the edited sigma, at the renderer's samples and weights."""
     rays = Rays.of(camera, torch.device("cpu"))
     mapped = None if edits is None else TensorMap(edits, torch.device("cpu"), preserve_opacity=False)
+    double = in_float64(field)
 
     def sigma(points: torch.Tensor, viewdirs: torch.Tensor) -> torch.Tensor:
-        if mapped is None:
-            return field.torch(points, viewdirs)[0]
-        # the direction is kept, as sigma depends on it in NDC alone
-        return field.torch(mapped(points, viewdirs)[0], viewdirs)[0]
+        if mapped is not None:
+            points = mapped(points.float(), viewdirs.float())[0].double()
+        return double(points, viewdirs)[0]
 
     with torch.no_grad():
         sums = march(field.torch, rays, mapped)[1]
         points = (rays.origins[:, None] + sums.t[..., None] * rays.directions[:, None]).reshape(-1, 3)
         along = rays.directions[:, None].expand(*sums.t.shape, 3).reshape(-1, 3)
-        # float32 does not tell apart points 1e-3 from each other where NDC rays are a thousand away
-        size = step * points.norm(dim=1, keepdim=True).clamp_min(1.0)
+        points, along = points.double(), along.double()
+        # the edits' map is float32; NDC rays end a million units away
+        size = (1e-6 if mapped is None else 1e-3) * points.norm(dim=1, keepdim=True).clamp_min(1.0)
         offsets = [size * axis for axis in torch.eye(3)]
         slopes = torch.stack([sigma(points + o, along) - sigma(points - o, along) for o in offsets], dim=1)
         own = torch.nn.functional.normalize(slopes, dim=1, eps=1e-30).reshape(*sums.t.shape, 3)
@@ -354,10 +363,10 @@ def test_normals_are_the_slopes_of_the_edited_density(name) -> None:
     seen_by = Camera.from_fov(np.eye(4), 8, 8, 0.9) if name == "ndc" else camera(8)
     frame = render_nerf(field, seen_by, edits=edits, normals=True, preserve_opacity=False)
     assert frame.normals is not None
-    expected = numeric_normals(field, seen_by, edits, 1e-3)
+    expected = numeric_normals(field, seen_by, edits)
     cosines = (frame.normals.reshape(-1, 3) * expected).sum(axis=1)[frame.opacity.ravel() > 0.3]
     assert len(cosines) > 10
-    # central differences in float32 over 2e-3, and across ReLUs and cage faces: a few pixels are degrees off
+    # differences of a float32 map over 2e-3, and across ReLUs and cage faces: a few pixels are degrees off
     assert np.median(cosines) > 0.9999 and np.quantile(cosines, 0.1) > 0.99
 
 
