@@ -143,7 +143,9 @@ def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, m
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
     argv = [photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 60, "--resolution", 24]
     text = printed(capsys, "train", *argv)
-    assert "60 steps, networks of 3 x 24, 4 + 2 octaves; train PSNR" in text
+    assert (
+        "60 steps, networks of 3 x 24, 4 + 2 octaves, sampled from depth" in text and "; train PSNR" in text
+    )
     assert "PSNR of the voxels against the original" in text
     scene = Scene.open(tmp_path / "scene")
     assert scene.original is not None and scene.original.samples == (12, 12)
