@@ -7,6 +7,7 @@ import pytest
 
 from cagefield import devices
 from cagefield.cameras import Camera
+from cagefield.fields.seen import seen_by
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.renderer import Renderer
 from cagefield.training.filling import DEPTH, OPAQUE, filled
@@ -134,8 +135,10 @@ def test_under_a_block_the_ground_goes_on() -> None:
     block = (np.abs(p[..., :2]).max(axis=-1) <= 0.3) & (p[..., 2] > -0.5) & (p[..., 2] <= 0.3)
     density = np.where(ground | block, 3.0 / VOXEL, 0.0).astype(np.float32)
     colour = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
+    hidden = unseen(field_of(density, colour), ring())
+    # What a training leaves where no photo looks.
+    colour[hidden] = [-1.0, -1.0, 2.0]
     field = field_of(density, colour)
-    hidden = unseen(field, ring())
     _, after = dense(filled(field, hidden))
     k = int(np.argmin(np.abs(np.linspace(-1, 1, N) + 0.5))) - 1
     under = hidden[:, :, k] & (np.abs(p[:, :, k, :2]).max(axis=-1) < 0.25)
@@ -151,3 +154,19 @@ def test_nothing_unseen_and_nothing_solid_leave_the_field_as_it_is(ball) -> None
     assert filled(field, np.zeros(field.resolution, bool)) is field
     mist = field_of(np.full((N, N, N), 1e-4, np.float32), np.zeros((N, N, N, 3), np.float32))
     assert filled(mist, np.ones((N, N, N), bool)) is mist
+
+
+def test_as_many_cameras_as_asked_have_a_point_in_their_picture() -> None:
+    # All look along +x: two from the left of the origin, one from the right of it.
+    eyes = ((-3.0, 0, 0), (-3.0, 0.1, 0), (4.0, 0, 0))
+    targets = ((0.0, 0, 0), (0, 0.1, 0), (9.0, 0, 0))
+    cameras = [
+        Camera.look_at(eye, at, width=20, height=20, fov_x=0.5) for eye, at in zip(eyes, targets, strict=True)
+    ]
+    points = np.array([[0.0, 0, 0], [6.0, 0, 0], [0, 5.0, 0], [-2.5, 0.05, 0]])
+    assert [seen_by(cameras, points, least=n).tolist() for n in (1, 2, 3)] == [
+        [True, True, False, True],
+        [True, True, False, True],
+        [False, True, False, False],
+    ]
+    assert seen_by(cameras, points, near=1.0).tolist() == [True, True, False, False]

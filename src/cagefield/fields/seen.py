@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,19 +14,19 @@ MARGIN = 0.05
 """A picture reaches this share of its size over its edges here, for what is interpolated there."""
 
 
-def seen_by(cameras: Sequence[Camera], points: NDArray[np.float32], near: float = 0.0) -> NDArray[np.bool_]:
-    """True [N] where a point [N,3] lies in the picture of any camera, at a depth of `near` or more.
+def seen_by(
+    cameras: Sequence[Camera], points: NDArray[Any], near: float = 0.0, least: int = 1
+) -> NDArray[np.bool_]:
+    """True [N] where a point [N,3] lies in the pictures of `least` cameras, at a depth of `near` or more.
 
     What is in between is not looked at.
     """
-    seen = np.zeros(len(points), bool)
-    left = np.arange(len(points))
+    wanted = np.full(len(points), least)
     for camera in cameras:
+        left = np.flatnonzero(wanted > 0)
         positions, depth = camera.project(points[left])
         size = np.array([camera.width, camera.height])
         with np.errstate(invalid="ignore"):
             inside = np.abs(positions / size - 0.5).max(axis=1) <= 0.5 + MARGIN
-        found = inside & (depth > 0.0) & (depth >= near)
-        seen[left[found]] = True
-        left = left[~found]
-    return seen
+        wanted[left] -= inside & (depth > 0.0) & (depth >= near)
+    return wanted <= 0

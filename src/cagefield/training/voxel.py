@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError, DatasetError
+from cagefield.fields.seen import seen_by
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.training.filling import filled
@@ -224,7 +225,7 @@ class _Run:
             self.near = config.near * float(
                 np.median([np.linalg.norm(v.camera.origin - middle) for v in dataset.train])
             )
-            keep = seen(dataset.train, self.bounds, first, self.near)
+            keep = _seen_vertices(dataset.train, self.bounds, first, self.near)
         self.all_patches = self.photos.patches(config.patch)
         self.step = 0
         self.stage = 0
@@ -589,10 +590,10 @@ def _cubic_voxels(
     return grown, (int(n[0]), int(n[1]), int(n[2]))
 
 
-def seen(
-    views: tuple[View, ...], bounds: NDArray[np.float64], resolution: int, near: float, least: int = 2
+def _seen_vertices(
+    views: tuple[View, ...], bounds: NDArray[np.float64], resolution: int, near: float
 ) -> NDArray[np.bool_]:
-    """Vertices [resolution^3] of a contracted grid that at least `least` views have in their picture.
+    """Vertices [resolution^3] of a contracted grid that at least two views have in their picture.
 
     What fewer views see cannot be told from a floater in front of a camera.
     """
@@ -601,12 +602,4 @@ def seen(
     axis = np.linspace(-2.0, 2.0, resolution)
     c = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     points = uncontract(c) * ((bounds[1] - bounds[0]) / 2) + bounds.mean(axis=0)
-    votes = np.zeros(len(points), np.int32)
-    # A margin of one voxel: a vertex outside a picture may still belong to a cell inside it.
-    for view in views:
-        pixels, depth = view.camera.project(points)
-        margin = 0.05 * np.array([view.camera.width, view.camera.height])
-        size = np.array([view.camera.width, view.camera.height])
-        inside = (np.abs(pixels - size / 2) <= size / 2 + margin).all(axis=1) & (depth > near)
-        votes += inside
-    return votes >= min(least, len(views))
+    return seen_by([view.camera for view in views], points, near, least=min(2, len(views)))
