@@ -6,13 +6,24 @@ Quadrants is imported here and in the kernel modules only, never by ``import cag
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import os
+import shutil
+import time
+import warnings
+from pathlib import Path
 from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import DeviceError
 
 DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
+
+KEPT_SECONDS = 30 * 86400.0
+"""How long kernels of other versions of the package are kept after they were last used."""
 
 _started: str | None = None
 
@@ -41,6 +52,8 @@ def start(device: str = "auto", *, double: bool = False) -> str:
     import quadrants as qd
 
     qd.set_logging_level("error")
+    # Kernels name constants, which `_kernel_cache` sees to.
+    warnings.filterwarnings("ignore", message=r"\[PURE.VIOLATION\]")
     archs: dict[str, Any] = {"cpu": qd.cpu, "cuda": qd.cuda, "metal": qd.metal, "vulkan": qd.vulkan}
     if device == "auto":
         chosen = next((name for name in ("cuda", "metal") if _supported(archs[name])), "cpu")
@@ -48,13 +61,16 @@ def start(device: str = "auto", *, double: bool = False) -> str:
         chosen = device
     else:
         raise DeviceError(f'device {device!r} is not available on this machine; use device="cpu" or "auto"')
+    cache = kernel_cache()
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             # Without that pass kernels compile three to nine times faster and run as fast.
             qd.init(
                 arch=archs[chosen],
                 default_fp=qd.f64 if double else qd.f32,
-                offline_cache=True,
+                offline_cache=cache is not None,
+                src_ll_cache=cache is not None,
+                offline_cache_file_path=str(cache or ""),
                 cfg_optimization=False,
                 log_level="error",
                 enable_fallback=False,
@@ -81,6 +97,51 @@ def threads() -> int:
         return max(1, len(os.sched_getaffinity(0)))
     except AttributeError:
         return max(1, os.cpu_count() or 1)
+
+
+def floats(values: ArrayLike) -> NDArray[np.float64]:
+    """A vector or matrix as an argument of a kernel.
+
+    Arrays, for Quadrants' own vectors keep a kernel from being loaded from the disk without its source being
+    read again, which takes seconds.
+    """
+    return np.asarray(values, dtype=np.float64)
+
+
+def ints(values: ArrayLike) -> NDArray[np.int32]:
+    """A vector of integers as an argument of a kernel; see `floats`."""
+    return np.asarray(values, dtype=np.int32)
+
+
+def kernel_cache() -> Path | None:
+    """The folder of the compiled kernels of this state of the package's source; None where none can be made.
+
+    Quadrants finds a kernel again by the source of its functions, without the constants that they name: two
+    states of the packages that hold kernels must not share a folder. Folders that nobody used for long are
+    removed.
+    """
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
+        folder = base / _source_digest()
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for other in base.iterdir():
+            if time.time() - other.stat().st_mtime > KEPT_SECONDS:
+                shutil.rmtree(other, ignore_errors=True)
+    except (OSError, RuntimeError):
+        return None
+    return folder
+
+
+def _source_digest() -> str:
+    """A digest of the source in all folders that hold kernels."""
+    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
+    folders = {path.parent for path, source in sources.items() if b"import quadrants" in source}
+    digest = hashlib.sha256()
+    for path, source in sources.items():
+        if path.parent in folders:
+            digest.update(source)
+    return digest.hexdigest()[:16]
 
 
 def _supported(arch: Any) -> bool:

@@ -24,6 +24,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import smooth_occupancy as smooth
 from cagefield.rendering.grid import (
@@ -229,10 +230,10 @@ def _corners(
     _occupied_corners(
         out,
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
-        ivec3(*canonical.blocks.shape),
-        ivec3(*canonical.origin.tolist()),
-        ivec3(*lower.tolist()),
-        ivec3(*count.tolist()),
+        ints(canonical.blocks.shape),
+        ints(canonical.origin),
+        ints(lower),
+        ints(count),
         spacing,
         *transform_of(field),
         stack.params,
@@ -252,10 +253,10 @@ def _refined(
     _occupied_blocks(
         out,
         np.ascontiguousarray(candidates).reshape(-1),
-        ivec3(*lower.tolist()),
+        ints(lower),
         grid.index,
         grid.density,
-        ivec3(*grid.field.resolution),
+        ints(grid.field.resolution),
         *transform_of(grid.field),
         stack.params,
         stack.lattice,
@@ -312,7 +313,7 @@ def probe(
     return image, reach, empty
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _occupied_corners(
     out: U8,
     blocks: U8,
@@ -351,7 +352,7 @@ def _occupied_corners(
         out[n] = qd.cast(found, qd.u8)
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _occupied_blocks(
     out: U8,
     candidates: I32,

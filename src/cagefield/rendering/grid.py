@@ -15,7 +15,9 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
+from cagefield.devices import floats
 from cagefield.fields.voxel import VoxelField
+from cagefield.hexahedron import Array
 
 BRICK = 4
 
@@ -92,14 +94,14 @@ def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -
     return np.asarray(np.lexsort((vertices, brick)))
 
 
-def transform_of(field: VoxelField) -> tuple[vec3, vec3, vec3]:
+def transform_of(field: VoxelField) -> tuple[Array, Array, Array]:
     """Origin, scale and half as in `cagefield.rendering.march`."""
     n = np.array(field.resolution)
     if field.contracted:
         origin, scale = field.center, 1.0 / field.half_size
     else:
         origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-    return vec3(*origin.tolist()), vec3(*scale.tolist()), vec3(*((n - 1) / 4).tolist())
+    return floats(origin), floats(scale), floats((n - 1) / 4)
 
 
 @qd.func

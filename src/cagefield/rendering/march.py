@@ -31,7 +31,7 @@ ivec2 = qd.types.vector(2, qd.i32)
 TILE = 8
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def march_tiles(
     out: F32,
     directions: F32,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.cameras import Camera
+from cagefield.devices import floats, ints
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
@@ -132,7 +133,6 @@ class Renderer:
         takes the place of the renderer's own.
         """
         from cagefield.rendering import march
-        from cagefield.rendering.grid import ivec3, vec3
 
         field = self.field
         x, y, width, height = _checked_region(region, camera)
@@ -155,27 +155,27 @@ class Renderer:
                 directions,
                 row,
                 min(rows, down - row),
-                march.ivec2(x, y),
-                march.ivec2(width, height),
+                ints((x, y)),
+                ints((width, height)),
                 camera.width,
-                march.mat3(camera.c2w[:3, :3].tolist()),
-                vec3(*camera.c2w[:3, 3].tolist()),
+                floats(camera.c2w[:3, :3]),
+                floats(camera.c2w[:3, 3]),
                 self._codes,
-                ivec3(*self._occupancy.origin.tolist()),
-                ivec3(*self._occupancy.codes.shape),
+                ints(self._occupancy.origin),
+                ints(self._occupancy.codes.shape),
                 self._grid.index,
                 self._grid.density,
                 self._grid.sh,
-                ivec3(*field.resolution),
-                vec3(*lower.tolist()),
-                vec3(*scale.tolist()),
+                ints(field.resolution),
+                floats(lower),
+                floats(scale),
                 length,
                 near,
                 int(normals),
                 self._boxes,
                 len(self._stack.boxes),
                 self._canonical_codes,
-                ivec3(*self._canonical.codes.shape),
+                ints(self._canonical.codes.shape),
                 self._stack.params,
                 self._stack.lattice,
                 self._stack.n_edits,

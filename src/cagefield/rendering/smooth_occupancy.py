@@ -19,6 +19,7 @@ import numpy as np
 import quadrants as qd
 from numpy.typing import NDArray
 
+from cagefield.devices import ints
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -115,8 +116,8 @@ def _images(
         np.zeros((1, 3), np.float32) if starts is None else starts,
         int(starts is not None),
         np.ascontiguousarray(wanted, np.uint8).reshape(-1),
-        ivec3(*lower.tolist()),
-        ivec3(*wanted.shape),
+        ints(lower),
+        ints(wanted.shape),
         spacing,
         *transform_of(grid.field),
         stack.params,
@@ -135,10 +136,10 @@ def _occupied(images: NDArray[np.float32], canonical: Occupancy, count: tuple[in
         out,
         images,
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
-        ivec3(*canonical.blocks.shape),
+        ints(canonical.blocks.shape),
         canonical.codes.reshape(-1),
-        ivec3(*canonical.origin.tolist()),
-        ivec3(*count),
+        ints(canonical.origin),
+        ints(count),
     )
     return out.reshape(count).view(bool)
 
@@ -159,15 +160,15 @@ def _refined(
         out,
         candidates.reshape(-1),
         images,
-        ivec3(*count),
+        ints(count),
         grid.index,
         grid.density,
-        ivec3(*grid.field.resolution),
+        ints(grid.field.resolution),
     )
     return out.view(bool)
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _map_points(
     images: Nodes,
     starts: Nodes,
@@ -227,7 +228,7 @@ def differences(images: qd.template(), n: qd.i32, i: qd.i32, count: qd.i32, stri
     return qd.max(qd.abs(before), qd.abs(after)), bend
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _occupied_points(
     out: U8,
     images: Nodes,
@@ -267,7 +268,7 @@ def _occupied_points(
         out[n] = qd.cast(found, qd.u8)
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _dense_blocks(
     out: U8, candidates: I32, images: Nodes, count: ivec3, index: I32, density: F32, resolution: ivec3
 ):

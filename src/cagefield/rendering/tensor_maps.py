@@ -67,7 +67,7 @@ class TensorMap:
         return out[:, :3], out[:, 3:6], out[:, 6]
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _map_tensors(
     samples: Table,
     out: Table,

@@ -72,7 +72,7 @@ def spread_slope(
     return 2.0 * (s * before_w - before_ws + after_ws - s * after_w) + (2.0 / 3.0) * w * ds
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def march_batch(
     patches: I32,
     n_patches: qd.i32,
@@ -291,7 +291,7 @@ def march_batch(
                                         add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def gauss_newton(
     density: F32,
     sh: F32,
@@ -358,7 +358,7 @@ def gauss_newton(
                 sh[slot * (3 * K) + j] = c - rate * g
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def touched_patches(
     touched: I32,
     patches: I32,
@@ -404,7 +404,7 @@ def touched_patches(
         touched[patch] = found
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def laplacian(
     density: F32,
     sh: F32,

@@ -15,6 +15,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
+from cagefield.devices import floats, ints
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import (
@@ -62,15 +63,15 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
             seen,
             to_device(local.astype(np.float32)),
             local.shape[0] * local.shape[1],
-            mat3(camera.c2w[:3, :3].tolist()),
-            vec3(*camera.origin),
+            floats(camera.c2w[:3, :3]),
+            floats(camera.origin),
             codes,
-            ivec3(*bricks.codes.shape),
+            ints(bricks.codes.shape),
             grid.index,
             grid.density,
-            ivec3(*field.resolution),
-            vec3(*field.bounds[0]),
-            vec3(*scale),
+            ints(field.resolution),
+            floats(field.bounds[0]),
+            floats(scale),
             float(STEP / scale.max()),
             LEAST_TRANSMITTANCE,
         )
@@ -84,7 +85,7 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
     return ~cells
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _mark_seen(
     seen: U8,
     directions: F32,

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.datasets.views import Dataset, View
+from cagefield.devices import floats, ints
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.seen import seen_by
 from cagefield.fields.voxel import VoxelField
@@ -314,7 +315,7 @@ class _Run:
 
     def _choose_patches(self) -> None:
         """Leave out the patches that meet no occupied block."""
-        from cagefield.rendering.grid import ivec3, to_device, vec3
+        from cagefield.rendering.grid import to_device
         from cagefield.training import kernels
 
         self.patches = self.all_patches
@@ -332,10 +333,10 @@ class _Run:
                 self.photos.poses,
                 self.photos.directions,
                 grid.codes,
-                ivec3(*grid.brick_dims),
-                vec3(*lower),
-                vec3(*scale),
-                ivec3(*grid.resolution),
+                ints(grid.brick_dims),
+                floats(lower),
+                floats(scale),
+                ints(grid.resolution),
                 self.near,
             )
             self.patches = self.all_patches[touched.to_numpy() > 0]
@@ -357,7 +358,6 @@ class _Run:
         return self.grid.bounds[0].tolist(), (n / (self.grid.bounds[1] - self.grid.bounds[0])).tolist()
 
     def _batch(self, done: float) -> None:
-        from cagefield.rendering.grid import ivec3, vec3
         from cagefield.training import kernels
 
         config, grid, photos = self.config, self.grid, self.photos
@@ -394,16 +394,16 @@ class _Run:
             losses,
             penalties,
             gain_sums,
-            ivec3(*grid.brick_dims),
-            ivec3(*grid.resolution),
-            vec3(*lower),
-            vec3(*scale),
+            ints(grid.brick_dims),
+            ints(grid.resolution),
+            floats(lower),
+            floats(scale),
             step,
             self.near,
             config.distortion,
             self.reach,
             1,
-            vec3(1.0, 1.0, 1.0),
+            floats((1.0, 1.0, 1.0)),
             grid.terms,
             self.contracted,
             gpu,
@@ -417,7 +417,7 @@ class _Run:
                 grid.cell,
                 grid.accumulator,
                 grid.slots,
-                ivec3(*grid.resolution),
+                ints(grid.resolution),
                 self.smooth,
                 self.smooth,
                 grid.terms,

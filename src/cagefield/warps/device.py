@@ -22,6 +22,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices, hexahedron
+from cagefield.devices import floats
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
 from cagefield.warps import flow_device, flow_lattice
@@ -440,7 +441,7 @@ def displacement(at: vec3, s: vec3, lattice: qd.template(), first: qd.i32, resol
     return u, along
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _map_samples(
     samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32, flows: qd.template()
 ):
@@ -457,7 +458,7 @@ def _map_samples(
         out[i, 7] = qd.cast(emptied, qd.f32)
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
     for n in range(nodes.shape[0]):
         i = n % resolution
@@ -516,7 +517,7 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
         return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
     origin, frame = warp.outer.frame
     nodes = np.empty((resolution**3, 3), dtype=np.float32)
-    place = (vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    place = (floats(origin), floats(frame), resolution)
     params = row[None].copy()
     params[0, [RESOLUTION, SIMPLE]] = 0.0
     if not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference

@@ -15,6 +15,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
+from cagefield.devices import floats
 from cagefield.warps.flow_device import HEADER, MOMENT, flow_point, table
 from cagefield.warps.flow_lanes import bend, newton, times, unbend, weight_at
 from cagefield.warps.flow_shell import FlowShell
@@ -50,7 +51,7 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     devices.start()
     origin, frame = shell.outer.frame
     nodes = np.empty((resolution**3, 3), dtype=np.float32)
-    place = (table(shell), vec3(*origin.tolist()), mat3(frame.tolist()), resolution)
+    place = (table(shell), floats(origin), floats(frame), resolution)
     if devices.is_gpu():  # which has a lane for every node
         nodes[:] = LOST
     else:
@@ -60,7 +61,7 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     return nodes
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _march_lost(nodes: Nodes, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
     for n in range(nodes.shape[0]):
         if nodes[n].x == LOST:
@@ -68,7 +69,7 @@ def _march_lost(nodes: Nodes, table: Nodes, origin: vec3, frame: mat3, resolutio
             nodes[n] = flow_point(p, table, 0) - p
 
 
-@qd.kernel
+@qd.kernel(fastcache=True)
 def _march(
     nodes: Nodes,
     table: Nodes,
