@@ -303,3 +303,19 @@ def test_a_page_that_left_is_not_rendered_for() -> None:
     b.scheduler.leave(1)
     b.scheduler.finished(request, 100, 0.1, 0.0)
     assert b.scheduler.next(b.now) is None and b.scheduler.wake(b.now) is None
+
+
+def test_nothing_else_is_done_between_the_pictures_of_a_drag() -> None:
+    b = Bench()
+    b.open(1)
+    b.finish()
+    b.settle()
+    b.finish()
+    assert b.scheduler.idle()
+    for revision in range(1, 1 + MOST_UNSHOWN):
+        b.scheduler.edits(revision, True, b.now)
+        request = b.scheduler.next(b.now)
+        assert request is not None
+        b.render(request)
+    assert b.scheduler.unshown(1) == MOST_UNSHOWN and b.scheduler.next(b.now) is None
+    assert not b.scheduler.idle()

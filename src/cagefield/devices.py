@@ -70,6 +70,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
                 default_fp=qd.f64 if double else qd.f32,
                 offline_cache=cache is not None,
                 src_ll_cache=cache is not None,
+                cpu_max_num_threads=threads(),
                 offline_cache_file_path=str(cache or ""),
                 cfg_optimization=False,
                 log_level="error",

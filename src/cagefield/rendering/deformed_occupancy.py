@@ -26,6 +26,7 @@ from scipy import ndimage
 
 from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
+from cagefield.loops import Deal, deal, dealt, turns
 from cagefield.rendering import smooth_occupancy as smooth
 from cagefield.rendering.grid import (
     F32,
@@ -229,6 +230,7 @@ def _corners(
     out = np.zeros(int(np.prod(count)), np.uint8)
     _occupied_corners(
         out,
+        deal(len(out)),
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
         ints(canonical.blocks.shape),
         ints(canonical.origin),
@@ -252,6 +254,7 @@ def _refined(
     out = np.zeros(len(candidates), np.uint8)
     _occupied_blocks(
         out,
+        deal(len(out)),
         np.ascontiguousarray(candidates).reshape(-1),
         ints(lower),
         grid.index,
@@ -316,6 +319,7 @@ def probe(
 @qd.kernel(fastcache=True)
 def _occupied_corners(
     out: U8,
+    deal: Deal,
     blocks: U8,
     blocks_shape: ivec3,
     blocks_origin: ivec3,
@@ -331,30 +335,34 @@ def _occupied_corners(
     contracted: qd.i32,
     flows: qd.template(),
 ):
-    for n in range(count.x * count.y * count.z):
-        i = n // (count.y * count.z)
-        j = (n // count.z) % count.y
-        k = n % count.z
-        g = qd.cast(lower + spacing * ivec3(i, j, k), qd.f32)
-        image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
-        found = 0
-        if empty == 0:
-            r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
-            first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - blocks_origin // 2, 0)
-            last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - blocks_origin // 2, blocks_shape - 1)
-            x = first.x
-            while x <= last.x and found == 0:
-                for y in range(first.y, last.y + 1):
-                    for z in range(first.z, last.z + 1):
-                        if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
-                            found = 1
-                x += 1
-        out[n] = qd.cast(found, qd.u8)
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
+        if n < count.x * count.y * count.z:
+            i = n // (count.y * count.z)
+            j = (n // count.z) % count.y
+            k = n % count.z
+            g = qd.cast(lower + spacing * ivec3(i, j, k), qd.f32)
+            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
+            found = 0
+            if empty == 0:
+                r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
+                first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - blocks_origin // 2, 0)
+                last = qd.cast(qd.floor((image + r) * 0.5), qd.i32) - blocks_origin // 2
+                last = qd.min(last, blocks_shape - 1)
+                x = first.x
+                while x <= last.x and found == 0:
+                    for y in range(first.y, last.y + 1):
+                        for z in range(first.z, last.z + 1):
+                            if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
+                                found = 1
+                    x += 1
+            out[n] = qd.cast(found, qd.u8)
 
 
 @qd.kernel(fastcache=True)
 def _occupied_blocks(
     out: U8,
+    deal: Deal,
     candidates: I32,
     lower: ivec3,
     index: I32,
@@ -369,23 +377,27 @@ def _occupied_blocks(
     contracted: qd.i32,
     flows: qd.template(),
 ):
-    for n in range(out.shape[0]):
-        block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
-        found = 0
-        k = 0
-        while k < 27 and found == 0:
-            g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
-            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
-            if empty == 0:
-                r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
-                first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-                last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
-                x = first.x
-                while x <= last.x and found == 0:
-                    for y in range(first.y, last.y + 1):
-                        for z in range(first.z, last.z + 1):
-                            if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
-                                found = 1
-                    x += 1
-            k += 1
-        out[n] = qd.cast(found, qd.u8)
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
+        if n < out.shape[0]:
+            block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
+            found = 0
+            k = 0
+            while k < 27 and found == 0:
+                g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
+                image, reach, empty = probe(
+                    g, origin, scale, half, params, lattice, n_edits, contracted, flows
+                )
+                if empty == 0:
+                    r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
+                    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
+                    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+                    x = first.x
+                    while x <= last.x and found == 0:
+                        for y in range(first.y, last.y + 1):
+                            for z in range(first.z, last.z + 1):
+                                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                                    found = 1
+                        x += 1
+                k += 1
+            out[n] = qd.cast(found, qd.u8)

@@ -9,6 +9,7 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 
 import quadrants as qd
 
+from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.grid import (
     F32,
@@ -34,6 +35,7 @@ TILE = 8
 @qd.kernel(fastcache=True)
 def march_tiles(
     out: F32,
+    deal: Deal,
     directions: F32,
     first_row: qd.i32,
     rows: qd.i32,
@@ -80,11 +82,12 @@ def march_tiles(
     """
     across = (size.x + TILE - 1) // TILE
     qd.loop_config(block_dim=64)
-    for n in range(across * rows * TILE * TILE):
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
         tile = n // (TILE * TILE)
         x = (tile % across) * TILE + n % TILE
         y = (first_row + tile // across) * TILE + (n // TILE) % TILE
-        if x < size.x and y < size.y:
+        if tile < across * rows and x < size.x and y < size.y:
             pixel = (corner.y + y) * width + corner.x + x
             d = rotation @ vec3(directions[3 * pixel], directions[3 * pixel + 1], directions[3 * pixel + 2])
             basis = sh_basis(d, K)

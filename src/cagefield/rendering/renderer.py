@@ -132,6 +132,7 @@ class Renderer:
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
         takes the place of the renderer's own.
         """
+        from cagefield.loops import deal
         from cagefield.rendering import march
 
         field = self.field
@@ -150,11 +151,13 @@ class Renderer:
         for row in range(0, down, rows):
             if should_stop is not None and should_stop():
                 return None
+            few = min(rows, down - row)
             march.march_tiles(
                 out,
+                deal(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
                 directions,
                 row,
-                min(rows, down - row),
+                few,
                 ints((x, y)),
                 ints((width, height)),
                 camera.width,

@@ -20,6 +20,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.devices import ints
+from cagefield.loops import Deal, deal, dealt, turns
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -113,6 +114,7 @@ def _images(
     images = np.empty((wanted.size, 3), np.float32)
     _map_points(
         images,
+        deal(len(images)),
         np.zeros((1, 3), np.float32) if starts is None else starts,
         int(starts is not None),
         np.ascontiguousarray(wanted, np.uint8).reshape(-1),
@@ -134,6 +136,7 @@ def _occupied(images: NDArray[np.float32], canonical: Occupancy, count: tuple[in
     out = np.empty(len(images), np.uint8)
     _occupied_points(
         out,
+        deal(len(out)),
         images,
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
         ints(canonical.blocks.shape),
@@ -158,6 +161,7 @@ def _refined(
     out = np.empty(len(candidates), np.uint8)
     _dense_blocks(
         out,
+        deal(len(out)),
         candidates.reshape(-1),
         images,
         ints(count),
@@ -171,6 +175,7 @@ def _refined(
 @qd.kernel(fastcache=True)
 def _map_points(
     images: Nodes,
+    deal: Deal,
     starts: Nodes,
     started: qd.i32,
     wanted: U8,
@@ -186,9 +191,10 @@ def _map_points(
     contracted: qd.i32,
     flows: qd.template(),
 ):
-    for n in range(images.shape[0]):
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
         image = vec3(UNKNOWN, UNKNOWN, UNKNOWN)
-        if wanted[n] > 0:
+        if n < images.shape[0] and wanted[n] > 0:
             at = lower + spacing * ivec3(n // (count.y * count.z), (n // count.z) % count.y, n % count.z)
             g = qd.cast(at, qd.f32)
             if started == 1:
@@ -202,7 +208,8 @@ def _map_points(
                 image = (q - origin) * scale
                 if contracted == 1:
                     image = (contract_point(image) + 2.0) * half
-        images[n] = image
+        if n < images.shape[0]:
+            images[n] = image
 
 
 @qd.func
@@ -231,6 +238,7 @@ def differences(images: qd.template(), n: qd.i32, i: qd.i32, count: qd.i32, stri
 @qd.kernel(fastcache=True)
 def _occupied_points(
     out: U8,
+    deal: Deal,
     images: Nodes,
     blocks: U8,
     blocks_shape: ivec3,
@@ -238,88 +246,99 @@ def _occupied_points(
     origin: ivec3,
     count: ivec3,
 ):
-    for n in range(images.shape[0]):
-        found = 0
-        image = images[n]
-        if image.x < UNKNOWN:
-            i = n // (count.y * count.z)
-            j = (n // count.z) % count.y
-            k = n % count.z
-            x_reach, _x = differences(images, n, i, count.x, count.y * count.z)
-            y_reach, _y = differences(images, n, j, count.y, count.z)
-            z_reach, _z = differences(images, n, k, count.z, 1)
-            r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, MOST_CELLS)
-            first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
-            last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, blocks_shape - 1)
-            x = first.x
-            bricks = blocks_shape // 2
-            b = (qd.cast(qd.floor(image), qd.i32) - origin) >> 2
-            if b.min() >= 0 and (bricks - b).min() > 0:
-                # Every brick nearer than this code says is empty.
-                code = codes[(b.x * bricks.y + b.y) * bricks.z + b.z]
-                if r.max() < qd.cast(4 * ((code >> 8) - 1), qd.f32):
-                    x = last.x + 1
-            while x <= last.x and found == 0:
-                for y in range(first.y, last.y + 1):
-                    for z in range(first.z, last.z + 1):
-                        if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
-                            found = 1
-                x += 1
-        out[n] = qd.cast(found, qd.u8)
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
+        if n < images.shape[0]:
+            found = 0
+            image = images[n]
+            if image.x < UNKNOWN:
+                i = n // (count.y * count.z)
+                j = (n // count.z) % count.y
+                k = n % count.z
+                x_reach, _x = differences(images, n, i, count.x, count.y * count.z)
+                y_reach, _y = differences(images, n, j, count.y, count.z)
+                z_reach, _z = differences(images, n, k, count.z, 1)
+                r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, MOST_CELLS)
+                first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
+                last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, blocks_shape - 1)
+                x = first.x
+                bricks = blocks_shape // 2
+                b = (qd.cast(qd.floor(image), qd.i32) - origin) >> 2
+                if b.min() >= 0 and (bricks - b).min() > 0:
+                    # Every brick nearer than this code says is empty.
+                    code = codes[(b.x * bricks.y + b.y) * bricks.z + b.z]
+                    if r.max() < qd.cast(4 * ((code >> 8) - 1), qd.f32):
+                        x = last.x + 1
+                while x <= last.x and found == 0:
+                    for y in range(first.y, last.y + 1):
+                        for z in range(first.z, last.z + 1):
+                            if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
+                                found = 1
+                    x += 1
+            out[n] = qd.cast(found, qd.u8)
 
 
 @qd.kernel(fastcache=True)
 def _dense_blocks(
-    out: U8, candidates: I32, images: Nodes, count: ivec3, index: I32, density: F32, resolution: ivec3
+    out: U8,
+    deal: Deal,
+    candidates: I32,
+    images: Nodes,
+    count: ivec3,
+    index: I32,
+    density: F32,
+    resolution: ivec3,
 ):
-    for c in range(out.shape[0]):
-        i = candidates[3 * c]
-        j = candidates[3 * c + 1]
-        k = candidates[3 * c + 2]
-        corners = qd.Matrix.zero(qd.f32, 8, 3)
-        reach = vec3(0.0, 0.0, 0.0)
-        bend = vec3(0.0, 0.0, 0.0)
-        for corner in qd.static(range(8)):
-            x = i + (corner >> 2 & 1)
-            y = j + (corner >> 1 & 1)
-            z = k + (corner & 1)
-            n = (x * count.y + y) * count.z + z
-            for a in qd.static(range(3)):
-                corners[corner, a] = images[n][a]
-            _x, x_bend = differences(images, n, x, count.x, count.y * count.z)
-            _y, y_bend = differences(images, n, y, count.y, count.z)
-            _z, z_bend = differences(images, n, z, count.z, 1)
-            bend = qd.max(bend, x_bend + y_bend + z_bend)
-        for a in qd.static(range(3)):
-            along_x = 0.0
-            along_y = 0.0
-            along_z = 0.0
-            for low in qd.static((0, 1, 2, 3)):
-                along_x = qd.max(along_x, qd.abs(corners[low + 4, a] - corners[low, a]))
-            for low in qd.static((0, 1, 4, 5)):
-                along_y = qd.max(along_y, qd.abs(corners[low + 2, a] - corners[low, a]))
-            for low in qd.static((0, 2, 4, 6)):
-                along_z = qd.max(along_z, qd.abs(corners[low + 1, a] - corners[low, a]))
-            reach[a] = 0.25 * (along_x + along_y + along_z)
-        r = qd.min(reach + 0.25 * bend, MOST_CELLS) + 1e-3
-        found = 0
-        at = 0
-        while at < 27 and found == 0:
-            part = 0.5 * vec3(at // 9, (at // 3) % 3, at % 3)
-            image = vec3(0.0, 0.0, 0.0)
+    for turn in range(turns(deal)):
+        c = dealt(turn, deal)
+        if c < out.shape[0]:
+            i = candidates[3 * c]
+            j = candidates[3 * c + 1]
+            k = candidates[3 * c + 2]
+            corners = qd.Matrix.zero(qd.f32, 8, 3)
+            reach = vec3(0.0, 0.0, 0.0)
+            bend = vec3(0.0, 0.0, 0.0)
             for corner in qd.static(range(8)):
-                up = ivec3(corner >> 2 & 1, corner >> 1 & 1, corner & 1)
-                w = qd.abs(1.0 - up - part)
+                x = i + (corner >> 2 & 1)
+                y = j + (corner >> 1 & 1)
+                z = k + (corner & 1)
+                n = (x * count.y + y) * count.z + z
                 for a in qd.static(range(3)):
-                    image[a] += w.x * w.y * w.z * corners[corner, a]
-            first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-            last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
-            x = first.x
-            while x <= last.x and found == 0:
-                for y in range(first.y, last.y + 1):
-                    for z in range(first.z, last.z + 1):
-                        if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
-                            found = 1
-                x += 1
-            at += 1
-        out[c] = qd.cast(found, qd.u8)
+                    corners[corner, a] = images[n][a]
+                _x, x_bend = differences(images, n, x, count.x, count.y * count.z)
+                _y, y_bend = differences(images, n, y, count.y, count.z)
+                _z, z_bend = differences(images, n, z, count.z, 1)
+                bend = qd.max(bend, x_bend + y_bend + z_bend)
+            for a in qd.static(range(3)):
+                along_x = 0.0
+                along_y = 0.0
+                along_z = 0.0
+                for low in qd.static((0, 1, 2, 3)):
+                    along_x = qd.max(along_x, qd.abs(corners[low + 4, a] - corners[low, a]))
+                for low in qd.static((0, 1, 4, 5)):
+                    along_y = qd.max(along_y, qd.abs(corners[low + 2, a] - corners[low, a]))
+                for low in qd.static((0, 2, 4, 6)):
+                    along_z = qd.max(along_z, qd.abs(corners[low + 1, a] - corners[low, a]))
+                reach[a] = 0.25 * (along_x + along_y + along_z)
+            r = qd.min(reach + 0.25 * bend, MOST_CELLS) + 1e-3
+            found = 0
+            at = 0
+            while at < 27 and found == 0:
+                part = 0.5 * vec3(at // 9, (at // 3) % 3, at % 3)
+                image = vec3(0.0, 0.0, 0.0)
+                for corner in qd.static(range(8)):
+                    up = ivec3(corner >> 2 & 1, corner >> 1 & 1, corner & 1)
+                    w = qd.abs(1.0 - up - part)
+                    for a in qd.static(range(3)):
+                        image[a] += w.x * w.y * w.z * corners[corner, a]
+                first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
+                last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+                x = first.x
+                while x <= last.x and found == 0:
+                    for y in range(first.y, last.y + 1):
+                        for z in range(first.z, last.z + 1):
+                            if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                                found = 1
+                    x += 1
+                at += 1
+            out[c] = qd.cast(found, qd.u8)

@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from cagefield import devices
+from cagefield.loops import Deal, deal, dealt, turns
 from cagefield.warps.device import DeviceStack, PackedStack, map_sample, read3
 
 Table = qd.types.ndarray(dtype=qd.f32, ndim=2)
@@ -62,14 +63,16 @@ class TensorMap:
         samples = torch.cat([points, viewdirs], dim=1).contiguous()
         out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
         if len(samples):
-            arguments = [values.numpy() if self._as_arrays else values for values in (samples, out)]
-            _map_tensors(*arguments, self._params, self._lattice, self.count, self.flows, preserve_opacity)
+            table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
+            stack = self._params, self._lattice, self.count, self.flows
+            _map_tensors(table, deal(len(samples)), result, *stack, preserve_opacity)
         return out[:, :3], out[:, 3:6], out[:, 6]
 
 
 @qd.kernel(fastcache=True)
 def _map_tensors(
     samples: Table,
+    deal: Deal,
     out: Table,
     params: Table,
     lattice: Nodes,
@@ -77,16 +80,18 @@ def _map_tensors(
     flows: qd.template(),
     preserve_opacity: qd.template(),
 ):
-    for i in range(samples.shape[0]):
-        d = read3(samples, i, 3)
-        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
-        length = qd.max(v.norm(), 1e-20)
-        unchanged = (v - d).norm() == 0.0
-        for a in qd.static(range(3)):
-            out[i, a] = q[a]
-            out[i, 3 + a] = d[a] if unchanged else v[a] / length
-        gain = 1.0 - qd.cast(emptied, qd.f32)
-        if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
-            if not unchanged:
-                gain *= length / qd.max(d.norm(), 1e-20)
-        out[i, 6] = gain
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            length = qd.max(v.norm(), 1e-20)
+            unchanged = (v - d).norm() == 0.0
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = d[a] if unchanged else v[a] / length
+            gain = 1.0 - qd.cast(emptied, qd.f32)
+            if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
+                if not unchanged:
+                    gain *= length / qd.max(d.norm(), 1e-20)
+            out[i, 6] = gain

@@ -20,6 +20,7 @@ colour curvature w^2, largest weight, then the 3K colour gradients (basis-major)
 
 import quadrants as qd
 
+from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -78,6 +79,7 @@ def march_batch(
     n_patches: qd.i32,
     patch_size: qd.i32,
     workers: qd.i32,
+    deal: Deal,
     seed: qd.u32,
     views: I32,
     poses: F32,
@@ -119,11 +121,12 @@ def march_batch(
     """
     rays = patch_size * patch_size
     per = (n_patches + workers - 1) // workers
-    for worker in range(workers):
+    for turn in range(turns(deal)):
+        worker = dealt(turn, deal)
         base = 0
         if qd.static(not gpu):
             base = worker * record
-        for patch in range(worker * per, qd.min((worker + 1) * per, n_patches)):
+        for patch in range(qd.min(worker * per, n_patches), qd.min((worker + 1) * per, n_patches)):
             for r in range(rays):
                 ray = patch * rays + r
                 view = patches[3 * patch]

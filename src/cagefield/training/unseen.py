@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cagefield.cameras import Camera
 from cagefield.devices import floats, ints
 from cagefield.fields.voxel import VoxelField
+from cagefield.loops import Deal, deal, dealt, turns
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import (
     F32,
@@ -61,6 +62,7 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
         local = camera.local_directions().reshape(camera.height, camera.width, 3)[::stride, ::stride]
         _mark_seen(
             seen,
+            deal(local.shape[0] * local.shape[1]),
             to_device(local.astype(np.float32)),
             local.shape[0] * local.shape[1],
             floats(camera.c2w[:3, :3]),
@@ -88,6 +90,7 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
 @qd.kernel(fastcache=True)
 def _mark_seen(
     seen: U8,
+    deal: Deal,
     directions: F32,
     rays: qd.i32,
     rotation: mat3,
@@ -103,20 +106,22 @@ def _mark_seen(
     least: qd.f32,
 ):
     """Writes 1 into `seen` [nx*ny*nz], at the first vertex of each cell, where rays of a camera come by."""
-    for n in range(rays):
-        d = rotation @ vec3(directions[3 * n], directions[3 * n + 1], directions[3 * n + 2])
-        go = (origin - lower) * scale
-        gd = d * scale
-        through = slab(go, safe_inverse(gd), vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
-        t = qd.max(through.x, 0.0) + 0.5 * step
-        T = 1.0
-        while t < through.y and least < T:
-            g = go + t * gd
-            cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
-            seen[(cell.x * resolution.y + cell.y) * resolution.z + cell.z] = qd.u8(1)
-            if is_occupied(codes, g, brick_dims):
-                slots = corner_slots(index, cell, resolution.y, resolution.z)
-                raw = gather_density(density, slots, corner_weights(g - qd.cast(cell, qd.f32)))
-                if raw > 0.0:
-                    T *= qd.exp(-raw * step)
-            t += step
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
+        if n < rays:
+            d = rotation @ vec3(directions[3 * n], directions[3 * n + 1], directions[3 * n + 2])
+            go = (origin - lower) * scale
+            gd = d * scale
+            through = slab(go, safe_inverse(gd), vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
+            t = qd.max(through.x, 0.0) + 0.5 * step
+            T = 1.0
+            while t < through.y and least < T:
+                g = go + t * gd
+                cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
+                seen[(cell.x * resolution.y + cell.y) * resolution.z + cell.z] = qd.u8(1)
+                if is_occupied(codes, g, brick_dims):
+                    slots = corner_slots(index, cell, resolution.y, resolution.z)
+                    raw = gather_density(density, slots, corner_weights(g - qd.cast(cell, qd.f32)))
+                    if raw > 0.0:
+                        T *= qd.exp(-raw * step)
+                t += step

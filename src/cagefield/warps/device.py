@@ -25,6 +25,7 @@ from cagefield import devices, hexahedron
 from cagefield.devices import floats
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
+from cagefield.loops import Deal, deal, dealt, turns
 from cagefield.warps import flow_device, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
@@ -155,7 +156,9 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            _map_samples(samples, out, self.params, self.lattice, self.n_edits, self.has_flows)
+            _map_samples(
+                samples, deal(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
+            )
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 
@@ -443,30 +446,42 @@ def displacement(at: vec3, s: vec3, lattice: qd.template(), first: qd.i32, resol
 
 @qd.kernel(fastcache=True)
 def _map_samples(
-    samples: Params, out: Params, params: Params, lattice: Nodes, n_edits: qd.i32, flows: qd.template()
+    samples: Params,
+    deal: Deal,
+    out: Params,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
 ):
-    for i in range(samples.shape[0]):
-        d = read3(samples, i, 3)
-        q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
-        stretch = 1.0
-        if (v - d).norm() > 0.0:
-            stretch = v.norm()
-        for a in qd.static(range(3)):
-            out[i, a] = q[a]
-            out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
-        out[i, 6] = stretch
-        out[i, 7] = qd.cast(emptied, qd.f32)
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            stretch = 1.0
+            if (v - d).norm() > 0.0:
+                stretch = v.norm()
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
+            out[i, 6] = stretch
+            out[i, 7] = qd.cast(emptied, qd.f32)
 
 
 @qd.kernel(fastcache=True)
-def _sample_lattice(nodes: Nodes, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
-    for n in range(nodes.shape[0]):
-        i = n % resolution
-        j = (n // resolution) % resolution
-        k = n // (resolution * resolution)
-        p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
-        q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
-        nodes[n] = q - p
+def _sample_lattice(
+    nodes: Nodes, deal: Deal, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
+):
+    for turn in range(turns(deal)):
+        n = dealt(turn, deal)
+        if n < nodes.shape[0]:
+            i = n % resolution
+            j = (n // resolution) % resolution
+            k = n // (resolution * resolution)
+            p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
+            q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
+            nodes[n] = q - p
 
 
 _Kept: TypeAlias = "WeakKeyDictionary[Any, NDArray[np.float32]]"
@@ -524,7 +539,7 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
         nodes[:] = lattice.displacement.reshape(-1, 3)
     else:
-        _sample_lattice(nodes, params, np.zeros((1, 3), dtype=np.float32), *place)
+        _sample_lattice(nodes, deal(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
 
 

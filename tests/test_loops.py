@@ -1,0 +1,52 @@
+"""Every item of a loop is dealt once, and to all threads alike."""
+
+import numpy as np
+import pytest
+import quadrants as qd
+
+from cagefield import devices, loops
+from cagefield.loops import Deal, dealt, turns
+
+Counts = qd.types.ndarray(dtype=qd.i32, ndim=1)
+
+
+@qd.kernel
+def _visit(visits: Counts, order: Counts, deal: Deal):
+    for n in range(turns(deal)):
+        i = dealt(n, deal)
+        if i < visits.shape[0]:
+            visits[i] += 1
+            order[i] = n
+
+
+@pytest.mark.parametrize("unit", [1, 8, 64])
+@pytest.mark.parametrize("items", [1, 2, 63, 511, 1024, 1025, 70_001])
+def test_every_item_has_its_turn(items: int, unit: int) -> None:
+    devices.start()
+    visits, order = np.zeros(items, np.int32), np.zeros(items, np.int32)
+    _visit(visits, order, loops.deal(items, unit))
+    assert (visits == 1).all()
+
+
+def test_threads_get_their_share_of_any_part_of_the_items() -> None:
+    devices.start()
+    threads, items = devices.threads(), 6400
+    visits, order = np.zeros(items, np.int32), np.zeros(items, np.int32)
+    deal = loops.deal(items, 1)
+    _visit(visits, order, deal)
+    # Quadrants gives a thread an equal part of the turns, one after the other.
+    thread = order // deal[0]
+    for first in range(0, items, 640):
+        share = np.bincount(thread[first : first + 640], minlength=threads)
+        assert share.min() >= 640 // threads
+
+
+def test_few_items_go_to_different_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "threads", lambda: 4)
+    length, threads, unit = loops.deal(4, 1)
+    assert (length, threads, unit) == (loops.LEAST, 4, 1)
+
+
+def test_a_gpu_keeps_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "is_gpu", lambda: True)
+    assert loops.deal(1000, 1).tolist() == [1000, 1, 1]
