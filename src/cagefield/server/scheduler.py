@@ -257,7 +257,7 @@ class Scheduler:
     def idle(self) -> bool:
         """True where nothing moves, and no page waits for a picture or can be sent one."""
         return (self._running is None and not self._dragging) and all(
-            p.camera < 0 or not p.moving and (len(p.unshown) >= MOST_UNSHOWN or p.tiles == [])
+            p.camera < 0 or (not p.moving and (len(p.unshown) >= MOST_UNSHOWN or p.tiles == []))
             for p in self._pages.values()
         )
 
