@@ -18,11 +18,14 @@ from typing import Any
 from cagefield.errors import CagefieldError
 from cagefield.server.tasks import Failed, Ready, Result, Task
 
+TO_END = 1.0
+"""Seconds that the process has to end by itself: then it keeps the kernels that it compiled."""
+
 _LOST = (EOFError, ConnectionResetError, BrokenPipeError, OSError)
 
 
 def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
-    """Does tasks until the pipe closes. The scene is read once; what a task raises becomes `Failed`."""
+    """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from cagefield import devices
     from cagefield.scene import Scene
@@ -41,6 +44,8 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
         try:
             task = connection.recv()
         except _LOST:
+            task = None
+        if task is None:
             working.close()
             return
         result = _done(working, task, generation)
@@ -117,6 +122,10 @@ class Worker:
         """Ends the process."""
         connection, self._connection = self._connection, None
         if connection is not None:
+            with contextlib.suppress(*_LOST):
+                connection.send(None)
+            if self._process is not None:
+                self._process.join(TO_END)
             connection.close()
         if self._process is not None:
             self._process.terminate()
