@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.keyframes import Keyframe, Still
 from cagefield.server import jobs
+from cagefield.server.chores import Chores
 from cagefield.server.document import Document
 from cagefield.server.grid_lines import grid_lines
 from cagefield.server.placing import PROBES, fitted, probes
@@ -217,10 +220,27 @@ def test_the_grid_bends_with_the_edit() -> None:
 
 
 def test_the_error_of_a_lattice_is_told_in_voxels(studio: Studio) -> None:
-    found = Working(studio).do(ErrorTask(1, values_of((MOVED,))[0]), lambda _: False)
+    found = Working(studio).do(ErrorTask(1, values_of((MOVED,))[0], 0), lambda _: False)
     assert isinstance(found, Answered)
-    most, mean = MOVED.lattice_error(samples=5_000)
+    most, mean = MOVED.lattice_error()
     np.testing.assert_allclose(found.value, (most / 0.125, mean / 0.125))
+
+
+def test_measuring_a_lattice_is_given_up_and_done_again_later(studio: Studio) -> None:
+    task = ErrorTask(1, values_of((MOVED,))[0], 0)
+    stopped = Working(studio).do(task, lambda _: True)
+    assert isinstance(stopped, Stopped)
+    session: Any = SimpleNamespace(drags={}, drawn=lambda: (MOVED,))
+    measured = []
+    chores = Chores(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
+    chores._warmed = WARM_STAGES
+    chore = chores.next(0)
+    assert chore is not None
+    chore.done(stopped)
+    again = chores.next(1)
+    assert again is not None and again.make(2) == replace(task, number=2, generation=1)
+    again.done(Answered(2, (0.5, 0.1)))
+    assert measured == [1] and chores.next(2) is None
 
 
 def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(

@@ -25,6 +25,9 @@ from cagefield.warps.lattice import Lattice
 
 Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
+AT_ONCE = 500
+"""Points at which a lattice is compared with its flow at a time: hundredths of a second."""
+
 LATTICE_RANGE = (2, 512)
 
 
@@ -207,18 +210,34 @@ class Edit:
             before, operation = self.replace(operations=self.operations[:-1]), self.operations[-1]
         return before._largest_part(operation)
 
-    def lattice_error(self, resolution: int | None = None, *, samples: int = 20_000) -> tuple[float, float]:
-        """(max, mean) error of the lattice in world units, measured in the shell; zeros without a lattice."""
+    def lattice_error(
+        self,
+        resolution: int | None = None,
+        *,
+        samples: int = 5_000,
+        proceed: Callable[[], None] | None = None,
+    ) -> tuple[float, float]:
+        """(max, mean) error of the lattice in world units, measured in the shell; zeros without a lattice.
+
+        `proceed` is called now and then, and gives the measurement up by raising.
+        """
         warp, nodes = self.exact_warp, resolution if resolution is not None else self.lattice
         if nodes is None or not isinstance(warp, ContinuousWarp):
             return 0.0, 0.0
         if not isinstance(warp.shell, FlowShell):
             return lattice_error(warp, nodes, samples=samples)
         # A lattice of a flow in float64 takes minutes; float32's rounding is far below the lattice's error.
-        from cagefield.warps.device import lattice_difference
+        from cagefield.warps.device import flow_lattice_of
 
-        points = warp.shell_points(samples)
-        distance = lattice_difference(self.replace(lattice=None), self.replace(lattice=nodes), points)
+        lattice = flow_lattice_of(self.replace(lattice=nodes))
+        points, distances = warp.shell_points(samples), [np.zeros(0)]
+        for first in range(0, len(points), AT_ONCE):
+            if proceed is not None:
+                proceed()
+            part = points[first : first + AT_ONCE]
+            difference = lattice.to_canonical(part)[0] - warp.to_canonical(part).points
+            distances.append(np.linalg.norm(difference, axis=1))
+        distance = np.concatenate(distances)
         return float(distance.max(initial=0.0)), float(distance.mean()) if len(distance) else 0.0
 
     def _largest_part(self, operation: Operation) -> float:

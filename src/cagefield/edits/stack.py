@@ -139,7 +139,7 @@ class EditStack:
                 changed = np.concatenate([changed, edit.boxes])
         return changed
 
-    def lattice_errors(self, voxel_size: float, *, samples: int = 20_000) -> tuple[LatticeError, ...]:
+    def lattice_errors(self, voxel_size: float, *, samples: int = 5_000) -> tuple[LatticeError, ...]:
         """The errors of the active edits that have a lattice, in voxels of an edge in world units.
 
         Measured at that many random points of each shell, between the inner and the outer cage. Raises

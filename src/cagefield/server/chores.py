@@ -20,6 +20,7 @@ from cagefield.server.tasks import (
     ErrorTask,
     Failed,
     Result,
+    Stopped,
     WarmTask,
     values_of,
 )
@@ -54,7 +55,7 @@ class Chores:
             return Chore(lambda number: WarmTask(number, stage), lambda _: None)
         edit = self._unmeasured()
         if edit is not None:
-            return self._measure(edit)
+            return self._measure(edit, generation)
         if self._ending:
             task = self._ending.pop(0)
             return Chore(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
@@ -78,16 +79,18 @@ class Chores:
         edits = (edit for edit in self._session.drawn() if edit.lattice and edit.adjustment == "continuous")
         return next((edit for edit in edits if not any(edit is other for other in known)), None)
 
-    def _measure(self, edit: Edit) -> Chore:
+    def _measure(self, edit: Edit, generation: int) -> Chore:
         values = values_of((edit,))[0]
 
         def done(result: Result) -> None:
+            if isinstance(result, Stopped):
+                return
             error = result.value if isinstance(result, Answered) else None
             self._errors = [*self._errors[-63:], (edit, error)]
             if error is not None:
                 self._measured()
 
-        return Chore(lambda number: ErrorTask(number, values), done)
+        return Chore(lambda number: ErrorTask(number, values, generation), done)
 
     # ---- jobs ----
 

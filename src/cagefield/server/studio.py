@@ -63,9 +63,9 @@ class Studio:
         began = time.perf_counter()
         try:
             renderer = (
-                self.plain if task.look.before else self.renderer(task.shown, task.exact, _giving_up(stop))
+                self.plain if task.look.before else self.renderer(task.shown, task.exact, giving_up(stop))
             )
-        except _GivenUpError:
+        except GivenUpError:
             return Stopped(task.number)
         mapped = time.perf_counter()
         frame = self._frame(task, renderer, stop)
@@ -96,8 +96,8 @@ class Studio:
         task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
         stopping = stop or (lambda: False)
         try:
-            renderer = self.plain if look.before else self.renderer(shown, True, _giving_up(stopping))
-        except _GivenUpError:
+            renderer = self.plain if look.before else self.renderer(shown, True, giving_up(stopping))
+        except GivenUpError:
             return None
         return self._frame(task, renderer, stopping)
 
@@ -107,9 +107,6 @@ class Studio:
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
         if stage == 3:
-            edit.lattice_error(samples=64)
-            return
-        if stage == 4:
             self.plain.with_edits(EditStack([Edit.delete(inner)]))
             return
         renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
@@ -202,14 +199,16 @@ class Studio:
         return quick
 
 
-class _GivenUpError(Exception):
+class GivenUpError(Exception):
     """What was being made ready is not wanted any more."""
 
 
-def _giving_up(stop: Stop) -> Callable[[], None]:
+def giving_up(stop: Stop) -> Callable[[], None]:
+    """A `proceed` that gives up what is being made ready where `stop` says so, by raising GivenUpError."""
+
     def proceed() -> None:
         if stop():
-            raise _GivenUpError
+            raise GivenUpError
 
     return proceed
 

@@ -12,7 +12,7 @@ from cagefield.edits import Edit
 from cagefield.keyframes import Still
 from cagefield.server.scheduler import Look, Region
 
-WARM_STAGES = 5
+WARM_STAGES = 4
 """Steps in which the kernels of edited pictures are made ready."""
 
 EditValues: TypeAlias = Mapping[str, Any]
@@ -86,10 +86,11 @@ class WarmTask:
 
 @dataclass(frozen=True)
 class ErrorTask:
-    """How far an edit's lattice is from its exact map."""
+    """How far an edit's lattice is from its exact map; given up when its generation is over."""
 
     number: int
     edit: EditValues
+    generation: int
 
 
 @dataclass(frozen=True)

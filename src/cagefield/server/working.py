@@ -14,7 +14,7 @@ from cagefield.server.grid_lines import grid_lines
 from cagefield.server.job_files import JobFiles
 from cagefield.server.placing import probes
 from cagefield.server.scheduler import Look
-from cagefield.server.studio import Studio
+from cagefield.server.studio import GivenUpError, Studio, giving_up
 from cagefield.server.tasks import (
     Answered,
     EndJobTask,
@@ -50,15 +50,15 @@ class Working:
             return self._studio.picture(task, lambda: abandoned(task.generation))
         if isinstance(task, FrameTask):
             return self._frame(task, lambda: abandoned(task.generation))
+        if isinstance(task, ErrorTask):
+            return self._error(task, lambda: abandoned(task.generation))
         return Answered(task.number, self._answer(task))
 
     def close(self) -> None:
         """Drops what is half done."""
         self._files.close()
 
-    def _answer(
-        self, task: StillTask | SurfaceTask | FitTask | WarmTask | ErrorTask | GridTask | EndJobTask
-    ) -> Any:
+    def _answer(self, task: StillTask | SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
         if isinstance(task, FitTask):
@@ -69,12 +69,16 @@ class Working:
             return self._studio.warm(task.stage)
         if isinstance(task, EndJobTask):
             return self._files.end(task.job, task.keep)
-        edit = Edit(**task.edit)
-        if isinstance(task, GridTask):
-            return grid_lines(edit)
-        most, mean = edit.lattice_error(samples=5_000)
+        return grid_lines(Edit(**task.edit))
+
+    def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
+        """(max, mean) error of an edit's lattice, voxels."""
+        try:
+            most, mean = Edit(**task.edit).lattice_error(proceed=giving_up(stop))
+        except GivenUpError:
+            return Stopped(task.number)
         voxel = float(min(self._studio.scene.field.voxel_size))
-        return most / voxel, mean / voxel
+        return Answered(task.number, (most / voxel, mean / voxel))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
         frame = self._studio.still(task.shown, task.still.camera, Look(), stop)
