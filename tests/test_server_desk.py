@@ -165,7 +165,9 @@ def test_chores_wait_until_no_page_does(office: PlayedOffice, monkeypatch: pytes
         chore = worker.tasks[-1]
         assert isinstance(chore, WarmTask)
         generation = desk.scheduler.generation
-        desk.interrupt()
+        desk.pump()
+        assert worker.generation == generation
+        desk.scheduler.camera(1, 2, 64, 64, True, 0.0)
         desk.pump()
         assert worker.generation == generation + 1
         worker.answer(Stopped(chore.number))

@@ -39,7 +39,7 @@ from cagefield.server.tasks import (
     WarmTask,
     values_of,
 )
-from cagefield.server.working import Working
+from cagefield.server.working import SAMPLES, Working
 from scenes import ball_scene
 
 SIDE = 48
@@ -222,7 +222,7 @@ def test_the_grid_bends_with_the_edit() -> None:
 def test_the_error_of_a_lattice_is_told_in_voxels(studio: Studio) -> None:
     found = Working(studio).do(ErrorTask(1, values_of((MOVED,))[0], 0), lambda _: False)
     assert isinstance(found, Answered)
-    most, mean = MOVED.lattice_error()
+    most, mean = MOVED.lattice_error(samples=SAMPLES)
     np.testing.assert_allclose(found.value, (most / 0.125, mean / 0.125))
 
 

@@ -125,6 +125,8 @@ class Desk:
     def pump(self) -> None:
         """Gives the rendering process its next task, if it is free; abandons what nobody wants any more."""
         now = time.monotonic()
+        if not self.scheduler.idle():
+            self.interrupt()
         self.worker.abandon(self.scheduler.generation)
         if self._running is not None or not self._ready or self._closing:
             return

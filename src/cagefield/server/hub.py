@@ -154,8 +154,6 @@ class Hub:
         """Has rendered what is new to see."""
         self._look_again()
         self.desk.scheduler.edits(self._pictures, bool(self.session.drags), time.monotonic())
-        if not self.desk.scheduler.idle():
-            self.desk.interrupt()
         self.desk.pump()
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:

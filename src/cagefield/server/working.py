@@ -34,6 +34,9 @@ from cagefield.server.tasks import (
 DENSE = 0.05
 """Optical depth of a voxel from which on it counts as dense."""
 
+SAMPLES = 2_000
+"""Points at which a lattice is measured."""
+
 Abandoned = Callable[[int], bool]
 
 
@@ -74,7 +77,8 @@ class Working:
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
         """(max, mean) error of an edit's lattice, voxels."""
         try:
-            most, mean = Edit(**task.edit).lattice_error(proceed=giving_up(stop))
+            (edit,) = self._studio.edits((task.edit,))
+            most, mean = edit.lattice_error(samples=SAMPLES, proceed=giving_up(stop))
         except GivenUpError:
             return Stopped(task.number)
         voxel = float(min(self._studio.scene.field.voxel_size))
