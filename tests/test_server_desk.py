@@ -142,6 +142,8 @@ def test_one_task_at_a_time_and_answers_before_pictures(
         worker.answer(Answered(worker.tasks[-1].number, "point"))
         await settle()
         assert await asked == "point"
+        desk.scheduler.presented(1, picture.number)
+        desk.pump()
         assert isinstance(worker.tasks[-1], PictureTask) and len(worker.tasks) == 3
 
     play(office, monkeypatch, script)

@@ -24,6 +24,13 @@ const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cag
 /** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
 const FIGURES_EVERY = 300;
 
+/** A picture, and when it came and was decoded. */
+interface Arrived {
+  header: PictureHeader;
+  received: number;
+  decoded: number;
+}
+
 export class App {
   readonly store = new Store(recallTools());
   readonly stage: Stage;
@@ -43,7 +50,9 @@ export class App {
   private requests = 0;
   private drags = 0;
   private pictureChain: Promise<void> = Promise.resolve();
-  private pending: (() => void)[] = [];
+  /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
+  private undrawn: Arrived[] = [];
+  private drawn: Arrived[] = [];
   private placedAfter: number | null = null;
   /** When the figures below the picture were last set. */
   private figured = -Infinity;
@@ -57,6 +66,7 @@ export class App {
     this.camera = new CameraFeed(this.stage, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
     this.stage.beforeFrame.push(() => this.arrange());
+    this.stage.drawn.push(() => this.acknowledge());
     this.stage.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
@@ -236,7 +246,7 @@ export class App {
         this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
         this.lastPicture = header;
         this.lastNews = performance.now();
-        this.pending.push(() => this.presented(header, received, decoded));
+        this.undrawn.push({ header, received, decoded });
       } catch {
         this.say("a picture from the server could not be decoded", "warning");
         this.send({ type: "presented", picture: header.picture });
@@ -246,14 +256,20 @@ export class App {
 
   private framed(time: number): void {
     this.latency.framed(time);
-    const shown = this.pending;
-    this.pending = [];
-    for (const done of shown) done();
+    const shown = this.drawn;
+    this.drawn = [];
+    for (const picture of shown) this.presented(picture);
   }
 
-  private presented(header: PictureHeader, received: number, decoded: number): void {
+  /** Asks for the next picture while the frame with this one goes to the screen. */
+  private acknowledge(): void {
+    for (const { header } of this.undrawn) this.send({ type: "presented", picture: header.picture });
+    this.drawn.push(...this.undrawn);
+    this.undrawn = [];
+  }
+
+  private presented({ header, received, decoded }: Arrived): void {
     const time = performance.now();
-    this.send({ type: "presented", picture: header.picture });
     const { drag, seq, camera, revision, width, full_width, final, render_ms, encode_ms } = header;
     this.latency.shown(
       { time, drag, seq, camera, revision, width, fullWidth: full_width, final },

@@ -36,8 +36,9 @@ export class Stage {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;
-  /** Called before each frame is drawn, and after it with the time at which the next one could begin. */
+  /** Called before each frame is drawn, when it was, and with the time at which the next one could begin. */
   beforeFrame: (() => void)[] = [];
+  drawn: (() => void)[] = [];
   afterFrame: ((time: number) => void)[] = [];
   /** Called when the camera or the canvas is another. */
   cameraChanged: (() => void)[] = [];
@@ -79,6 +80,7 @@ export class Stage {
       this.renderer.setRenderTarget(null);
       this.renderer.clear();
       this.renderer.render(this.scene, this.camera);
+      for (const action of this.drawn) action();
       requestAnimationFrame((time) => {
         for (const action of this.afterFrame) action(time);
       });

@@ -6,7 +6,7 @@ no web and no renderer: it is told what happens and when, and asked for the next
 - At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
   anything changes.
 - Where the camera is the one of the last whole picture, only the part is rendered that the edits change.
-- A page is owed a picture only while fewer than two of its pictures are on their way.
+- A page is owed a picture only while none of its pictures is on its way; at rest, fewer than two.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from dataclasses import dataclass, field
 from cagefield.server.protocol import View
 from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixels, tiles
 
-MOST_UNSHOWN = 2
-"""Pictures sent and not yet shown, at most, per page."""
+MOST_UNSHOWN, MOST_MOVING = 2, 1
+"""Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older
+than it had to be, and would be rendered while the page has the one before to draw."""
 
 MOVING_SECONDS = 0.05
 """Time that a picture may take while something moves."""
@@ -32,7 +33,7 @@ SETTLE_SECONDS = 0.12
 MOST_TILES = 9
 """Tiles of a view, at most."""
 
-LEAST_SIDE = 96
+LEAST_SIDE = 80
 """Shorter side of the smallest moving picture, pixels."""
 
 SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
@@ -220,7 +221,7 @@ class Scheduler:
         waiting = sorted(
             (not self._owes_moving(p), p.served, page)
             for page, p in self._pages.items()
-            if p.camera >= 0 and len(p.unshown) < MOST_UNSHOWN
+            if p.camera >= 0 and self._has_room(p)
         )
         for _, _, page in waiting:
             request = self._request(page, now)
@@ -237,7 +238,7 @@ class Scheduler:
         waits = [
             p.changed + SETTLE_SECONDS - now
             for p in self._pages.values()
-            if p.camera >= 0 and p.tiles != [] and not p.moving and len(p.unshown) < MOST_UNSHOWN
+            if p.camera >= 0 and p.tiles != [] and not p.moving and self._has_room(p)
         ]
         return max(0.0, min(waits)) if waits else None
 
@@ -257,7 +258,7 @@ class Scheduler:
     def idle(self) -> bool:
         """True where nothing moves, and no page waits for a picture or can be sent one."""
         return (self._running is None and not self._dragging) and all(
-            p.camera < 0 or (not p.moving and (len(p.unshown) >= MOST_UNSHOWN or p.tiles == []))
+            p.camera < 0 or (not p.moving and (p.tiles == [] or not self._has_room(p)))
             for p in self._pages.values()
         )
 
@@ -270,6 +271,9 @@ class Scheduler:
         p.tiles = None
         if self._running is not None and not self._running[0].moving and self._running[0].page == page:
             self.generation += 1
+
+    def _has_room(self, p: _Page) -> bool:
+        return len(p.unshown) < (MOST_MOVING if p.moving or self._dragging else MOST_UNSHOWN)
 
     def _owes_moving(self, p: _Page) -> bool:
         return p.shown_version != p.version
