@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cagefield.server.scheduler import (
-    MOST_TILES,
     MOST_MOVING,
+    MOST_TILES,
     MOST_UNSHOWN,
     MOVING_SECONDS,
     SETTLE_SECONDS,
