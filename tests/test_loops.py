@@ -28,23 +28,22 @@ def test_every_item_has_its_turn(items: int, unit: int) -> None:
     assert (visits == 1).all()
 
 
-def test_threads_get_their_share_of_any_part_of_the_items() -> None:
+def test_parts_get_their_share_of_any_piece_of_the_items() -> None:
     devices.start()
-    threads, items = devices.threads(), 6400
+    parts, items = devices.parts(), 6400
     visits, order = np.zeros(items, np.int32), np.zeros(items, np.int32)
     deal = loops.deal(items, 1)
     _visit(visits, order, deal)
-    # Quadrants gives a thread an equal part of the turns, one after the other.
-    thread = order // deal[0]
+    part = order // deal[0]
     for first in range(0, items, 640):
-        share = np.bincount(thread[first : first + 640], minlength=threads)
-        assert share.min() >= 640 // threads
+        share = np.bincount(part[first : first + 640], minlength=parts)
+        assert share.min() >= 640 // parts
 
 
-def test_few_items_go_to_different_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(devices, "threads", lambda: 4)
-    length, threads, unit = loops.deal(4, 1)
-    assert (length, threads, unit) == (loops.LEAST, 4, 1)
+def test_few_items_go_to_different_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "parts", lambda: 4)
+    length, parts, unit = loops.deal(4, 1)
+    assert (length, parts, unit) == (loops.LEAST, 4, 1)
 
 
 def test_a_gpu_keeps_the_order(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,7 +70,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
                 default_fp=qd.f64 if double else qd.f32,
                 offline_cache=cache is not None,
                 src_ll_cache=cache is not None,
-                cpu_max_num_threads=threads(),
+                cpu_max_num_threads=parts(),
                 offline_cache_file_path=str(cache or ""),
                 cfg_optimization=False,
                 log_level="error",
@@ -93,7 +93,7 @@ def is_gpu() -> bool:
 
 
 def threads() -> int:
-    """Number of CPU threads that kernels use."""
+    """Number of threads that the CPU runs at once."""
     try:
         return max(1, len(os.sched_getaffinity(0)))
     except AttributeError:
@@ -143,6 +143,12 @@ def _source_digest() -> str:
         if path.parent in folders:
             digest.update(source)
     return digest.hexdigest()[:16]
+
+
+def parts() -> int:
+    """Number of parts that kernels' loops are cut into: more than threads can run at once, so that none of
+    them waits long for one whose core other programs use."""
+    return 3 * threads()
 
 
 def _supported(arch: Any) -> bool:

@@ -1,7 +1,6 @@
 """How the items of a kernel's loop are dealt to the CPU's threads.
 
-Quadrants cuts a loop into as many contiguous parts as there are threads, none of them shorter than LEAST
-turns. Where items cost unlike much one thread waits for the others, and a few costly items are all done by
+Quadrants cuts a loop into `devices.parts` contiguous parts, none of them shorter than LEAST turns. Where items cost unlike much one thread waits for the others, and a few costly items are all done by
 one. Dealt out like cards, some at a time, they keep all threads busy:
 
     deal = loops.deal(items)
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from cagefield import devices
 
 LEAST = 512
-"""Turns of a loop that Quadrants leaves to one thread."""
+"""Turns of a loop that Quadrants does not cut."""
 
 UNIT = 64
 """Items that are dealt together: threads should not write to the same cache line in turn."""
@@ -32,11 +31,11 @@ Deal = qd.types.vector(3, qd.i32)
 
 
 def deal(items: int, unit: int = UNIT) -> NDArray[np.int32]:
-    """The argument (turns, threads, unit) of a kernel that loops over so many items; see the module."""
-    threads = 1 if devices.is_gpu() else devices.threads()
+    """The argument (turns, parts, unit) of a kernel that loops over so many items; see the module."""
+    parts = 1 if devices.is_gpu() else devices.parts()
     units = -(-items // unit)
-    least = -(-LEAST // unit) if threads > 1 else 1
-    return devices.ints((max(-(-units // threads), least), threads, unit))
+    least = -(-LEAST // unit) if parts > 1 else 1
+    return devices.ints((max(-(-units // parts), least), parts, unit))
 
 
 @qd.func
