@@ -1,7 +1,8 @@
 """How the items of a kernel's loop are dealt to the CPU's threads.
 
-Quadrants cuts a loop into `devices.parts` contiguous parts, none of them shorter than LEAST turns. Where items cost unlike much one thread waits for the others, and a few costly items are all done by
-one. Dealt out like cards, some at a time, they keep all threads busy:
+Quadrants cuts a loop into `devices.parts` contiguous parts, none of them shorter than LEAST turns. Where
+items cost unlike much one thread waits for the others, and a few costly items are all done by one. Dealt out
+like cards, some at a time, they keep all threads busy:
 
     deal = loops.deal(items)
 

@@ -12,7 +12,8 @@ occupied blocks; the second probes the 27 cell corners of each block that passed
 densities themselves. Maps of discrete edits jump: there, the first pass takes the neighbours' corners too.
 Where one edit of a stack is replaced, only the blocks are looked at that its old and its new map can change.
 
-The coarse occupancy, for pictures while a cage is being dragged, is the first pass over whole bricks.
+The coarse occupancy, for pictures while a cage is being dragged, is the first pass, eight
+bricks at a time.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -70,10 +71,10 @@ def deform(
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
-    Only what `known` does not know is looked at. `coarse` takes the first pass alone, for whole bricks: it
-    holds what the fine one holds and more, for a tenth of the time; with a `link`, the stack has the edit of
-    the link in place of another one, and nothing else is looked at. `proceed` is called between the passes,
-    and may raise.
+    Only what `known` does not know is looked at. `coarse` takes the first pass alone, eight bricks at a
+    time: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack has
+    the edit of the link in place of another one, and nothing else is looked at. `proceed` is called between
+    the passes, and may raise.
     """
     field, proceed = grid.field, proceed or nothing
     if stack.n_edits == 0:
@@ -107,7 +108,7 @@ def deform(
         if link is not None and coarse:
             near = link.near_bricks(grid, begin, bricks)
         else:
-            near = smooth.near_bricks(canonical, grid, stack, begin, bricks)
+            near = smooth.near_bricks(canonical, grid, stack, begin, bricks, coarse=coarse)
         if coarse:
             near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
         else:

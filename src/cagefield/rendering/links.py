@@ -42,9 +42,9 @@ class Link:
     def near_bricks(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """As `smooth_occupancy.near_bricks` of the whole stack."""
+        """As `smooth_occupancy.near_bricks` of the whole stack, coarsely."""
         starts = self.chain.starts(grid, lower, count)
-        return smooth.near_bricks(self.chain.below, grid, self.stack, lower, count, starts)
+        return smooth.near_bricks(self.chain.below, grid, self.stack, lower, count, starts, coarse=True)
 
 
 @dataclass(frozen=True)
@@ -85,5 +85,5 @@ class Chain:
         if key not in self._starts:
             self._starts.clear()
             later = DeviceStack.from_stack(EditStack(self.later))
-            self._starts[key] = smooth.brick_corners(grid, later, lower, count)
+            self._starts[key] = smooth.coarse_corners(grid, later, lower, count)
         return self._starts[key]

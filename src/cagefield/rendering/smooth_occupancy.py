@@ -52,21 +52,33 @@ def near_bricks(
     lower: NDArray[np.int64],
     count: NDArray[np.int64],
     starts: NDArray[np.float32] | None = None,
+    *,
+    coarse: bool = False,
 ) -> Mask:
     """The bricks [count] with an occupied corner, the first one's at grid coordinates `lower`.
 
-    `starts`, where given, are where the corners are mapped from; see `brick_corners`.
+    `coarse` takes eight bricks as one. `starts`, where given, are where the corners are mapped from; see
+    `coarse_corners`.
     """
-    points = tuple((count + 1).tolist())
-    images = _images(grid, stack, lower, np.ones(points, bool), BRICK, starts)
-    return _cubes(_occupied(images, canonical, points))
+    if not coarse:
+        points = tuple((count + 1).tolist())
+        images = _images(grid, stack, lower, np.ones(points, bool), BRICK, starts)
+        return _cubes(_occupied(images, canonical, points))
+    points = _coarse_points(count)
+    images = _images(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
+    near = _cubes(_occupied(images, canonical, points))
+    return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: count[0], : count[1], : count[2]]
 
 
-def brick_corners(
+def coarse_corners(
     grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
 ) -> NDArray[np.float32]:
-    """Images [N,3], grid coordinates, of the corners of bricks [count] under a stack."""
-    return _images(grid, stack, lower, np.ones(tuple((count + 1).tolist()), bool), BRICK)
+    """Images [N,3], grid coordinates, under a stack, of the corners that a coarse look at bricks maps."""
+    return _images(grid, stack, lower, np.ones(_coarse_points(count), bool), 2 * BRICK)
+
+
+def _coarse_points(count: NDArray[np.int64]) -> tuple[int, ...]:
+    return tuple((-(-count // 2) + 1).tolist())
 
 
 def occupied_blocks(
