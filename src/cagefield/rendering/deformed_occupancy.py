@@ -72,9 +72,9 @@ def deform(
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
     Only what `known` does not know is looked at. `coarse` takes the first pass alone, eight bricks at a
-    time: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack has
-    the edit of the link in place of another one, and nothing else is looked at. `proceed` is called between
-    the passes, and may raise.
+    time: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack
+    has the edit of the link in place of another one, and nothing else is looked at. `proceed` is called
+    between the passes, and may raise.
     """
     field, proceed = grid.field, proceed or nothing
     if stack.n_edits == 0:

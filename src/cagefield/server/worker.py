@@ -18,7 +18,7 @@ from typing import Any
 from cagefield.errors import CagefieldError
 from cagefield.server.tasks import Failed, Ready, Result, Task
 
-TO_END = 1.0
+TO_END = 3.0
 """Seconds that the process has to end by itself: then it keeps the kernels that it compiled."""
 
 _LOST = (EOFError, ConnectionResetError, BrokenPipeError, OSError)
@@ -119,9 +119,10 @@ class Worker:
         return None if self._process is None else self._process.pid
 
     def close(self) -> None:
-        """Ends the process."""
+        """Ends the process; what it does is abandoned."""
         connection, self._connection = self._connection, None
         if connection is not None:
+            self._generation.value = ctypes.c_ulong(-1).value
             with contextlib.suppress(*_LOST):
                 connection.send(None)
             if self._process is not None:
