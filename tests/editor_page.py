@@ -169,6 +169,7 @@ class EditorPage:
         self.page.bring_to_front()
         if not cages:
             self.press("o")
+            self.until("!cagefield.now.cages")
         self.page.mouse.move(2, 2)
         self.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         image = Image.open(io.BytesIO(self.page.screenshot(clip=self.box)))
