@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.benchmarking import ablations
-from cagefield.benchmarking.ablations import Subject, around, continuous_of, lattice_error
+from cagefield.benchmarking.ablations import Subject, around
 from cagefield.benchmarking.cases import chosen
 from cagefield.benchmarking.compare import continuous
 from cagefield.benchmarking.edits import eye
@@ -17,7 +17,6 @@ from cagefield.benchmarking.strips import difference, strip
 from cagefield.benchmarking.workbench import Settings, Workbench, beside
 from cagefield.cli import main
 from cagefield.datasets.procedural import procedural_scene
-from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.training.voxel import VoxelConfig
@@ -81,14 +80,6 @@ def test_finer_lattices_are_nearer_to_the_exact_map(subject: Subject) -> None:
         assert float(coarse[same]) < float(fine[same])
         assert (exact[worst], exact[mean], exact[same]) == ("0.000", "0.0000", "inf")
     assert result.picture.shape[1] == 3 * PICTURE + 2 * 8
-
-
-def test_lattice_errors_agree_with_the_reference(subject: Subject) -> None:
-    exact = subject.with_edit(lambda e: e.replace(shell="trilinear"))
-    stack = EditStack(e.replace(lattice=16) for e in exact)
-    # other points of the shell: the means agree to their scatter, and each point to float32
-    expected = continuous_of(exact).lattice_error(16, samples=20_000)
-    assert lattice_error(stack, exact)[1] == pytest.approx(expected[1], rel=0.05)
 
 
 def test_discrete_edits_change_less_than_continuous_ones(subject: Subject) -> None:

@@ -46,10 +46,11 @@ def test_a_second_process_loads_its_kernels_from_the_disk(tmp_path: Path) -> Non
 
 def test_a_folder_that_cannot_be_made_is_done_without(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    assert run(tmp_path / "file")[0] is not None
+    point, stored, loaded = run(tmp_path / "file")
+    assert (stored, loaded) == (False, False) and point == run(tmp_path / "folder")[0]
 
 
-def test_folders_of_other_versions_go_when_nobody_used_them_for_long(
+def test_folders_of_other_versions_and_locks_go_when_nobody_uses_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -57,6 +58,12 @@ def test_folders_of_other_versions_go_when_nobody_used_them_for_long(
     for name, age in (("old", devices.KEPT_SECONDS + 60.0), ("recent", 60.0)):
         (kernels / name).mkdir(parents=True)
         os.utime(kernels / name, 2 * (time.time() - age,))
+    lock = devices.kernel_cache() / "kernel_compilation_manager" / "qdcache.lock"  # type: ignore[operator]
+    lock.parent.mkdir()
+    lock.write_text("")
     folder = devices.kernel_cache()
-    assert folder is not None
+    assert folder is not None and lock.exists()
+    os.utime(lock, 2 * (time.time() - 2.0 * devices.LOCKED_SECONDS,))
+    devices.kernel_cache()
+    assert not lock.exists()
     assert sorted(path.name for path in kernels.iterdir()) == sorted([folder.name, "recent"])

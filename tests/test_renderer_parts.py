@@ -10,6 +10,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.occupancy import FEW, encode
 from cagefield.rendering.renderer import Renderer
 from scenes import ball_field
@@ -74,6 +75,24 @@ def test_the_coarse_occupancy_holds_the_fine_one_and_shows_the_same(plain: Rende
     assert pictures[0] is not None and pictures[1] is not None
     assert pictures[0].opacity.max() > 0.9
     np.testing.assert_array_equal(pictures[0].rgb, pictures[1].rgb)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None:
+    devices.start("cpu")
+    dots = np.random.default_rng(seed).integers(21, 76, (12, 3))
+    field = VoxelField(
+        bounds=np.array([[-1.0] * 3, [1.0] * 3]),
+        resolution=(97, 97, 97),
+        vertices=np.unique(dots @ [97 * 97, 97, 1]),
+        density=np.full(12, 50.0, np.float32),
+        sh=np.zeros((12, 1, 3), np.float32),
+    )
+    plain = Renderer(field)
+    stack = EditStack([Edit(INNER, Cage.box((0, 0, 0), 1.6), lattice=48).scale(0.15)])
+    fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
+    assert fine._occupancy.blocks.sum() > 50
+    assert (coarse._occupancy.blocks >= fine._occupancy.blocks).all()
 
 
 def test_short_leaps_are_long_ones_cut_off() -> None:

@@ -8,7 +8,7 @@ import pytest
 from cagefield import devices
 from cagefield.cameras import Camera
 from cagefield.datasets.views import View
-from cagefield.loops import deal
+from cagefield.loops import deal_of
 
 devices.start("cpu")
 
@@ -69,7 +69,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 
         len(patches),
         4,
         grid.workers,
-        deal(grid.workers, 1),
+        deal_of(grid.workers, 1),
         7,
         data.views,
         data.poses,

@@ -25,6 +25,9 @@ DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
 KEPT_SECONDS = 30 * 86400.0
 """How long kernels of other versions of the package are kept after they were last used."""
 
+LOCKED_SECONDS = 60.0
+"""How long a process may hold the lock of a folder of kernels: it writes a few megabytes."""
+
 _started: str | None = None
 
 
@@ -52,7 +55,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
     import quadrants as qd
 
     qd.set_logging_level("error")
-    # Kernels name constants, which `_kernel_cache` sees to.
+    # Kernels name constants, which `kernel_cache` sees to.
     warnings.filterwarnings("ignore", message=r"\[PURE.VIOLATION\]")
     archs: dict[str, Any] = {"cpu": qd.cpu, "cuda": qd.cuda, "metal": qd.metal, "vulkan": qd.vulkan}
     if device == "auto":
@@ -126,12 +129,23 @@ def kernel_cache() -> Path | None:
         folder = base / _source_digest()
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
-        for other in base.iterdir():
-            if time.time() - other.stat().st_mtime > KEPT_SECONDS:
-                shutil.rmtree(other, ignore_errors=True)
     except (OSError, RuntimeError):
         return None
+    _tidy(folder)
     return folder
+
+
+def _tidy(folder: Path) -> None:
+    """Removes what nobody needs beside a folder of kernels, and the lock of a process that died with it."""
+    with contextlib.suppress(OSError):
+        for other in list(folder.parent.iterdir()):
+            with contextlib.suppress(OSError):
+                if time.time() - other.stat().st_mtime > KEPT_SECONDS:
+                    shutil.rmtree(other, ignore_errors=True)
+    lock = folder / "kernel_compilation_manager" / "qdcache.lock"
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
+            lock.unlink()
 
 
 def _source_digest() -> str:
@@ -148,7 +162,7 @@ def _source_digest() -> str:
 def parts() -> int:
     """Number of parts that kernels' loops are cut into: more than threads can run at once, so that none of
     them waits long for one whose core other programs use."""
-    return 3 * threads()
+    return min(3 * threads(), threads() + 32)
 
 
 def _supported(arch: Any) -> bool:

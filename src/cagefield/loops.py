@@ -2,9 +2,9 @@
 
 Quadrants cuts a loop into `devices.parts` contiguous parts, none of them shorter than LEAST turns. Where
 items cost unlike much one thread waits for the others, and a few costly items are all done by one. Dealt out
-like cards, some at a time, they keep all threads busy:
+like cards, some at a time (a block-cyclic distribution), they keep all threads busy:
 
-    deal = loops.deal(items)
+    deal = loops.deal_of(items)
 
     for n in range(turns(deal)):
         i = dealt(n, deal)
@@ -31,7 +31,7 @@ UNIT = 64
 Deal = qd.types.vector(3, qd.i32)
 
 
-def deal(items: int, unit: int = UNIT) -> NDArray[np.int32]:
+def deal_of(items: int, unit: int = UNIT) -> NDArray[np.int32]:
     """The argument (turns, parts, unit) of a kernel that loops over so many items; see the module."""
     parts = 1 if devices.is_gpu() else devices.parts()
     units = -(-items // unit)

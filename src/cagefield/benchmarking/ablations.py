@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.compare import compared_cameras, continuous, seen
-from cagefield.benchmarking.distortion import distortion, shell_points
+from cagefield.benchmarking.distortion import distortion
 from cagefield.benchmarking.edits import eye, frame_ratio
 from cagefield.benchmarking.figures import Figures, Pictures, compare
 from cagefield.benchmarking.strips import Panel, difference, strip
@@ -25,14 +25,13 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.metrics import psnr
 from cagefield.scene import Scene
-from cagefield.warps.device import lattice_difference
 
 RESOLUTIONS = (64, 128, 256)
 GAPS = (0.1, 0.25, 0.5, 1.0)
 """Gaps between the cages, as shares of the inner cage's mean edge."""
 
 _STRONGER = 20.0
-_POINTS = 1 << 16
+_POINTS = 20_000
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
         for nodes in (*resolutions, None):
             stack = EditStack(e.replace(lattice=nodes) if e.adjustment == "continuous" else e for e in exact)
             edited = subject.scene.with_edits(stack)
-            worst, mean = lattice_error(stack, exact) if nodes else (0.0, 0.0)
+            worst, mean = continuous_of(stack).lattice_error(samples=_POINTS)
             same = psnr(seen(edited, subject.cameras), frames)
             figures = subject.figures(stack)
             if nodes:
@@ -149,7 +148,7 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
             tuple(rows),
             (
                 f"Error: distance in voxels ({voxel:.4g} world units) between the canonical points from the "
-                f"lattice and exact ones, at {_POINTS} random points of the shell.",
+                f"lattice and exact ones, at those of {_POINTS} random points that lie in the shell.",
                 "PSNR to exact: frames from the lattice against frames with the exact map; edited: against "
                 "the scene's model through the exact map. Frame time: over an unedited frame.",
                 f"Picture: the exact frame, and the difference to it, {_STRONGER:g} times as strong.",
@@ -198,13 +197,6 @@ _DISCRETE: dict[str, Any] = {
     "adjustment": "discrete", "outer": None, "shell": "flow", "lattice": None, "falloff": "smooth",
     "width": 1.0,
 }  # fmt: skip
-
-
-def lattice_error(stack: EditStack, exact: EditStack) -> tuple[float, float]:
-    """(max, mean) distance, world units, of canonical points by two stacks' maps in the renderer's kernel."""
-    edit = continuous_of(stack)
-    apart = lattice_difference(continuous_of(exact), edit, shell_points(edit, _POINTS))
-    return float(apart.max()), float(apart.mean())
 
 
 def continuous_of(stack: EditStack) -> Edit:

@@ -12,8 +12,8 @@ occupied blocks; the second probes the 27 cell corners of each block that passed
 densities themselves. Maps of discrete edits jump: there, the first pass takes the neighbours' corners too.
 Where one edit of a stack is replaced, only the blocks are looked at that its old and its new map can change.
 
-The coarse occupancy, for pictures while a cage is being dragged, is the first pass, eight
-bricks at a time.
+The coarse occupancy, for pictures while a cage is being dragged, is the first pass alone, by
+bricks; where no edit jumps, by eight of them at a time.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -27,7 +27,7 @@ from scipy import ndimage
 
 from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.rendering import smooth_occupancy as smooth
 from cagefield.rendering.grid import (
     F32,
@@ -71,8 +71,8 @@ def deform(
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
-    Only what `known` does not know is looked at. `coarse` takes the first pass alone, eight bricks at a
-    time: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack
+    Only what `known` does not know is looked at. `coarse` takes the first pass alone, by whole
+    bricks: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack
     has the edit of the link in place of another one, and nothing else is looked at. `proceed` is called
     between the passes, and may raise.
     """
@@ -231,7 +231,7 @@ def _corners(
     out = np.zeros(int(np.prod(count)), np.uint8)
     _occupied_corners(
         out,
-        deal(len(out)),
+        deal_of(len(out)),
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
         ints(canonical.blocks.shape),
         ints(canonical.origin),
@@ -255,7 +255,7 @@ def _refined(
     out = np.zeros(len(candidates), np.uint8)
     _occupied_blocks(
         out,
-        deal(len(out)),
+        deal_of(len(out)),
         np.ascontiguousarray(candidates).reshape(-1),
         ints(lower),
         grid.index,

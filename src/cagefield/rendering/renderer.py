@@ -76,7 +76,7 @@ class Renderer:
     ) -> Renderer:
         """A renderer of the same field under other edits; what they share with these is kept.
 
-        `coarse` looks at the edited space by bricks instead of cells: ready sooner, the same picture, slower.
+        `coarse` looks at the edited space by many cells at a time: ready sooner, the same picture, slower.
         `proceed` is called now and then, and gives the renderer up by raising.
         """
         other = object.__new__(Renderer)
@@ -132,7 +132,7 @@ class Renderer:
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
         takes the place of the renderer's own.
         """
-        from cagefield.loops import deal
+        from cagefield.loops import deal_of
         from cagefield.rendering import march
 
         field = self.field
@@ -154,7 +154,7 @@ class Renderer:
             few = min(rows, down - row)
             march.march_tiles(
                 out,
-                deal(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
+                deal_of(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
                 directions,
                 row,
                 few,

@@ -8,7 +8,8 @@ images q: along axis a as far as to the farther neighbour's, halved, and summed 
 Three passes, each looked at where the one before found something: points a brick apart, points a block
 apart (both against occupied blocks, half a cell added), and the cells of a block against the densities
 themselves. The images of the cells' corners are interpolated between the block's corners, and r is then half
-a cell's reach plus a quarter of the images' second difference, twice the error of interpolation.
+a cell's reach plus a quarter of the images' second difference, twice the error of interpolation. A coarse
+look is the first pass alone, with points two bricks apart.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -20,7 +21,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.devices import ints
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -36,7 +37,7 @@ from cagefield.rendering.occupancy import BRICK, Occupancy
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
 MOST_CELLS = 12.0
-"""Largest r, in cells; a map that squeezes more than this looks that far only."""
+"""Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""
 
 UNKNOWN = 1e30
 """Image of a point that was not mapped."""
@@ -66,7 +67,7 @@ def near_bricks(
         return _cubes(_occupied(images, canonical, points))
     points = _coarse_points(count)
     images = _images(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
-    near = _cubes(_occupied(images, canonical, points))
+    near = _cubes(_occupied(images, canonical, points, 2.0 * MOST_CELLS))
     return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: count[0], : count[1], : count[2]]
 
 
@@ -126,7 +127,7 @@ def _images(
     images = np.empty((wanted.size, 3), np.float32)
     _map_points(
         images,
-        deal(len(images)),
+        deal_of(len(images)),
         np.zeros((1, 3), np.float32) if starts is None else starts,
         int(starts is not None),
         np.ascontiguousarray(wanted, np.uint8).reshape(-1),
@@ -143,18 +144,21 @@ def _images(
     return images
 
 
-def _occupied(images: NDArray[np.float32], canonical: Occupancy, count: tuple[int, ...]) -> Mask:
-    """Which points [count] have an occupied block within reach."""
+def _occupied(
+    images: NDArray[np.float32], canonical: Occupancy, count: tuple[int, ...], most: float = MOST_CELLS
+) -> Mask:
+    """Which points [count] have an occupied block within reach, at most `most` cells."""
     out = np.empty(len(images), np.uint8)
     _occupied_points(
         out,
-        deal(len(out)),
+        deal_of(len(out)),
         images,
         np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
         ints(canonical.blocks.shape),
         canonical.codes.reshape(-1),
         ints(canonical.origin),
         ints(count),
+        most,
     )
     return out.reshape(count).view(bool)
 
@@ -173,7 +177,7 @@ def _refined(
     out = np.empty(len(candidates), np.uint8)
     _dense_blocks(
         out,
-        deal(len(out)),
+        deal_of(len(out)),
         candidates.reshape(-1),
         images,
         ints(count),
@@ -257,6 +261,7 @@ def _occupied_points(
     codes: I32,
     origin: ivec3,
     count: ivec3,
+    most: qd.f32,
 ):
     for turn in range(turns(deal)):
         n = dealt(turn, deal)
@@ -270,7 +275,7 @@ def _occupied_points(
                 x_reach, _x = differences(images, n, i, count.x, count.y * count.z)
                 y_reach, _y = differences(images, n, j, count.y, count.z)
                 z_reach, _z = differences(images, n, k, count.z, 1)
-                r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, MOST_CELLS)
+                r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, most)
                 first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
                 last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, blocks_shape - 1)
                 x = first.x

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps.device import DeviceStack, PackedStack, map_sample, read3
 
 Table = qd.types.ndarray(dtype=qd.f32, ndim=2)
@@ -65,7 +65,7 @@ class TensorMap:
         if len(samples):
             table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
             stack = self._params, self._lattice, self.count, self.flows
-            _map_tensors(table, deal(len(samples)), result, *stack, preserve_opacity)
+            _map_tensors(table, deal_of(len(samples)), result, *stack, preserve_opacity)
         return out[:, :3], out[:, 3:6], out[:, 6]
 
 

@@ -256,7 +256,10 @@ class Scheduler:
         return len(self._pages[page].unshown)
 
     def idle(self) -> bool:
-        """True where nothing moves, and no page waits for a picture or can be sent one."""
+        """True where nothing moves, and no page waits for a picture or can be sent one.
+
+        What can wait, background jobs too, stands still while anybody drags.
+        """
         return (self._running is None and not self._dragging) and all(
             p.camera < 0 or (not p.moving and (p.tiles == [] or not self._has_room(p)))
             for p in self._pages.values()

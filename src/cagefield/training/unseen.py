@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cagefield.cameras import Camera
 from cagefield.devices import floats, ints
 from cagefield.fields.voxel import VoxelField
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import (
     F32,
@@ -62,7 +62,7 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
         local = camera.local_directions().reshape(camera.height, camera.width, 3)[::stride, ::stride]
         _mark_seen(
             seen,
-            deal(local.shape[0] * local.shape[1]),
+            deal_of(local.shape[0] * local.shape[1]),
             to_device(local.astype(np.float32)),
             local.shape[0] * local.shape[1],
             floats(camera.c2w[:3, :3]),

@@ -358,7 +358,7 @@ class _Run:
         return self.grid.bounds[0].tolist(), (n / (self.grid.bounds[1] - self.grid.bounds[0])).tolist()
 
     def _batch(self, done: float) -> None:
-        from cagefield.loops import deal
+        from cagefield.loops import deal_of
         from cagefield.training import kernels
 
         config, grid, photos = self.config, self.grid, self.photos
@@ -379,7 +379,7 @@ class _Run:
             count,
             config.patch,
             count if gpu else self.workers,
-            deal(count if gpu else self.workers, 1),
+            deal_of(count if gpu else self.workers, 1),
             self.step + 1000003 * config.seed,
             photos.views,
             photos.poses,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,22 +42,6 @@ class ContinuousWarp:
     def to_deformed(self, points: Array) -> Mapped:
         """Canonical points [N,3] to deformed space."""
         return _by_region(points, self.inner.inverse, self.outer, self.shell.to_deformed)
-
-
-def lattice_error(
-    warp: ContinuousWarp, resolution: int, *, samples: int = 20_000, seed: int = 0
-) -> tuple[float, float]:
-    """(max, mean) distance, world units, between the shell map from R^3 nodes and the exact one.
-
-    Measured at `samples` random points of the outer cage's frame that lie in the shell V^o minus V; the
-    interpolation's own error falls with R^-2 where the map is smooth and with R^-1 at the cages' faces.
-    """
-    points = warp.shell_points(samples, seed)
-    exact = replace(warp, lattice=None)
-    lattice = Lattice.sample(lambda p: exact.to_canonical(p).points, warp.outer, resolution)
-    difference = lattice.to_canonical(points)[0] - exact.to_canonical(points).points
-    distance = np.linalg.norm(difference, axis=1)
-    return float(distance.max(initial=0.0)), float(distance.mean()) if len(distance) else 0.0
 
 
 def _by_region(

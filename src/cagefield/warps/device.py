@@ -25,7 +25,7 @@ from cagefield import devices, hexahedron
 from cagefield.devices import floats
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps import flow_device, flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
@@ -157,24 +157,9 @@ class DeviceStack:
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
             _map_samples(
-                samples, deal(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
+                samples, deal_of(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
             )
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
-
-
-@dataclass(frozen=True)
-class _One:
-    """A stack of one edit."""
-
-    active: tuple[PackedEdit]
-
-
-def lattice_difference(exact: PackedEdit, sampled: PackedEdit, points: Array) -> Array:
-    """Distances [N], world units, between an edit's map with and without its lattice at points [N,3]."""
-    p = points.astype(np.float32)
-    d = np.tile(np.array([1.0, 0.0, 0.0], dtype=np.float32), (len(p), 1))
-    maps = [DeviceStack.from_stack(_One((edit,))).to_canonical(p, d)[0] for edit in (exact, sampled)]
-    return np.linalg.norm((maps[1] - maps[0]).astype(np.float64), axis=1)
 
 
 @qd.func
@@ -508,15 +493,15 @@ def _lattice(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
     return _kept(_lattices, edit, lambda: _sampled(edit, row))
 
 
-def flow_lattice_of(edit: PackedEdit) -> Lattice:
-    """The lattice of an edit with a flow shell, by the kernel, for the float64 reference.
+def lattice_of(edit: PackedEdit) -> Lattice:
+    """The lattice of a continuous edit as the renderer has it, for the float64 reference.
 
-    Raises `DeviceError` where no device starts, `EditError` for other edits.
+    Raises `DeviceError` where no device starts, `EditError` for edits without a lattice.
     """
     warp = edit.exact_warp
-    if not (isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell)) or edit.lattice is None:
-        raise EditError("only an edit with a flow shell and a lattice has a flow lattice")
-    nodes = _lattice(edit, np.zeros(WIDTH, dtype=np.float32))
+    if not isinstance(warp, ContinuousWarp) or edit.lattice is None:
+        raise EditError("only a continuous edit with a lattice has one")
+    nodes = _lattice(edit, _kept(_rows, edit, partial(_packed, edit)))
     origin, frame = warp.outer.frame
     R = edit.lattice
     return Lattice(origin, frame, nodes.reshape(R, R, R, 3).astype(np.float64))
@@ -539,7 +524,7 @@ def _sampled(edit: PackedEdit, row: NDArray[np.float32]) -> NDArray[np.float32]:
         lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
         nodes[:] = lattice.displacement.reshape(-1, 3)
     else:
-        _sample_lattice(nodes, deal(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
+        _sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
 
 

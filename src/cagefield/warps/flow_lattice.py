@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.devices import floats
-from cagefield.loops import Deal, deal, dealt, turns
+from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps.flow_device import HEADER, MOMENT, flow_point, table
 from cagefield.warps.flow_lanes import bend, newton, times, unbend, weight_at
 from cagefield.warps.flow_shell import FlowShell
@@ -56,10 +56,10 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     if devices.is_gpu():  # which has a lane for every node
         nodes[:] = LOST
     else:
-        blocks = deal(-(-len(nodes) // LANES), 1)
+        blocks = deal_of(-(-len(nodes) // LANES), 1)
         _march(nodes, blocks, *place, not shell.motion.confines.is_affine, not shell.motion.is_affine)
     if (nodes[:, 0] == np.float32(LOST)).any():
-        _march_lost(nodes, deal(len(nodes)), *place)
+        _march_lost(nodes, deal_of(len(nodes)), *place)
     return nodes
 
 
