@@ -165,14 +165,17 @@ class EditorPage:
         return self.edit
 
     def pixels(self, cages: bool = False) -> NDArray[np.float64]:
-        """The picture on the screen [H,W,3] in [0,1]; the cages are taken off for it, unless wanted."""
+        """The picture on the screen [H,W,3] in [0,1]; the cages are taken off for it, unless wanted, and what
+        the page says of actions before."""
         self.page.bring_to_front()
+        self.page.evaluate("document.querySelector('.toasts').style.visibility = 'hidden'")
         if not cages:
             self.press("o")
             self.until("!cagefield.now.cages")
         self.page.mouse.move(2, 2)
         self.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         image = Image.open(io.BytesIO(self.page.screenshot(clip=self.box)))
+        self.page.evaluate("document.querySelector('.toasts').style.visibility = ''")
         if not cages:
             self.press("o")
         return np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0

@@ -263,6 +263,8 @@ def test_numbers_move_turn_and_scale(editor: EditorPage) -> None:
     field.press("Enter")
     assert "must stay inside the outer cage" in editor.said("% of it is possible")
     assert editor.state["entry"] == entry
+    editor.press("r")  # Enter has left the field: keys are shortcuts again
+    assert editor.page.evaluate("cagefield.now.tool") == "rotate"
 
 
 def test_set_mode_moves_cages_and_not_the_field(editor: EditorPage) -> None:

@@ -356,7 +356,7 @@ def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None) -
     return torch.nn.functional.normalize(total, dim=1).numpy()
 
 
-@pytest.mark.parametrize("name", ["none", "ndc", "move", "trilinear, then move"])
+@pytest.mark.parametrize("name", ["none", "ndc", "move", "flow", "trilinear, then move"])
 def test_normals_are_the_slopes_of_the_edited_density(name) -> None:
     field = small_field(ndc=(0.5, 0.5), near=0.0, far=1.0) if name == "ndc" else small_field()
     edits = STACKS.get(name)

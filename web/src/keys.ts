@@ -68,7 +68,10 @@ export function named(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey" |
 export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all: Binding[]): void {
   const byKey = new Map(all.flatMap((binding) => binding.keys.map((key) => [key, binding] as const)));
   addEventListener("keydown", (event) => {
-    if (isTyping(event.target)) return;
+    if (isTyping(event.target)) {
+      if (event.key === "Enter") leave(event.target);
+      return;
+    }
     const name = named(event);
     if (event.key === "Control") return snap(true);
     if (name === "B" && !event.repeat) return app.store.set({ before: true });
@@ -93,6 +96,11 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     pointer.snapKey = held;
     pointer.follow();
   }
+}
+
+/** Lets the keys be shortcuts again after a field was filled in. */
+function leave(field: EventTarget | null): void {
+  if (field instanceof HTMLInputElement) setTimeout(() => field.blur());
 }
 
 function isTyping(target: EventTarget | null): boolean {
