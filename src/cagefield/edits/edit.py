@@ -26,7 +26,7 @@ from cagefield.warps.lattice import Lattice
 Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
 AT_ONCE = 500
-"""Points at which a lattice is compared with its flow at a time: hundredths of a second."""
+"""Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
 
 LATTICE_RANGE = (2, 512)
 

@@ -43,7 +43,7 @@ from cagefield.rendering.grid import (
 )
 from cagefield.rendering.links import Link
 from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
-from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed
+from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed, is_dense
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
 
@@ -391,14 +391,6 @@ def _occupied_blocks(
                 )
                 if empty == 0:
                     r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
-                    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-                    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
-                    x = first.x
-                    while x <= last.x and found == 0:
-                        for y in range(first.y, last.y + 1):
-                            for z in range(first.z, last.z + 1):
-                                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
-                                    found = 1
-                        x += 1
+                    found = is_dense(image, r, index, density, resolution)
                 k += 1
             out[n] = qd.cast(found, qd.u8)

@@ -295,6 +295,22 @@ def _occupied_points(
             out[n] = qd.cast(found, qd.u8)
 
 
+@qd.func
+def is_dense(image: vec3, r: vec3, index: qd.template(), density: qd.template(), resolution: ivec3):
+    """1 where a cell within r of an image, grid coordinates, holds density, else 0."""
+    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
+    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+    found = 0
+    x = first.x
+    while x <= last.x and found == 0:
+        for y in range(first.y, last.y + 1):
+            for z in range(first.z, last.z + 1):
+                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                    found = 1
+        x += 1
+    return found
+
+
 @qd.kernel(fastcache=True)
 def _dense_blocks(
     out: U8,
@@ -348,14 +364,6 @@ def _dense_blocks(
                     w = qd.abs(1.0 - up - part)
                     for a in qd.static(range(3)):
                         image[a] += w.x * w.y * w.z * corners[corner, a]
-                first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-                last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
-                x = first.x
-                while x <= last.x and found == 0:
-                    for y in range(first.y, last.y + 1):
-                        for z in range(first.z, last.z + 1):
-                            if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
-                                found = 1
-                    x += 1
+                found = is_dense(image, r, index, density, resolution)
                 at += 1
             out[c] = qd.cast(found, qd.u8)
