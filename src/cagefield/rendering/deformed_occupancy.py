@@ -43,7 +43,7 @@ from cagefield.rendering.grid import (
 )
 from cagefield.rendering.links import Link
 from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
-from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed, is_dense
+from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed, is_blocked, is_dense
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
 
@@ -347,16 +347,7 @@ def _occupied_corners(
             found = 0
             if empty == 0:
                 r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
-                first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - blocks_origin // 2, 0)
-                last = qd.cast(qd.floor((image + r) * 0.5), qd.i32) - blocks_origin // 2
-                last = qd.min(last, blocks_shape - 1)
-                x = first.x
-                while x <= last.x and found == 0:
-                    for y in range(first.y, last.y + 1):
-                        for z in range(first.z, last.z + 1):
-                            if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
-                                found = 1
-                    x += 1
+                found = is_blocked(image, r, blocks, blocks_shape, blocks_origin)
             out[n] = qd.cast(found, qd.u8)
 
 

@@ -251,6 +251,22 @@ def differences(images: qd.template(), n: qd.i32, i: qd.i32, count: qd.i32, stri
     return qd.max(qd.abs(before), qd.abs(after)), bend
 
 
+@qd.func
+def is_blocked(image: vec3, r: vec3, blocks: qd.template(), shape: ivec3, origin: ivec3):
+    """1 where an occupied block lies within r of an image, grid coordinates, else 0."""
+    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
+    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, shape - 1)
+    found = 0
+    x = first.x
+    while x <= last.x and found == 0:
+        for y in range(first.y, last.y + 1):
+            for z in range(first.z, last.z + 1):
+                if blocks[(x * shape.y + y) * shape.z + z] > 0:
+                    found = 1
+        x += 1
+    return found
+
+
 @qd.kernel(fastcache=True)
 def _occupied_points(
     out: U8,
@@ -276,22 +292,16 @@ def _occupied_points(
                 y_reach, _y = differences(images, n, j, count.y, count.z)
                 z_reach, _z = differences(images, n, k, count.z, 1)
                 r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, most)
-                first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
-                last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, blocks_shape - 1)
-                x = first.x
+                empty = 0
                 bricks = blocks_shape // 2
                 b = (qd.cast(qd.floor(image), qd.i32) - origin) >> 2
                 if b.min() >= 0 and (bricks - b).min() > 0:
                     # Every brick nearer than this code says is empty.
                     code = codes[(b.x * bricks.y + b.y) * bricks.z + b.z]
                     if r.max() < qd.cast(4 * ((code >> 8) - 1), qd.f32):
-                        x = last.x + 1
-                while x <= last.x and found == 0:
-                    for y in range(first.y, last.y + 1):
-                        for z in range(first.z, last.z + 1):
-                            if blocks[(x * blocks_shape.y + y) * blocks_shape.z + z] > 0:
-                                found = 1
-                    x += 1
+                        empty = 1
+                if empty == 0:
+                    found = is_blocked(image, r, blocks, blocks_shape, origin)
             out[n] = qd.cast(found, qd.u8)
 
 
