@@ -300,9 +300,9 @@ def _in_hull(local: Array, y: Array) -> Mask:
 def solve(J: tuple[Array, Array, Array], r: Array) -> Array:
     """J^-1 r [3,N] by Cramer's rule, from the columns [3,N] of J; singular J are moved off zero."""
     a, b, c = J
-    bc, ca, ab = _cross(b, c), _cross(c, a), _cross(a, b)
+    bc, ar = _cross(b, c), _cross(a, r)
     det = _off_zero((a * bc).sum(axis=0), 1e-12)
-    return np.stack([(v * r).sum(axis=0) / det for v in (bc, ca, ab)])
+    return np.stack([(r * bc).sum(axis=0), (c * ar).sum(axis=0), -(b * ar).sum(axis=0)]) / det
 
 
 def _off_zero(values: Array, least: float) -> Array:

@@ -31,6 +31,7 @@ from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_device import flow_sample, solve_columns
 from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.joined import Joined
 from cagefield.warps.lattice import Lattice
 from cagefield.warps.maps import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
@@ -133,7 +134,7 @@ class DeviceStack:
             lattices.append(nodes)
         nodes = np.zeros((1, 3), dtype=np.float32)
         if lattices:
-            nodes = lattices[0] if len(lattices) == 1 else np.concatenate(lattices)
+            nodes = lattices[0] if len(lattices) == 1 else _joined.join(lattices)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
         boxes = np.concatenate([np.zeros((0, 2, 3))] + [widened(edit.boxes) for edit in edits])
@@ -473,6 +474,7 @@ _Kept: TypeAlias = "WeakKeyDictionary[Any, NDArray[np.float32]]"
 _lattices: _Kept = WeakKeyDictionary()
 _tables: _Kept = WeakKeyDictionary()
 _rows: _Kept = WeakKeyDictionary()
+_joined = Joined()
 
 
 def _kept(kept: _Kept, edit: PackedEdit, make: Callable[[], NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -104,57 +104,65 @@ def straighten(form: Array, y: Array, start: Array | None = None, enough: float 
 
 def _newton(form: Array, xi: Array, target: Array, enough: float) -> Array:
     """What is left [N] of y(xi) - target after taking xi [3,N] to the root near it, in place."""
-    residual = _residual(form, xi, target)
+    form = form if form[4:].any() else form[:4]
+    x, y, residual = xi, target, _residual(form, xi, target)
     size = np.abs(residual).max(axis=0)
-    arrived = enough * (1.0 + np.abs(target).max(axis=0))
-    rows = np.flatnonzero(size > arrived)
+    left, arrived = size, enough * (1.0 + np.abs(target).max(axis=0))
+    rows = np.arange(len(size))  # those on their way; x, y, residual and left are theirs
     for _ in range(60):
+        going = left > arrived[rows]
+        if not going.all():
+            rows, x, y, residual, left = rows[going], x[:, going], y[:, going], residual[:, going], left[going]
         if len(rows) == 0:
             break
-        step = hexahedron.solve(slope_columns(form, xi[:, rows]), residual[:, rows])
-        left, share = np.arange(len(rows)), 1.0
-        for _ in range(7):
-            here = rows[left]
-            trial = xi[:, here] - share * step[:, left]
-            new = _residual(form, trial, target[:, here])
-            new_size = np.abs(new).max(axis=0)
-            better = new_size < size[here]
-            moved = here[better]
-            xi[:, moved], residual[:, moved], size[moved] = trial[:, better], new[:, better], new_size[better]
-            left, share = left[~better], 0.5 * share
-            if len(left) == 0:
+        step = hexahedron.solve(slope_columns(form, x), residual)
+        trial = x - step
+        new = _residual(form, trial, y)
+        new_left = np.abs(new).max(axis=0)
+        worse, share = np.flatnonzero(new_left >= left), 1.0
+        for _ in range(6):
+            if len(worse) == 0:
                 break
-        rows = np.delete(rows, left)  # what no step improves has arrived, up to rounding, or is stuck
-        rows = rows[size[rows] > arrived[rows]]
+            share *= 0.5
+            trial[:, worse] = x[:, worse] - share * step[:, worse]
+            new[:, worse] = _residual(form, trial[:, worse], y[:, worse])
+            new_left[worse] = np.abs(new[:, worse]).max(axis=0)
+            worse = worse[new_left[worse] >= left[worse]]
+        if len(worse):  # what no step improves has arrived, up to rounding, or is stuck
+            kept = np.delete(np.arange(len(rows)), worse)
+            rows, trial, y, new, new_left = rows[kept], trial[:, kept], y[:, kept], new[:, kept], new_left[kept]
+        x, residual, left = trial, new, new_left
+        xi[:, rows], size[rows] = x, left
     return np.asarray(size)
 
 
 def _residual(form: Array, xi: Array, y: Array) -> Array:
     """y(xi) - y, all [3,N]."""
-    return xi + form.T @ _factors(xi) - y
+    return xi + form.T @ _factors(xi, len(form)) - y
 
 
-def _factors(xi: Array) -> Array:
-    """What the rows of a form are multiplied by [10,N] at xi [3,N]."""
+def _factors(xi: Array, rows: int = 10) -> Array:
+    """What the first 4 or all 10 rows of a form are multiplied by at xi [3,N]."""
     a, b, c = xi.clip(-1.0, 1.0)
     ab = a * b
+    if rows == 4:
+        return np.stack([ab, a * c, b * c, ab * c])
     below, above = np.minimum(xi + 1.0, 0.0), np.maximum(xi - 1.0, 0.0)
     beyond = (below[0], above[0], below[1], above[1], below[2], above[2])
     return np.stack([ab, a * c, b * c, ab * c, *beyond])
 
 
 def slope_columns(form: Array, xi: Array) -> tuple[Array, Array, Array]:
-    """The three columns [3,N] of dy/dxi at xi [3,N]."""
+    """The three columns [3,N] of dy/dxi at xi [3,N], for the bend alone [4,3] or with its tilts [10,3]."""
     a, b, c = xi.clip(-1.0, 1.0)
     inside = np.abs(xi) <= 1.0
-    columns = (
-        form[[0, 1, 3]].T @ np.stack([b, c, b * c]),
-        form[[0, 2, 3]].T @ np.stack([a, c, a * c]),
-        form[[1, 2, 3]].T @ np.stack([a, b, a * b]),
-    )
+    A, B, C, D = form[:4, :, None]
+    bc = b * c
+    columns = (A * b + B * c + D * bc, A * a + C * c + D * (a * c), B * a + C * b + D * (a * b))
     for axis, column in enumerate(columns):
         column *= inside[axis]
-        column += form[4 + 2 * axis : 6 + 2 * axis].T @ np.stack([xi[axis] < -1.0, xi[axis] > 1.0])
+        if len(form) > 4:
+            column += form[4 + 2 * axis : 6 + 2 * axis].T @ np.stack([xi[axis] < -1.0, xi[axis] > 1.0])
         column[axis] += 1.0
     return columns
 

@@ -70,7 +70,7 @@ class Motion:
         least = KEPT_GAP * min(self.gaps)
         if least <= 0.0:
             return np.inf
-        at_rest = self._gap(TIMES, 0.0) - least
+        at_rest = 1.0 - np.abs(self._at_rest).max(axis=(1, 2)) - least
         if at_rest.min() >= 0.0:
             return 0.0
         high = -float(np.log(LEAST_SIZE))
@@ -135,45 +135,61 @@ class Motion:
         if self.confines.is_affine:
             return True
         a, b = self.start.centre, self.end.centre
-        z = self.confines.coordinates(a + np.linspace(0.0, 1.0, 33)[:, None] * (b - a))
+        z = self.confines.coordinates(a + np.linspace(0.0, 1.0, 33)[:, None] * (b - a), enough=1e-7)
         inside = 1.0 - np.abs(z).max(axis=1)
         return bool(inside.min() >= 0.9 * min(inside[0], inside[-1]))
 
-    def surface(self, t: Array) -> tuple[Array, Array]:
-        """(z [T,S,3], dz/dt [T,S,3]) of points on the cage's faces, in the outer cage's coordinates.
+    @cached_property
+    def surface(self) -> tuple[Array, Array]:
+        """(z [T,S,3], dz/dt [T,S,3]) at `TIMES` of points on the cage's faces, in the outer cage's coordinates.
 
         In an affine outer cage they are the corners: |z| and |dz/dt| / (1 - |z|) are largest there. In others
         the middles of edges and faces, too.
         """
-        c, F, dc, dF = self.frames(t)
-        xi = SIGNS if self.confines.is_affine else _SURFACE[:26]
-        y = self._straightened(t, xi)
-        x = c[:, None] + y @ np.transpose(F, (0, 2, 1))
-        v = dc[:, None] + y @ np.transpose(dF, (0, 2, 1))
+        _, F, dc, dF = self.frames(TIMES)
+        v = dc[:, None] + self._straightened(TIMES) @ np.transpose(dF, (0, 2, 1))
         if not self.is_affine:
-            v += bend(self.end.bend - self.start.bend, xi) @ np.transpose(F, (0, 2, 1))
-        z = self.confines.coordinates(x.reshape(-1, 3))
-        if self.confines.is_affine:
-            return z.reshape(x.shape), v @ self.confines.inverse.T
-        along = hexahedron.solve(
-            slope_columns(self.confines.form, z.T), (v.reshape(-1, 3) @ self.confines.inverse.T).T
-        )
-        return z.reshape(x.shape), along.T.reshape(x.shape)
+            v += bend(self.end.bend - self.start.bend, self._looked_at) @ np.transpose(F, (0, 2, 1))
+        z = self._at_rest
+        if self.shrink != 0.0:
+            z = self.faces(TIMES, self.shrink, z)
+        along = v @ self.confines.inverse.T
+        if not self.confines.is_affine:
+            columns = slope_columns(self.confines.form, z.reshape(-1, 3).T)
+            along = hexahedron.solve(columns, along.reshape(-1, 3).T).T.reshape(z.shape)
+        return z, along
 
-    def _straightened(self, t: Array, xi: Array) -> Array:
-        """xi + B_t(xi) [T,S,3] of points xi [S,3] of the cube at times t [T]."""
+    @property
+    def _looked_at(self) -> Array:
+        """The points xi [S,3] of `surface`."""
+        return SIGNS if self.confines.is_affine else _SURFACE[:26]
+
+    def _straightened(self, t: Array) -> Array:
+        """xi + B_t(xi) [T,S,3] of the points of `surface` at times t [T]."""
+        xi = self._looked_at
         if self.is_affine:
             return np.broadcast_to(xi, (len(t), *xi.shape))
         going = bend(self.end.bend - self.start.bend, xi)
         return xi + bend(self.start.bend, xi) + t[:, None, None] * going
 
+    @cached_property
+    def _at_rest(self) -> Array:
+        """z [T,S,3] of `surface`, were the cage not to shrink."""
+        return self.faces(TIMES, 0.0)
+
+    def faces(self, t: Array, shrink: float, start: Array | None = None, enough: float = 1e-7) -> Array:
+        """z [T,S,3] of the points of `surface` at times t [T], with that much shrinking.
+
+        By Newton's method from z = start [T,S,3], if given, to `enough`.
+        """
+        c, F, *_ = self.frames(t, shrink)
+        x = c[:, None] + self._straightened(t) @ np.transpose(F, (0, 2, 1))
+        near = None if start is None else start.reshape(-1, 3)
+        return self.confines.coordinates(x.reshape(-1, 3), near, enough).reshape(x.shape)
+
     def _gap(self, t: Array, shrink: float) -> Array:
         """Least distance [T], as a share of the outer cage's half-width, of the cage from the outer cage."""
-        c, F, *_ = self.frames(t, shrink)
-        xi = SIGNS if self.confines.is_affine else _SURFACE[:26]
-        x = c[:, None] + self._straightened(t, xi) @ np.transpose(F, (0, 2, 1))
-        z = self.confines.coordinates(x.reshape(-1, 3), enough=1e-7)
-        return 1.0 - np.abs(z).max(axis=1).reshape(x.shape[:2]).max(axis=1)
+        return 1.0 - np.abs(self.faces(t, shrink)).max(axis=(1, 2))
 
     @cached_property
     def gaps(self) -> tuple[float, float]:

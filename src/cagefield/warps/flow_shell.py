@@ -12,7 +12,7 @@ from cagefield.hexahedron import Array, Mask
 from cagefield.warps.bends import bend, bend_slope
 from cagefield.warps.extended import Extended
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.flow_motion import Motion, gaps, may_bend
+from cagefield.warps.flow_motion import TIMES, Motion, gaps, may_bend
 from cagefield.warps.inverting import inverted
 
 POWER = 4
@@ -78,7 +78,7 @@ class FlowShell:
     @cached_property
     def coefficients(self) -> tuple[float, float]:
         """(a, b) of the weight, see `Falloff`."""
-        z, _ = self.motion.surface(np.array([0.0, 1.0]))
+        z = self.motion.surface[0][[0, -1]]
         gaps = np.concatenate([1.0 + z.min(axis=1), 1.0 - z.max(axis=1)], axis=1)
         before, after = np.log(np.maximum(gaps, LEAST_GAP))
         return self.falloff.coefficients(float(np.abs(after - before).max()))
@@ -100,8 +100,8 @@ class FlowShell:
     @cached_property
     def _strained(self) -> tuple[Array, Array]:
         """(times, strain up to each of them)."""
-        t = np.linspace(0.0, 1.0, 65 if self.motion.confines.is_affine else 17)
-        z, dz = self.motion.surface(t)
+        t = TIMES
+        z, dz = self.motion.surface
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
         _, F, _, dF = self.motion.frames(t)
         W = np.linalg.inv(F)

@@ -1,0 +1,65 @@
+"""Arrays one after the other in one, for kernels, without copying those that have not changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from threading import Lock
+from typing import Any
+from weakref import ref
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rows = NDArray[np.float32]
+
+
+class Joined:
+    """Joins arrays [N,3], and keeps what it made to write into again once nobody holds it any more.
+
+    A drag asks again and again for the same arrays but one: only that one is copied, and no memory is
+    fetched. Arrays that are given must not change, and are held until others take their place.
+    """
+
+    def __init__(self, most: int = 3) -> None:
+        self._most = most
+        self._made: list[_Made] = []
+        self._lock = Lock()
+
+    def join(self, parts: Sequence[Rows]) -> Rows:
+        """The parts [N,3] one after the other, read-only. Views of it do not outlive it."""
+        with self._lock:
+            lengths = [len(part) for part in parts]
+            made = next((m for m in self._made if m.lengths == lengths and m.is_free), None)
+            if made is None:
+                made = _Made(lengths)
+            else:
+                self._made.remove(made)
+            self._made = [made, *self._made[: self._most - 1]]
+            return made.filled(parts)
+
+
+class _Made:
+    """An array, what lies in it, and whether somebody holds it."""
+
+    def __init__(self, lengths: list[int]) -> None:
+        self.lengths = lengths
+        self._rows = np.empty((sum(lengths), 3), dtype=np.float32)
+        self._parts: list[Rows | None] = [None] * len(lengths)
+        self._held: ref[Any] | None = None
+
+    @property
+    def is_free(self) -> bool:
+        return self._held is None or self._held() is None
+
+    def filled(self, parts: Sequence[Rows]) -> Rows:
+        at = 0
+        for n, part in enumerate(parts):
+            if self._parts[n] is not part:
+                self._rows[at : at + len(part)] = part
+                self._parts[n] = part
+            at += len(part)
+        # A view of their own: numpy gives views of it `_rows` as their base, so its own life says who looks.
+        view = self._rows.view()
+        view.setflags(write=False)
+        self._held = ref(view)
+        return view
