@@ -112,7 +112,13 @@ def _newton(form: Array, xi: Array, target: Array, enough: float) -> Array:
     for _ in range(60):
         going = left > arrived[rows]
         if not going.all():
-            rows, x, y, residual, left = rows[going], x[:, going], y[:, going], residual[:, going], left[going]
+            rows, x, y, residual, left = (
+                rows[going],
+                x[:, going],
+                y[:, going],
+                residual[:, going],
+                left[going],
+            )
         if len(rows) == 0:
             break
         step = hexahedron.solve(slope_columns(form, x), residual)
@@ -130,7 +136,13 @@ def _newton(form: Array, xi: Array, target: Array, enough: float) -> Array:
             worse = worse[new_left[worse] >= left[worse]]
         if len(worse):  # what no step improves has arrived, up to rounding, or is stuck
             kept = np.delete(np.arange(len(rows)), worse)
-            rows, trial, y, new, new_left = rows[kept], trial[:, kept], y[:, kept], new[:, kept], new_left[kept]
+            rows, trial, y, new, new_left = (
+                rows[kept],
+                trial[:, kept],
+                y[:, kept],
+                new[:, kept],
+                new_left[kept],
+            )
         x, residual, left = trial, new, new_left
         xi[:, rows], size[rows] = x, left
     return np.asarray(size)

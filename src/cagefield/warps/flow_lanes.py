@@ -62,32 +62,76 @@ def newton(
     K: qd.i32,
 ):
     """(xi after a step from xi = (x, y, z) towards y(xi) = a, the residual before it)."""
+    rx, ry, rz = residual(x, y, z, ax, ay, az, table, K)
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = inverse(x, y, z, table, K, True)
+    return (
+        x - (rx * ux + ry * uy + rz * uz),
+        y - (rx * vx + ry * vy + rz * vz),
+        z - (rx * wx + ry * wy + rz * wz),
+        qd.max(qd.abs(rx), qd.abs(ry), qd.abs(rz)),
+    )
+
+
+@qd.func
+def newton_twice(
+    x: qd.f32,
+    y: qd.f32,
+    z: qd.f32,
+    ax: qd.f32,
+    ay: qd.f32,
+    az: qd.f32,
+    table: qd.template(),
+    K: qd.i32,
+):
+    """(xi after two steps from (x, y, z) towards y(xi) = a, with one slope, the residual between them)."""
+    rx, ry, rz = residual(x, y, z, ax, ay, az, table, K)
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = inverse(x, y, z, table, K, True)
+    x1 = x - (rx * ux + ry * uy + rz * uz)
+    y1 = y - (rx * vx + ry * vy + rz * vz)
+    z1 = z - (rx * wx + ry * wy + rz * wz)
+    sx, sy, sz = residual(x1, y1, z1, ax, ay, az, table, K)
+    return (
+        x1 - (sx * ux + sy * uy + sz * uz),
+        y1 - (sx * vx + sy * vy + sz * vz),
+        z1 - (sx * wx + sy * wy + sz * wz),
+        qd.max(qd.abs(sx), qd.abs(sy), qd.abs(sz)),
+    )
+
+
+@qd.func
+def residual(
+    x: qd.f32,
+    y: qd.f32,
+    z: qd.f32,
+    ax: qd.f32,
+    ay: qd.f32,
+    az: qd.f32,
+    table: qd.template(),
+    K: qd.i32,
+):
+    """y(xi) - a at xi = (x, y, z)."""
     cx = qd.max(qd.min(x, 1.0), -1.0)
     cy = qd.max(qd.min(y, 1.0), -1.0)
     cz = qd.max(qd.min(z, 1.0), -1.0)
     tx, ty, tz = bend(cx, cy, cz, table, K)
     xy, xz, yx, yz, zx, zy = tilts(x, y, z, table, K)
-    rx = x + tx + (y - cy) * yx + (z - cz) * zx - ax
-    ry = y + ty + (x - cx) * xy + (z - cz) * zy - ay
-    rz = z + tz + (x - cx) * xz + (y - cy) * yz - az
-    residual = qd.max(qd.abs(rx), qd.abs(ry), qd.abs(rz))
-    sx, sy, sz = unbend(x, y, z, rx, ry, rz, table, K, True)
-    return x - sx, y - sy, z - sz, residual
+    return (
+        x + tx + (y - cy) * yx + (z - cz) * zx - ax,
+        y + ty + (x - cx) * xy + (z - cz) * zy - ay,
+        z + tz + (x - cx) * xz + (y - cy) * yz - az,
+    )
 
 
 @qd.func
-def unbend(
+def inverse(
     x: qd.f32,
     y: qd.f32,
     z: qd.f32,
-    rx: qd.f32,
-    ry: qd.f32,
-    rz: qd.f32,
     table: qd.template(),
     K: qd.i32,
     around: qd.template(),
 ):
-    """(dy/dxi)^-1 r at xi = (x, y, z), by Cramer's rule; without tilts where nothing is around the cage."""
+    """The rows of (dy/dxi)^-1 at xi = (x, y, z); without tilts where nothing is around the cage."""
     a = table[K]
     b = table[K + 1]
     c = table[K + 2]
@@ -122,17 +166,17 @@ def unbend(
     px = vy * wz - vz * wy
     py = vz * wx - vx * wz
     pz = vx * wy - vy * wx
-    qx = wy * uz - wz * uy
-    qy = wz * ux - wx * uz
-    qz = wx * uy - wy * ux
-    tx = uy * vz - uz * vy
-    ty = uz * vx - ux * vz
-    tz = ux * vy - uy * vx
-    inverse = 1.0 / qd.max(ux * px + uy * py + uz * pz, 1e-3)
+    scale = 1.0 / qd.max(ux * px + uy * py + uz * pz, 1e-3)
     return (
-        (rx * px + ry * py + rz * pz) * inverse,
-        (rx * qx + ry * qy + rz * qz) * inverse,
-        (rx * tx + ry * ty + rz * tz) * inverse,
+        px * scale,
+        py * scale,
+        pz * scale,
+        (wy * uz - wz * uy) * scale,
+        (wz * ux - wx * uz) * scale,
+        (wx * uy - wy * ux) * scale,
+        (uy * vz - uz * vy) * scale,
+        (uz * vx - ux * vz) * scale,
+        (ux * vy - uy * vx) * scale,
     )
 
 

@@ -4,8 +4,8 @@ The march of `flow_device`, written for `LANES` nodes at a time: the innermost l
 branches, and keep each number of all of them in one array, so that compilers use vector instructions. The
 table is that of `flow_device`. Two things differ from the march of single samples, by less than the error of
 its steps: it goes on in the outer cage's coordinates z, so that only the start of a way is straightened
-there, and the inner cage's xi are followed by two of Newton's steps a stage, not to rounding. Nodes that
-these do not suffice for are marked, and marched again one by one.
+there, and the inner cage's xi are followed by two of Newton's steps a stage, with one slope, not to rounding.
+Nodes that these do not suffice for are marked, and marched again one by one.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -18,7 +18,7 @@ from cagefield import devices
 from cagefield.devices import floats
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps.flow_device import HEADER, MOMENT, flow_point, table
-from cagefield.warps.flow_lanes import bend, newton, times, unbend, weight_at
+from cagefield.warps.flow_lanes import bend, inverse, newton, newton_twice, times, weight_at
 from cagefield.warps.flow_shell import FlowShell
 
 LANES = 64
@@ -26,8 +26,9 @@ lanes = qd.types.vector(LANES, qd.f32)
 vec3 = qd.math.vec3
 mat3 = qd.types.matrix(3, 3, qd.f32)
 Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
+Numbers = qd.types.ndarray(dtype=qd.i32, ndim=1)
 
-START_STEPS = 8
+START_STEPS = 5
 """Newton's steps for the outer cage's coordinates at the start of a way."""
 
 LOST = 1e30
@@ -58,16 +59,20 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     else:
         blocks = deal_of(-(-len(nodes) // LANES), 1)
         _march(nodes, blocks, *place, not shell.motion.confines.is_affine, not shell.motion.is_affine)
-    if (nodes[:, 0] == np.float32(LOST)).any():
-        _march_lost(nodes, deal_of(len(nodes)), *place)
+    lost = np.flatnonzero(nodes[:, 0] == np.float32(LOST)).astype(np.int32)
+    if len(lost):
+        _march_lost(nodes, lost, deal_of(len(lost), 1), *place)
     return nodes
 
 
 @qd.kernel(fastcache=True)
-def _march_lost(nodes: Nodes, deal: Deal, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32):
+def _march_lost(
+    nodes: Nodes, lost: Numbers, deal: Deal, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
+):
     for turn in range(turns(deal)):
-        n = dealt(turn, deal)
-        if n < nodes.shape[0] and nodes[n].x == LOST:
+        item = dealt(turn, deal)
+        if item < lost.shape[0]:
+            n = lost[item]
             p = place(n, origin, frame, resolution)
             nodes[n] = flow_point(p, table, 0) - p
 
@@ -167,10 +172,9 @@ def _march(
                         vy += table[moment + 7].y
                         vz += table[moment + 7].z
                         if qd.static(bent_inner):
-                            x1, y1, z1, _r = newton(
+                            ix, iy, iz, residual = newton_twice(
                                 bx[lane], by[lane], bz[lane], ix, iy, iz, table, moment + 10
                             )
-                            ix, iy, iz, residual = newton(x1, y1, z1, ix, iy, iz, table, moment + 10)
                             bx[lane] = ix
                             by[lane] = iy
                             bz[lane] = iz
@@ -188,7 +192,13 @@ def _march(
                         vy *= w
                         vz *= w
                         if qd.static(bent_outer):
-                            vx, vy, vz = unbend(x, y, z, vx, vy, vz, table, 10, False)
+                            ux, uy, uz, wx, wy, wz, tx, ty, tz = inverse(x, y, z, table, 10, False)
+                            x = ux * vx + uy * vy + uz * vz
+                            y = wx * vx + wy * vy + wz * vz
+                            z = tx * vx + ty * vy + tz * vz
+                            vx = x
+                            vy = y
+                            vz = z
                         kx[lane] = vx
                         ky[lane] = vy
                         kz[lane] = vz

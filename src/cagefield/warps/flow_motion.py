@@ -109,6 +109,16 @@ class Motion:
         c, dc = self._centre(t)
         return c, F, dc, dF
 
+    @cached_property
+    def way(self) -> tuple[Array, Array, Array, Array]:
+        """`frames` at `TIMES`."""
+        return self._way_at_rest if self.shrink == 0.0 else self.frames(TIMES)
+
+    @cached_property
+    def _way_at_rest(self) -> tuple[Array, Array, Array, Array]:
+        """`way`, were the cage not to shrink."""
+        return self.frames(TIMES, 0.0)
+
     def bend(self, t: float) -> Array:
         """K [4,3] at time t."""
         return self.start.bend + t * (self.end.bend - self.start.bend)
@@ -141,18 +151,18 @@ class Motion:
 
     @cached_property
     def surface(self) -> tuple[Array, Array]:
-        """(z [T,S,3], dz/dt [T,S,3]) at `TIMES` of points on the cage's faces, in the outer cage's coordinates.
+        """(z, dz/dt), both [T,S,3], of points on its faces at `TIMES`, in the outer cage's coordinates.
 
         In an affine outer cage they are the corners: |z| and |dz/dt| / (1 - |z|) are largest there. In others
         the middles of edges and faces, too.
         """
-        _, F, dc, dF = self.frames(TIMES)
+        _, F, dc, dF = self.way
         v = dc[:, None] + self._straightened(TIMES) @ np.transpose(dF, (0, 2, 1))
         if not self.is_affine:
             v += bend(self.end.bend - self.start.bend, self._looked_at) @ np.transpose(F, (0, 2, 1))
         z = self._at_rest
         if self.shrink != 0.0:
-            z = self.faces(TIMES, self.shrink, z)
+            z = self._inside(TIMES, self.way, z)
         along = v @ self.confines.inverse.T
         if not self.confines.is_affine:
             columns = slope_columns(self.confines.form, z.reshape(-1, 3).T)
@@ -175,15 +185,17 @@ class Motion:
     @cached_property
     def _at_rest(self) -> Array:
         """z [T,S,3] of `surface`, were the cage not to shrink."""
-        return self.faces(TIMES, 0.0)
+        return self._inside(TIMES, self._way_at_rest)
 
-    def faces(self, t: Array, shrink: float, start: Array | None = None, enough: float = 1e-7) -> Array:
-        """z [T,S,3] of the points of `surface` at times t [T], with that much shrinking.
+    def faces(self, t: Array, shrink: float, enough: float = 1e-7) -> Array:
+        """z [T,S,3] of the points of `surface` at times t [T], with that much shrinking, to `enough`."""
+        return self._inside(t, self.frames(t, shrink), enough=enough)
 
-        By Newton's method from z = start [T,S,3], if given, to `enough`.
-        """
-        c, F, *_ = self.frames(t, shrink)
-        x = c[:, None] + self._straightened(t) @ np.transpose(F, (0, 2, 1))
+    def _inside(
+        self, t: Array, frames: tuple[Array, ...], start: Array | None = None, enough: float = 1e-7
+    ) -> Array:
+        """z [T,S,3] of the points of `surface` in these frames, by Newton's method from z = start [T,S,3]."""
+        x = frames[0][:, None] + self._straightened(t) @ np.transpose(frames[1], (0, 2, 1))
         near = None if start is None else start.reshape(-1, 3)
         return self.confines.coordinates(x.reshape(-1, 3), near, enough).reshape(x.shape)
 

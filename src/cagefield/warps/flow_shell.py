@@ -103,7 +103,7 @@ class FlowShell:
         t = TIMES
         z, dz = self.motion.surface
         squeeze = (np.abs(dz) / np.maximum(1.0 - np.abs(z), 1e-6)).max(axis=(1, 2)) / self.falloff.width
-        _, F, _, dF = self.motion.frames(t)
+        _, F, _, dF = self.motion.way
         W = np.linalg.inv(F)
         inside = (dF @ W)[:, None]
         if not self.motion.is_affine:
