@@ -137,7 +137,7 @@ class DeviceStack:
             nodes = lattices[0] if len(lattices) == 1 else _joined.join(lattices)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
-        boxes = np.concatenate([np.zeros((0, 2, 3))] + [widened(edit.boxes) for edit in edits])
+        boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))
         packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
         for array in (packed.params, packed.lattice, packed.boxes):
             array.setflags(write=False)
