@@ -88,6 +88,16 @@ def test_a_page_is_told_what_there_is_and_sent_a_whole_picture(server: EditorSer
         assert abs(nearest - 2.5) < 0.1  # camera at 3.0, the ball's radius is 0.5
 
 
+def test_a_page_is_told_how_much_of_the_renderer_is_ready(server: EditorServer) -> None:
+    with page(server) as (client, hello):
+        told = [client.until(lambda m: m["type"] == "preparing")]
+        client.look_from(hello)
+        while told[-1]["done"] < told[-1]["of"]:
+            told.append(client.until(lambda m: m["type"] == "preparing"))
+        assert told[-1]["of"] > 1
+        assert [m["done"] for m in told] == list(range(told[0]["done"], told[-1]["of"] + 1))
+
+
 def test_a_drag_moves_the_picture_and_the_state(server: EditorServer) -> None:
     with page(server) as (client, hello):
         number = load(client, BALL)["edits"][0]["id"]

@@ -184,6 +184,9 @@ export class App {
       case "notice":
         this.store.set({ notice: message });
         break;
+      case "preparing":
+        this.store.set({ preparing: message });
+        break;
       case "job":
         this.store.set({ jobs: [...this.store.now.jobs.filter((job) => job.job !== message.job), message] });
         break;

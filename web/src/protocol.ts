@@ -35,7 +35,7 @@ export type PageMessage =
   | SetPath
   | RenderJob
   | CancelJob;
-export type ServerMessage = Hello | State | Dragged | Answer | Notice | Job;
+export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preparing | Job;
 
 /**
  * A whole operation at once, from numeric fields.
@@ -402,6 +402,14 @@ export interface Notice {
   type: "notice";
   level: "info" | "warning" | "error";
   text: string;
+}
+/**
+ * How much of the renderer is ready: what a machine's first run compiles, later ones load.
+ */
+export interface Preparing {
+  type: "preparing";
+  done: number;
+  of: number;
 }
 /**
  * Everything that pages show of the edits; sent to all pages after each change.

@@ -1,7 +1,7 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "./cage";
 import type { Axes } from "./operations";
-import type { EditState, Hello, Job, LookMessage, Notice, State } from "./protocol";
+import type { EditState, Hello, Job, LookMessage, Notice, Preparing, State } from "./protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<LookMessage["view"]>;
@@ -46,6 +46,8 @@ export interface Editor {
   /** Why the drag that goes on stopped, or null. */
   limit: string | null;
   notice: Notice | null;
+  /** How much of the renderer is ready, or null before it was said. */
+  preparing: Preparing | null;
   jobs: Job[];
   figures: Figures;
 }
@@ -70,6 +72,7 @@ export const START: Editor = {
   hover: null,
   limit: null,
   notice: null,
+  preparing: null,
   jobs: [],
   figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false },
 };

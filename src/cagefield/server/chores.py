@@ -41,7 +41,7 @@ class Chores:
         """`measured` is called when a lattice was, `tell` with jobs' progress for all pages."""
         self._session, self._keeper = session, keeper
         self._measured, self._tell = measured, tell
-        self._warmed = 0
+        self._warmed, self._warming = 0, 0
         self._errors: list[tuple[Edit, Errors | None]] = []
         self._jobs: list[Job] = []
         self._ending: list[EndJobTask] = []
@@ -49,10 +49,8 @@ class Chores:
 
     def next(self, generation: int) -> Chore | None:
         """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
-        if self._warmed < WARM_STAGES:
-            stage = self._warmed
-            self._warmed += 1
-            return Chore(lambda number: WarmTask(number, stage), lambda _: None)
+        if self._warming < WARM_STAGES:
+            return self._warm()
         edit = self._unmeasured()
         if edit is not None:
             return self._measure(edit, generation)
@@ -60,6 +58,22 @@ class Chores:
             task = self._ending.pop(0)
             return Chore(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
         return self._picture(generation) if self._jobs else None
+
+    # ---- kernels ----
+
+    def preparing(self) -> protocol.Preparing:
+        """How many of the stages of `Studio.warm` are done."""
+        return protocol.Preparing(done=self._warmed, of=WARM_STAGES)
+
+    def _warm(self) -> Chore:
+        stage = self._warming
+        self._warming += 1
+
+        def done(_: Result) -> None:
+            self._warmed += 1
+            self._tell(self.preparing())
+
+        return Chore(lambda number: WarmTask(number, stage), done)
 
     # ---- lattices ----
 

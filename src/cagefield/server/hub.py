@@ -72,6 +72,7 @@ class Hub:
         page.outbox.put(self.state())
         if self.greeting is not None:
             page.notice("info", self.greeting)
+        page.outbox.put(self.chores.preparing())
         for job in self.chores.jobs():
             page.outbox.put(job)
         return page

@@ -435,6 +435,14 @@ class Notice(Message):
     text: str
 
 
+class Preparing(Message):
+    """How much of the renderer is ready: what a machine's first run compiles, later ones load."""
+
+    type: Literal["preparing"] = "preparing"
+    done: int
+    of: int
+
+
 class Job(Message):
     """How far a background job is."""
 
@@ -449,7 +457,7 @@ class Job(Message):
 
 
 ServerMessage: TypeAlias = Annotated[
-    Hello | State | Dragged | Answer | Notice | Job, Field(discriminator="type")
+    Hello | State | Dragged | Answer | Notice | Preparing | Job, Field(discriminator="type")
 ]
 
 

@@ -4,8 +4,12 @@ import { h } from "./dom";
 
 const NOTICE_STAYS = 12000;
 
+/** Milliseconds after which the renderer's preparing is worth a word: a second run is done by then. */
+const LONG = 2000;
+
 export function status(app: App): HTMLElement {
   const message = h("span", { class: "message" });
+  const preparing = h("span", { class: "preparing", hidden: true, role: "status" });
   const figures = h("span", { class: "figures" });
   const saved = h("span", { class: "saved" });
   const connection = h("span", { class: "connection" });
@@ -20,6 +24,17 @@ export function status(app: App): HTMLElement {
     clearTimeout(until);
     if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
   });
+  let late: ReturnType<typeof setTimeout> | undefined;
+  app.store.watch(["preparing"], ({ preparing: p }) => {
+    const goesOn = p !== null && p.done < p.of;
+    if (goesOn) preparing.textContent = `Preparing the renderer ${p.done + 1}/${p.of} – a machine's first run only`;
+    preparing.title = "Kernels are compiled for this machine and kept. Until then pictures may wait for seconds.";
+    if (!goesOn) {
+      clearTimeout(late);
+      late = undefined;
+      preparing.hidden = true;
+    } else late ??= setTimeout(() => (preparing.hidden = false), LONG);
+  });
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
     const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
     figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms` : "";
@@ -28,5 +43,5 @@ export function status(app: App): HTMLElement {
     connection.className = `connection ${c}`;
     connection.title = { open: "Connected", connecting: "Connecting…", lost: "The server is gone" }[c];
   });
-  return h("footer", { class: "status" }, message, h("span", { class: "space" }), figures, saved, connection);
+  return h("footer", { class: "status" }, message, h("span", { class: "space" }), preparing, figures, saved, connection);
 }
