@@ -218,7 +218,7 @@ def test_ten_steps_are_undone_and_done_again(editor: EditorPage) -> None:
         editor.until(f"cagefield.now.state.entry === {wanted['entry']}")
         editor.settle()
         assert editor.edits == edits
-        assert difference(editor.pixels(), seen) < 0.1  # JPEG's
+        assert difference(editor.pixels(), seen) < 0.2  # JPEG's, of tiles cut elsewhere
     assert cone(after).at[1] < cone(before).at[1] - 15
 
 

@@ -87,5 +87,6 @@ def test_checks_run_what_the_readme_says() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
     checks = (ROOT / ".ci" / "run").read_text(encoding="utf-8").replace("step ", "").splitlines()
     assert "pip install . && cagefield demo" in readme and "pip install ." in checks
-    assert "pip install '.[test]' && python -m pytest" in readme
-    assert "pip install '.[test]'" in checks and checks[-1] == "python -m pytest"
+    tests = "python -m pytest -n 2 --dist loadfile"
+    assert f"pip install '.[test]' && {tests}" in readme
+    assert "pip install '.[test]'" in checks and checks[-1] == tests

@@ -233,7 +233,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(studio: Studio) ->
     session: Any = SimpleNamespace(drags={}, drawn=lambda: (MOVED,))
     measured = []
     chores = Chores(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
-    chores._warmed = WARM_STAGES
+    chores._warming = WARM_STAGES
     chore = chores.next(0)
     assert chore is not None
     chore.done(stopped)
