@@ -11,7 +11,7 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.occupancy import FEW, encode
+from cagefield.rendering.occupancy import FEW, Occupancy, encode, masks_of
 from cagefield.rendering.renderer import Renderer
 from scenes import ball_field
 
@@ -96,12 +96,19 @@ def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None
 
 
 def test_short_leaps_are_long_ones_cut_off() -> None:
-    blocks = np.random.default_rng(0).random((24, 20, 28)) > 0.997
-    codes, short = encode(blocks), encode(blocks, FEW)
+    masks = masks_of(np.random.default_rng(0).random((24, 20, 28)) > 0.997)
+    codes, short = encode(masks), encode(masks, FEW)
     empty = codes >= 256
     np.testing.assert_array_equal(short[~empty], codes[~empty])
     np.testing.assert_array_equal(short[empty] // 256, np.minimum(codes[empty] // 256, FEW))
-    assert (encode(np.zeros((4, 4, 4), bool), FEW) == 256 * FEW).all()
+    assert (encode(np.zeros((2, 2, 2), np.uint8), FEW) == 256 * FEW).all()
+
+
+def test_an_occupancy_gives_its_blocks_back() -> None:
+    blocks = np.random.default_rng(1).random((24, 20, 28)) > 0.9
+    occupancy = Occupancy.from_masks(np.zeros(3, np.int64), masks_of(blocks))
+    np.testing.assert_array_equal(occupancy.blocks, blocks)
+    np.testing.assert_array_equal(occupancy.masks > 0, occupancy.codes < 256)
 
 
 def test_the_opacity_choice_is_the_renderers_own(plain: Renderer) -> None:

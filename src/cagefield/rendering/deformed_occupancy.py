@@ -19,6 +19,7 @@ bricks; where no edit jumps, by eight of them at a time.
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import quadrants as qd
@@ -42,7 +43,7 @@ from cagefield.rendering.grid import (
     vec3,
 )
 from cagefield.rendering.links import Link
-from cagefield.rendering.occupancy import BRICK, FEW, MAX_LEAP, Occupancy
+from cagefield.rendering.occupancy import BRICK, FEW, FULL, MAX_LEAP, Occupancy, masks_of
 from cagefield.rendering.smooth_occupancy import MOST_CELLS, Proceed, is_blocked, is_dense
 from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
 
@@ -82,56 +83,68 @@ def deform(
     boxes = [_grid_box(field, box) for box in stack.boxes.astype(np.float64)]
     lower, upper = _region(boxes, canonical, field.contracted)
     first = np.minimum(lower, canonical.origin)
-    last = np.maximum(upper, canonical.origin + 2 * np.array(canonical.blocks.shape))
-    leap = FEW if coarse else MAX_LEAP
-    count = (last - first) // 2
-    blocks = np.zeros(count, bool)
-    _paste(blocks, first, canonical)
-    new = _touched(boxes, first, count)
+    last = np.maximum(upper, canonical.origin + BRICK * np.array(canonical.codes.shape))
+    # Masks of bricks, or blocks.
+    side = BRICK if coarse else 2
+    count = (last - first) // side
+    held = np.zeros(count, np.uint8 if coarse else bool)
+    _paste(held, first, canonical)
+    new = _touched(boxes, first, count, side)
     if known is not None:
-        changed = _touched([_grid_box(field, box) for box in known.changed], first, count)
-        _paste(blocks, first, known.occupancy, new & ~changed)
+        changed = _touched([_grid_box(field, box) for box in known.changed], first, count, side)
+        _paste(held, first, known.occupancy, new & ~changed)
         new &= changed
     where = _where(new)
-    if where is None:
-        return Occupancy.from_blocks(first, blocks, leap)
-    # Whole bricks of the blocks to look at, and as many more on each side as their corners' reach depends on.
-    margin = 2 if coarse and not jumps else 4
-    low = np.maximum(where[0] // 2 * 2 - margin, 0)
-    high = np.minimum(-(-where[1] // 2) * 2 + margin, count)
-    region = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
-    proceed()
-    begin, bricks = first + 2 * low, (high - low) // 2
-    if jumps:
-        near = _jumping(canonical, grid, stack, begin, bricks, new[region], coarse, proceed)
-    else:
-        if link is not None and coarse:
-            near = link.near_bricks(grid, begin, bricks)
-        else:
-            near = smooth.near_bricks(canonical, grid, stack, begin, bricks, coarse=coarse)
+    if where is not None:
+        # Whole bricks of what is looked at, and as many more on each side as their corners' reach depends on.
+        margin = 1 if coarse and not jumps else 2
+        low = np.maximum(where[0] * side // BRICK - margin, 0)
+        high = np.minimum(-(-where[1] * side // BRICK) + margin, (last - first) // BRICK)
+        region = tuple(slice(a, b) for a, b in zip(low * BRICK // side, high * BRICK // side, strict=True))
+        proceed()
+        begin, bricks = first + BRICK * low, high - low
         if coarse:
-            near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+            found: NDArray[Any] = FULL * _near_bricks(canonical, grid, stack, begin, bricks, jumps, link)
         else:
-            near = smooth.occupied_blocks(canonical, grid, stack, begin, near, new[region], proceed)
-    np.copyto(blocks[region], near, where=new[region])
-    return Occupancy.from_blocks(first, blocks, leap)
+            found = _near_blocks(canonical, grid, stack, begin, bricks, new[region], jumps, proceed)
+        np.copyto(held[region], found, where=new[region])
+    return Occupancy.from_masks(first, held if coarse else masks_of(held), FEW if coarse else MAX_LEAP)
 
 
-def _jumping(
+def _near_bricks(
+    canonical: Occupancy,
+    grid: DeviceGrid,
+    stack: DeviceStack,
+    lower: NDArray[np.int64],
+    count: NDArray[np.int64],
+    jumps: bool,
+    link: Link | None,
+) -> NDArray[np.uint8]:
+    """1 for the bricks [count] from the grid coordinates `lower` on where a coarse look finds something."""
+    if jumps:
+        near = _near(canonical, grid.field, stack, lower, count, BRICK)
+    elif link is not None:
+        near = link.near_bricks(grid, lower, count)
+    else:
+        near = smooth.near_bricks(canonical, grid, stack, lower, count, coarse=True)
+    return near.view(np.uint8)
+
+
+def _near_blocks(
     canonical: Occupancy,
     grid: DeviceGrid,
     stack: DeviceStack,
     lower: NDArray[np.int64],
     bricks: NDArray[np.int64],
     new: NDArray[np.bool_],
-    coarse: bool,
+    jumps: bool,
     proceed: Proceed,
 ) -> NDArray[np.bool_]:
-    """The occupied blocks of bricks [count] from the grid coordinates `lower` on, some of the new ones."""
-    spacing = BRICK if coarse else 2
-    near = _near(canonical, grid.field, stack, lower, bricks * BRICK // spacing, spacing, True)
-    if coarse:
-        return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    """The occupied blocks of the bricks from the grid coordinates `lower` on, some of the new ones."""
+    if not jumps:
+        near = smooth.near_bricks(canonical, grid, stack, lower, bricks)
+        return smooth.occupied_blocks(canonical, grid, stack, lower, near, new, proceed)
+    near = _near(canonical, grid.field, stack, lower, bricks * BRICK // 2, 2)
     near &= new
     proceed()
     candidates = np.argwhere(near).astype(np.int32)
@@ -164,30 +177,31 @@ def _region(
 
 
 def _touched(
-    boxes: list[NDArray[np.float64]], first: NDArray[np.int64], count: NDArray[np.int64]
+    boxes: list[NDArray[np.float64]], first: NDArray[np.int64], count: NDArray[np.int64], side: int
 ) -> NDArray[np.bool_]:
-    """The blocks [count], the first at the cell `first`, that boxes in grid coordinates meet."""
+    """The cubes [count] of `side` cells, the first at the cell `first`, that boxes in grid cells meet."""
     touched = np.zeros(count, bool)
     for box in boxes:
-        lo = np.maximum(np.floor(box[0] / 2).astype(int) - first // 2, 0)
-        hi = np.clip(np.floor(box[1] / 2).astype(int) + 1 - first // 2, 0, count)
+        lo = np.maximum(np.floor(box[0] / side).astype(int) - first // side, 0)
+        hi = np.clip(np.floor(box[1] / side).astype(int) + 1 - first // side, 0, count)
         touched[lo[0] : hi[0], lo[1] : hi[1], lo[2] : hi[2]] = True
     return touched
 
 
 def _paste(
-    blocks: NDArray[np.bool_],
-    first: NDArray[np.int64],
-    source: Occupancy,
-    where: NDArray[np.bool_] | None = None,
+    held: NDArray[Any], first: NDArray[np.int64], source: Occupancy, where: NDArray[np.bool_] | None = None
 ) -> None:
-    """Copy what another occupancy has of the blocks, the first at the cell `first`, where a mask says so."""
-    at = (source.origin - first) // 2
-    shape = np.array(source.blocks.shape)
-    low, high = np.maximum(at, 0), np.minimum(at + shape, blocks.shape)
+    """Copy an occupancy's blocks, or masks into uint8, to an array that begins at the cell `first`.
+
+    `where`, of the array's shape, says what of it to copy.
+    """
+    values = source.masks if held.dtype == np.uint8 else source.blocks
+    per_brick = values.shape[0] // source.codes.shape[0]
+    at = (source.origin - first) * per_brick // BRICK
+    low, high = np.maximum(at, 0), np.minimum(at + np.array(values.shape), held.shape)
     here = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
     there = tuple(slice(a, b) for a, b in zip(low - at, high - at, strict=True))
-    np.copyto(blocks[here], source.blocks[there], where=True if where is None else where[here])
+    np.copyto(held[here], values[there], where=True if where is None else where[here])
 
 
 def _grid_box(field: VoxelField, box: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -207,16 +221,10 @@ def _near(
     lower: NDArray[np.int64],
     count: NDArray[np.int64],
     spacing: int,
-    jumps: bool,
 ) -> NDArray[np.bool_]:
-    """Cubes of `spacing` cells [count] with an occupied corner, or, with `jumps`, a corner beside one."""
+    """Cubes of `spacing` cells [count] with an occupied corner, or a corner beside one."""
     near = _corners(canonical, field, stack, lower, count + 1, spacing)
-    if jumps:
-        near = ndimage.maximum_filter(near, size=3, mode="nearest")
-    for axis in range(3):
-        n = near.shape[axis]
-        near = np.take(near, range(n - 1), axis) | np.take(near, range(1, n), axis)
-    return near
+    return smooth.cubes(ndimage.maximum_filter(near, size=3, mode="nearest"))
 
 
 def _corners(
@@ -232,8 +240,8 @@ def _corners(
     _occupied_corners(
         out,
         deal_of(len(out)),
-        np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
-        ints(canonical.blocks.shape),
+        canonical.codes.reshape(-1),
+        ints(canonical.codes.shape),
         ints(canonical.origin),
         ints(lower),
         ints(count),
@@ -321,9 +329,9 @@ def probe(
 def _occupied_corners(
     out: U8,
     deal: Deal,
-    blocks: U8,
-    blocks_shape: ivec3,
-    blocks_origin: ivec3,
+    codes: I32,
+    bricks: ivec3,
+    bricks_origin: ivec3,
     lower: ivec3,
     count: ivec3,
     spacing: qd.i32,
@@ -347,7 +355,7 @@ def _occupied_corners(
             found = 0
             if empty == 0:
                 r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
-                found = is_blocked(image, r, blocks, blocks_shape, blocks_origin)
+                found = is_blocked(image, r, codes, bricks, bricks_origin)
             out[n] = qd.cast(found, qd.u8)
 
 

@@ -12,6 +12,7 @@ leaves an empty sub-block in one leap. A cell counts as occupied when one of its
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,11 @@ MAX_LEAP = 16
 FEW = 4
 """Leaps up to which distances are found by growing."""
 
+FULL = 255
+"""Mask of a brick whose sub-blocks are all occupied."""
+
+Masks = NDArray[np.uint8]
+
 
 @dataclass(frozen=True, eq=False)
 class Occupancy:
@@ -32,34 +38,46 @@ class Occupancy:
     Attributes:
         origin: [3] int, grid coordinates of the first brick's first cell, multiples of 4 (negative where
             the brick grid reaches beyond the vertex grid).
-        blocks: [2bx, 2by, 2bz] bool, occupied 2 x 2 x 2 sub-blocks.
         codes: [bx, by, bz] int32.
     """
 
     origin: NDArray[np.int64]
-    blocks: NDArray[np.bool_]
     codes: NDArray[np.int32]
 
     @classmethod
-    def from_blocks(
-        cls, origin: NDArray[np.int64], blocks: NDArray[np.bool_], leap: int = MAX_LEAP
-    ) -> Occupancy:
-        """The occupancy with these sub-blocks occupied; rays leap over at most `leap` bricks at a time."""
-        return cls(origin, blocks, encode(blocks, leap))
+    def from_masks(cls, origin: NDArray[np.int64], masks: Masks, leap: int = MAX_LEAP) -> Occupancy:
+        """The occupancy of bricks with these masks; rays leap over at most `leap` bricks at a time."""
+        return cls(origin, encode(masks, leap))
+
+    @property
+    def masks(self) -> Masks:
+        """[bx, by, bz], the bits of the occupied sub-blocks of each brick."""
+        return self.codes.astype(np.uint8)
+
+    @cached_property
+    def blocks(self) -> NDArray[np.bool_]:
+        """[2bx, 2by, 2bz], the occupied sub-blocks."""
+        bits = np.unpackbits(self.masks[..., None], axis=-1, bitorder="little").astype(bool)
+        x, y, z = self.codes.shape
+        return bits.reshape(x, y, z, 2, 2, 2).transpose(0, 3, 1, 4, 2, 5).reshape(2 * x, 2 * y, 2 * z)
 
 
-def encode(blocks: NDArray[np.bool_], leap: int = MAX_LEAP) -> NDArray[np.int32]:
-    """Brick codes [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz], D at most `leap`."""
+def masks_of(blocks: NDArray[np.bool_]) -> Masks:
+    """Masks [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz]."""
     # Pairs along z, y, x become 2, 4, 8 bits of a byte.
     pairs = np.ascontiguousarray(blocks).view("<u2")
     rows = ((pairs & 1) | (pairs >> 7)).astype(np.uint8)
     faces = rows[:, 0::2] + np.uint8(4) * rows[:, 1::2]
-    mask = faces[0::2] + np.uint8(16) * faces[1::2]
-    empty = mask == 0
+    return np.asarray(faces[0::2] + np.uint8(16) * faces[1::2])
+
+
+def encode(masks: Masks, leap: int = MAX_LEAP) -> NDArray[np.int32]:
+    """Codes [bx,by,bz] of bricks with these masks, D at most `leap`."""
+    empty = masks == 0
     if empty.all():
-        return np.full(mask.shape, 256 * leap, np.int32)
+        return np.full(masks.shape, 256 * leap, np.int32)
     distance = _few_distances(empty, leap) if leap <= FEW else _distances(empty, leap)
-    return np.where(empty, 256 * distance, mask).astype(np.int32)
+    return np.where(empty, np.int32(256) * distance, masks)
 
 
 def _distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
@@ -67,9 +85,9 @@ def _distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
     return np.minimum(ndimage.distance_transform_cdt(empty, metric="chessboard"), most).astype(np.int32)
 
 
-def _few_distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
+def _few_distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.uint8]:
     """The same by growing what is not empty, brick by brick: sooner for a `most` of a few."""
-    distance = np.ones(empty.shape, np.int32)
+    distance = empty.astype(np.uint8)
     near = ~empty
     for _ in range(1, most):
         for axis in range(3):
@@ -80,7 +98,7 @@ def _few_distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
             grown[tuple(off)] |= near[tuple(to)]
             near = grown
         distance += ~near
-    return np.where(empty, distance, 0)
+    return distance
 
 
 def of_field(field: VoxelField, threshold: float = 0.0) -> Occupancy:
@@ -101,4 +119,4 @@ def of_vertices(full: NDArray[np.bool_]) -> Occupancy:
         odd = np.take(padded, range(1, padded.shape[axis], 2), axis)
         last = np.take(padded, range(2, padded.shape[axis], 2), axis)
         padded = even | odd | last
-    return Occupancy.from_blocks(np.zeros(3, np.int64), padded)
+    return Occupancy.from_masks(np.zeros(3, np.int64), masks_of(padded))

@@ -64,10 +64,10 @@ def near_bricks(
     if not coarse:
         points = tuple((count + 1).tolist())
         images = _images(grid, stack, lower, np.ones(points, bool), BRICK, starts)
-        return _cubes(_occupied(images, canonical, points))
+        return cubes(_occupied(images, canonical, points))
     points = _coarse_points(count)
     images = _images(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
-    near = _cubes(_occupied(images, canonical, points, 2.0 * MOST_CELLS))
+    near = cubes(_occupied(images, canonical, points, 2.0 * MOST_CELLS))
     return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: count[0], : count[1], : count[2]]
 
 
@@ -104,7 +104,7 @@ def occupied_blocks(
     proceed()
     images = _images(grid, stack, lower, wanted, 2)
     proceed()
-    near &= new & _cubes(_occupied(images, canonical, points))
+    near &= new & cubes(_occupied(images, canonical, points))
     candidates = np.argwhere(near).astype(np.int32)
     if len(candidates):
         proceed()
@@ -153,9 +153,8 @@ def _occupied(
         out,
         deal_of(len(out)),
         images,
-        np.ascontiguousarray(canonical.blocks, np.uint8).reshape(-1),
-        ints(canonical.blocks.shape),
         canonical.codes.reshape(-1),
+        ints(canonical.codes.shape),
         ints(canonical.origin),
         ints(count),
         most,
@@ -163,7 +162,7 @@ def _occupied(
     return out.reshape(count).view(bool)
 
 
-def _cubes(points: Mask) -> Mask:
+def cubes(points: Mask) -> Mask:
     """Cubes with one of eight points [count + 1]."""
     near = points[:-1] | points[1:]
     near = near[:, :-1] | near[:, 1:]
@@ -252,19 +251,35 @@ def differences(images: qd.template(), n: qd.i32, i: qd.i32, count: qd.i32, stri
 
 
 @qd.func
-def is_blocked(image: vec3, r: vec3, blocks: qd.template(), shape: ivec3, origin: ivec3):
+def is_blocked(image: vec3, r: vec3, codes: qd.template(), bricks: ivec3, origin: ivec3):
     """1 where an occupied block lies within r of an image, grid coordinates, else 0."""
-    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - origin // 2, 0)
-    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - origin // 2, shape - 1)
+    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - (origin >> 1), 0)
+    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - (origin >> 1), 2 * bricks - 1)
     found = 0
-    x = first.x
-    while x <= last.x and found == 0:
-        for y in range(first.y, last.y + 1):
-            for z in range(first.z, last.z + 1):
-                if blocks[(x * shape.y + y) * shape.z + z] > 0:
-                    found = 1
+    x = first.x >> 1
+    while x <= last.x >> 1 and found == 0:
+        in_x = between(x, first.x, last.x, 0xF0)
+        for y in range(first.y >> 1, (last.y >> 1) + 1):
+            in_xy = in_x & between(y, first.y, last.y, 0xCC)
+            for z in range(first.z >> 1, (last.z >> 1) + 1):
+                code = codes[(x * bricks.y + y) * bricks.z + z]
+                found |= code & in_xy & between(z, first.z, last.z, 0xAA)
         x += 1
-    return found
+    return qd.min(found, 1)
+
+
+@qd.func
+def between(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
+    """Bits of a brick's sub-blocks from the block `first` to `last` along an axis.
+
+    `upper` are the bits of its second sub-blocks.
+    """
+    bits = 0xFF
+    if first > 2 * brick:
+        bits = upper
+    if last <= 2 * brick:
+        bits = bits & ~upper
+    return bits
 
 
 @qd.kernel(fastcache=True)
@@ -272,9 +287,8 @@ def _occupied_points(
     out: U8,
     deal: Deal,
     images: Nodes,
-    blocks: U8,
-    blocks_shape: ivec3,
     codes: I32,
+    bricks: ivec3,
     origin: ivec3,
     count: ivec3,
     most: qd.f32,
@@ -293,7 +307,6 @@ def _occupied_points(
                 z_reach, _z = differences(images, n, k, count.z, 1)
                 r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, most)
                 empty = 0
-                bricks = blocks_shape // 2
                 b = (qd.cast(qd.floor(image), qd.i32) - origin) >> 2
                 if b.min() >= 0 and (bricks - b).min() > 0:
                     # Every brick nearer than this code says is empty.
@@ -301,7 +314,7 @@ def _occupied_points(
                     if r.max() < qd.cast(4 * ((code >> 8) - 1), qd.f32):
                         empty = 1
                 if empty == 0:
-                    found = is_blocked(image, r, blocks, blocks_shape, origin)
+                    found = is_blocked(image, r, codes, bricks, origin)
             out[n] = qd.cast(found, qd.u8)
 
 
