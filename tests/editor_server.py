@@ -70,7 +70,7 @@ class Picture:
     """A picture as a page gets it."""
 
     header: dict[str, Any]
-    jpeg: bytes
+    content: bytes
     depth: bytes
 
 

@@ -117,7 +117,7 @@ async def settle() -> None:
 
 
 def done(task: Task) -> PictureDone:
-    return PictureDone(task.number, b"", b"", (0, 0), 1.0, 0.0, 0.01, 0.0)
+    return PictureDone(task.number, b"", "rgb", b"", (0, 0), 1.0, 0.0, 0.01, 0.0)
 
 
 def surface(number: int) -> SurfaceTask:

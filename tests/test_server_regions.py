@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from cagefield import devices
 from cagefield.cages import Cage
@@ -19,6 +17,7 @@ from cagefield.server.scheduler import SETTLE_SECONDS, Look, Region, Request, Sc
 from cagefield.server.studio import Studio
 from cagefield.server.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from scenes import ball_scene
+from sent_pictures import pixels_of
 
 SIDE = 64
 CAMERA = Camera.look_at((0.6, -3.4, 0.9), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
@@ -284,7 +283,7 @@ def test_a_part_over_the_last_picture_is_the_whole_picture(studio: Studio, view:
         task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, False, True, 0)
         done = studio.picture(task, lambda: False)
         assert isinstance(done, PictureDone)
-        return np.asarray(Image.open(io.BytesIO(done.picture))).astype(float)
+        return pixels_of(done.picture, done.format, region.width, region.height).astype(float)
 
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
     x, y, w, h = pixels(seen(CAMERA, EditStack(after).changed_boxes(EditStack(before))), SIDE, SIDE)

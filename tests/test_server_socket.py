@@ -29,6 +29,7 @@ from cagefield.server.protocol import MOST_BYTES
 from cagefield.server.sockets import _told
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
+from sent_pictures import pixels_of
 
 BALL = {"inner": {"center": [0, 0, 0], "size": 1.1}, "outer": {"margin": 0.4}, "lattice": 16, "name": "ball"}
 
@@ -56,8 +57,7 @@ def pixels(client: PageClient, side: int = 96) -> np.ndarray[Any, Any]:
         header = picture.header
         if header["full_width"] == side:
             x, y = header["x"], header["y"]
-            part = np.asarray(Image.open(io.BytesIO(picture.jpeg)))
-            assert part.shape == (header["height"], header["width"], 3)
+            part = pixels_of(picture.content, header["format"], header["width"], header["height"])
             out[y : y + header["height"], x : x + header["width"]] = part
     return out
 

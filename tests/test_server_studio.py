@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -41,6 +40,7 @@ from cagefield.server.tasks import (
 )
 from cagefield.server.working import SAMPLES, Working
 from scenes import ball_scene
+from sent_pictures import pixels_of
 
 SIDE = 48
 INNER = Cage.box((0, 0, 0), 1.2)
@@ -69,7 +69,7 @@ def task(
 def picture(studio: Studio, asked: PictureTask) -> np.ndarray[Any, Any]:
     done = studio.picture(asked, lambda: False)
     assert isinstance(done, PictureDone)
-    return np.asarray(Image.open(io.BytesIO(done.picture))).astype(float)
+    return pixels_of(done.picture, done.format, asked.region.width, asked.region.height).astype(float)
 
 
 def test_pictures_are_those_of_the_scene(studio: Studio) -> None:

@@ -14,7 +14,7 @@ import { recallCamera, recallTools } from "./remembered";
 import { scenery, shownCages } from "./scenery";
 import { Stage } from "./stage";
 import { Store, obstacle, selected, target } from "./store";
-import { unpack } from "./wire";
+import { decode, unpack } from "./wire";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, ServerMessage, State, Vec3 } from "./protocol";
 
@@ -23,6 +23,12 @@ const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cag
 
 /** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
 const FIGURES_EVERY = 300;
+
+/**
+ * When the next picture is asked for, frames after the beginning of one that draws a picture. Sooner, and it would
+ * wait here to be drawn and show an older drag; later, and there would be fewer of them.
+ */
+const ASKED_AFTER = 0.5;
 
 /** A picture, and when it came and was decoded. */
 interface Arrived {
@@ -39,6 +45,8 @@ export class App {
   readonly camera: CameraFeed;
   readonly latency = new Latency();
   drag: Drag | null = null;
+  /** Called before a picture is asked for: what it should show is to be sent. */
+  beforeAsking: (() => void)[] = [];
   lastPicture: PictureHeader | null = null;
   /** When a picture or a state last came. */
   lastNews = 0;
@@ -66,7 +74,7 @@ export class App {
     this.camera = new CameraFeed(this.stage, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
     this.stage.beforeFrame.push(() => this.arrange());
-    this.stage.drawn.push(() => this.acknowledge());
+    this.stage.beforeFrame.push(() => this.acknowledge());
     this.stage.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
@@ -241,7 +249,7 @@ export class App {
   private takePicture(bytes: ArrayBuffer): void {
     const received = performance.now();
     const { header, picture, depth } = unpack(bytes);
-    const decoding = createImageBitmap(new Blob([picture.slice()]), { colorSpaceConversion: "none" });
+    const decoding = decode(header, picture);
     this.pictureChain = this.pictureChain.then(async () => {
       try {
         const image = await decoding;
@@ -264,9 +272,15 @@ export class App {
     for (const picture of shown) this.presented(picture);
   }
 
-  /** Asks for the next picture while the frame with this one goes to the screen. */
+  /** Asks for the next picture while the frame with this one is drawn and goes to the screen. */
   private acknowledge(): void {
-    for (const { header } of this.undrawn) this.send({ type: "presented", picture: header.picture });
+    const pictures = this.undrawn.map(({ header }) => header.picture);
+    if (pictures.length > 0) {
+      setTimeout(() => {
+        for (const action of this.beforeAsking) action();
+        for (const picture of pictures) this.send({ type: "presented", picture });
+      }, ASKED_AFTER * this.stage.frameTime);
+    }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];
   }

@@ -8,9 +8,8 @@ import {
   Color,
   DynamicDrawUsage,
   GLSL3,
-  InstancedBufferAttribute,
-  InstancedBufferGeometry,
-  Float32BufferAttribute,
+  BufferAttribute,
+  BufferGeometry,
   Matrix4,
   Mesh,
   ShaderMaterial,
@@ -114,9 +113,10 @@ void main() {
 }`;
 
 export class Lines {
-  private readonly geometry = new InstancedBufferGeometry();
+  /** Four vertices a segment; instances would be a draw each where the processor draws. */
+  private readonly geometry = new BufferGeometry();
   private readonly mesh: Mesh;
-  private buffers: { from: InstancedBufferAttribute; to: InstancedBufferAttribute; paint: InstancedBufferAttribute; stroke: InstancedBufferAttribute };
+  private buffers: { from: BufferAttribute; to: BufferAttribute; paint: BufferAttribute; stroke: BufferAttribute };
   private capacity = 0;
   private readonly shared: Record<string, IUniform>;
 
@@ -132,8 +132,6 @@ export class Lines {
       slack: { value: 0.01 },
       scale: { value: 1 },
     };
-    this.geometry.setAttribute("position", new Float32BufferAttribute([0, -1, 0, 0, 1, 0, 1, -1, 0, 1, 1, 0], 3));
-    this.geometry.setIndex([0, 2, 1, 1, 2, 3]);
     this.buffers = this.grow(64);
     const material = new ShaderMaterial({
       vertexShader: VERTEX,
@@ -161,27 +159,33 @@ export class Lines {
     if (segments.length > this.capacity) this.buffers = this.grow(2 * segments.length);
     const { from, to, paint, stroke } = this.buffers;
     const scale = this.stage.renderer.getPixelRatio();
-    segments.forEach((segment, i) => {
-      from.setXYZ(i, ...segment.from);
-      to.setXYZ(i, ...segment.to);
+    segments.forEach((segment, n) => {
       const { r, g, b } = segment.colour;
-      paint.setXYZW(i, r, g, b, segment.alpha);
-      stroke.setXY(i, segment.width * scale, segment.hidden);
+      for (let i = 4 * n; i < 4 * n + 4; i++) {
+        from.setXYZ(i, ...segment.from);
+        to.setXYZ(i, ...segment.to);
+        paint.setXYZW(i, r, g, b, segment.alpha);
+        stroke.setXY(i, segment.width * scale, segment.hidden);
+      }
     });
     for (const buffer of Object.values(this.buffers)) buffer.needsUpdate = true;
-    this.geometry.instanceCount = segments.length;
+    this.geometry.setDrawRange(0, 6 * segments.length);
     this.mesh.visible = segments.length > 0;
   }
 
   private grow(capacity: number): Lines["buffers"] {
     this.capacity = capacity;
-    const make = (name: string, size: number): InstancedBufferAttribute => {
-      const attribute = new InstancedBufferAttribute(new Float32Array(capacity * size), size);
+    const make = (name: string, size: number): BufferAttribute => {
+      const attribute = new BufferAttribute(new Float32Array(4 * capacity * size), size);
       attribute.setUsage(DynamicDrawUsage);
       this.geometry.setAttribute(name, attribute);
       return attribute;
     };
     this.geometry.dispose();
+    const corners = [0, -1, 0, 0, 1, 0, 1, -1, 0, 1, 1, 0];
+    const position = Float32Array.from({ length: 12 * capacity }, (_, i) => corners[i % 12]);
+    this.geometry.setAttribute("position", new BufferAttribute(position, 3));
+    this.geometry.setIndex(Array.from({ length: 6 * capacity }, (_, i) => 4 * Math.floor(i / 6) + [0, 2, 1, 1, 2, 3][i % 6]));
     return { from: make("from", 3), to: make("to", 3), paint: make("paint", 4), stroke: make("stroke", 2) };
   }
 

@@ -123,7 +123,7 @@ export class Pictures {
   }
 
   /** Shows a part of a picture: all of it, or a tile. */
-  show(header: PictureHeader, image: ImageBitmap, depth: Uint16Array, viewpoint: Viewpoint | null): void {
+  show(header: PictureHeader, image: ImageBitmap | ImageData, depth: Uint16Array, viewpoint: Viewpoint | null): void {
     this.fit();
     const texture = new Texture(image);
     texture.flipY = false;
@@ -132,7 +132,7 @@ export class Pictures {
     texture.needsUpdate = true;
     this.draw(texture, header, false);
     texture.dispose();
-    image.close();
+    if (image instanceof ImageBitmap) image.close();
     this.depth.put(header, depth);
     this.uploadDepth();
     this.viewpoint = viewpoint ?? this.viewpoint;

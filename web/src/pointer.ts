@@ -32,6 +32,8 @@ export class Pointer {
   /** Axis along which a drag of corners is kept. */
   private constraint: Constraint = null;
   private hold: Hold | null = null;
+  /** Where the mouse was when the drag last followed it. */
+  private followed = { x: NaN, y: NaN };
   private pressed: { x: number; y: number } | null = null;
   private latest = { x: 0, y: 0, time: 0 };
   /** The first press of what may become a double click: when, and whether nothing was under it. */
@@ -41,6 +43,11 @@ export class Pointer {
     const { canvas } = app.stage;
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event));
+    // Where the mouse is between two frames; not all browsers and addresses tell.
+    canvas.addEventListener("pointerrawupdate", (event) => {
+      if (this.hold !== null) this.locate(event as PointerEvent);
+    });
+    app.beforeAsking.push(() => this.catchUp());
     canvas.addEventListener("pointerup", (event) => this.up(event));
     canvas.addEventListener("pointercancel", () => this.cancel());
     canvas.addEventListener("pointerleave", () => this.leave());
@@ -74,7 +81,13 @@ export class Pointer {
   follow(): void {
     if (this.hold === null) return;
     const raw = this.operation(this.hold);
+    this.followed = { ...this.at };
     if (raw !== null) this.app.moveDrag(this.snap(raw), this.latest.time);
+  }
+
+  /** Follows the mouse if it has moved since. */
+  private catchUp(): void {
+    if (this.at.x !== this.followed.x || this.at.y !== this.followed.y) this.follow();
   }
 
   private down(event: PointerEvent): void {
@@ -100,7 +113,7 @@ export class Pointer {
 
   private move(event: PointerEvent): void {
     this.locate(event);
-    if (this.hold !== null) this.follow();
+    if (this.hold !== null) this.catchUp();
     else if (event.buttons === 0) this.look();
   }
 

@@ -431,8 +431,9 @@ export interface State {
 /**
  * Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.
  *
- * The picture is a JPEG (colour, while moving) or PNG of `width` x `height`, the part at (x, y) of a picture
- * of full_width x full_height that covers the page's view; smaller ones are stretched. `depth_bytes` of
+ * The picture is a JPEG of `width` x `height` or, where it is small, its RGB bytes row by row: the part at
+ * (x, y) of a picture of full_width x full_height that covers the page's view; smaller ones are stretched.
+ * `depth_bytes` of
  * uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow it:
  * distance along the ray = value * depth_scale, 65535 where there is nothing.
  */
@@ -453,6 +454,7 @@ export interface PictureHeader {
   full_width: number;
   full_height: number;
   final: boolean;
+  format: "jpeg" | "rgb";
   picture_bytes: number;
   depth_bytes: number;
   depth_width: number;

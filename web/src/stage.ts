@@ -6,6 +6,9 @@ import type { Vec3 } from "./protocol";
 
 const MOST_PIXELS_PER_POINT = 2;
 
+/** Milliseconds between frames that were not drawn one after the other, at least. */
+const SLOWEST_FRAME = 100;
+
 /** Whether pages are drawn by the processor: then only lines and dots are smooth, which see to it themselves. */
 function isSoftware(): boolean {
   const gl = document.createElement("canvas").getContext("webgl2");
@@ -36,10 +39,11 @@ export class Stage {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
   orbit: OrbitControls | null = null;
-  /** Called before each frame is drawn, when it was, and with the time at which the next one could begin. */
+  /** Called before each frame is drawn, and with the time at which the next one could begin. */
   beforeFrame: (() => void)[] = [];
-  drawn: (() => void)[] = [];
   afterFrame: ((time: number) => void)[] = [];
+  /** Milliseconds from one frame to the next, smoothed. */
+  frameTime = 16;
   /** Called when the camera or the canvas is another. */
   cameraChanged: (() => void)[] = [];
   private scheduled = false;
@@ -74,14 +78,14 @@ export class Stage {
   invalidate(): void {
     if (this.scheduled) return;
     this.scheduled = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((began) => {
       this.scheduled = false;
       for (const action of this.beforeFrame) action();
       this.renderer.setRenderTarget(null);
       this.renderer.clear();
       this.renderer.render(this.scene, this.camera);
-      for (const action of this.drawn) action();
       requestAnimationFrame((time) => {
+        this.frameTime += 0.2 * (Math.min(time - began, SLOWEST_FRAME) - this.frameTime);
         for (const action of this.afterFrame) action(time);
       });
     });

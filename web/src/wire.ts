@@ -18,6 +18,21 @@ export function unpack(message: ArrayBuffer): Parcel {
   return { header, picture, depth: new Uint16Array(message.slice(at, at + header.depth_bytes)) };
 }
 
+/** The picture of a message: decoded away from the main thread, or at once where it came as it is. */
+export async function decode(header: PictureHeader, picture: Uint8Array): Promise<ImageBitmap | ImageData> {
+  if (header.format === "jpeg") {
+    return createImageBitmap(new Blob([picture.slice()]), { colorSpaceConversion: "none" });
+  }
+  const image = new ImageData(header.width, header.height);
+  for (let i = 0, j = 0; i < picture.length; i += 3, j += 4) {
+    image.data[j] = picture[i];
+    image.data[j + 1] = picture[i + 1];
+    image.data[j + 2] = picture[i + 2];
+    image.data[j + 3] = 255;
+  }
+  return image;
+}
+
 /** A binary message of these parts, as the server makes it. */
 export function pack(header: PictureHeader, picture: Uint8Array, depth: Uint16Array): ArrayBuffer {
   const json = new TextEncoder().encode(JSON.stringify(header));

@@ -6,7 +6,7 @@ import { pack, unpack } from "../src/wire";
 const HEADER: PictureHeader = {
   type: "picture", picture: 7, camera: 3, drag: 0, seq: 0, revision: 1, view: "colour", before: false, split: null,
   x: 0, y: 0, width: 4, height: 2, full_width: 4, full_height: 2, final: false,
-  picture_bytes: 3, depth_bytes: 16, depth_width: 4, depth_height: 2, depth_scale: 0.5, render_ms: 1, encode_ms: 1,
+  format: "jpeg", picture_bytes: 3, depth_bytes: 16, depth_width: 4, depth_height: 2, depth_scale: 0.5, render_ms: 1, encode_ms: 1,
 }; // prettier-ignore
 
 describe("a binary message", () => {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,11 @@ from cagefield.server.protocol import View
 
 NOTHING = 65535
 """Depth value where the picture shows nothing."""
+
+MOST_PLAIN = 16_384
+"""Pixels of a picture that is sent as it is, at most."""
+
+Format = Literal["jpeg", "rgb"]
 
 BEHIND = (0.13, 0.13, 0.15)
 """Colour behind a scene that has none."""
@@ -32,6 +38,13 @@ def picture_of(frame: Frame, view: View, reach: tuple[float, float]) -> NDArray[
     depth = np.where(np.isfinite(frame.depth), frame.depth, far)
     bright = 1.0 - 0.85 * np.clip((depth - near) / max(far - near, 1e-9), 0.0, 1.0)
     return to_uint8(np.repeat(bright[..., None] * opacity, 3, axis=-1))
+
+
+def plain_or_jpeg(pixels: NDArray[np.uint8], quality: int) -> tuple[bytes, Format]:
+    """A picture's bytes and their format: to decode small ones would take a page longer than to read them."""
+    if pixels.shape[0] * pixels.shape[1] <= MOST_PLAIN:
+        return pixels.tobytes(), "rgb"
+    return jpeg(pixels, quality), "jpeg"
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:

@@ -241,6 +241,7 @@ def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
         full_width=region.full_width,
         full_height=region.full_height,
         final=request.final,
+        format=done.format,
         picture_bytes=len(done.picture),
         depth_bytes=len(done.depth),
         depth_width=done.depth_size[0],

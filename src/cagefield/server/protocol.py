@@ -464,8 +464,9 @@ ServerMessage: TypeAlias = Annotated[
 class PictureHeader(Message):
     """Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.
 
-    The picture is a JPEG (colour, while moving) or PNG of `width` x `height`, the part at (x, y) of a picture
-    of full_width x full_height that covers the page's view; smaller ones are stretched. `depth_bytes` of
+    The picture is a JPEG of `width` x `height` or, where it is small, its RGB bytes row by row: the part at
+    (x, y) of a picture of full_width x full_height that covers the page's view; smaller ones are stretched.
+    `depth_bytes` of
     uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow it:
     distance along the ray = value * depth_scale, 65535 where there is nothing.
     """
@@ -489,6 +490,7 @@ class PictureHeader(Message):
     full_height: int
     final: bool
     """True for the last part of a full-resolution picture."""
+    format: Literal["jpeg", "rgb"]
     picture_bytes: int
     depth_bytes: int
     depth_width: int

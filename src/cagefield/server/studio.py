@@ -74,7 +74,7 @@ class Studio:
         rendered = time.perf_counter()
         near, far = self.reach(task.camera)
         pixels = encoding.picture_of(frame, task.look.view, (near, far))
-        picture = encoding.jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
+        picture, form = encoding.plain_or_jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
         few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
         stride = 1 if few else 2
         scale = (far if not self.scene.field.contracted else 16.0 * far) / 65_000.0
@@ -82,6 +82,7 @@ class Studio:
         return PictureDone(
             task.number,
             picture,
+            form,
             depth.tobytes(),
             (depth.shape[1], depth.shape[0]),
             scale,

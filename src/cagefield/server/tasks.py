@@ -144,6 +144,7 @@ class PictureDone:
 
     number: int
     picture: bytes
+    format: Literal["jpeg", "rgb"]
     depth: bytes
     depth_size: tuple[int, int]
     depth_scale: float
