@@ -252,6 +252,8 @@ def test_a_drag_that_ends_with_something_new_shows_it_quickly_first() -> None:
     b.scheduler.edits(2, False, b.now)
     picture = b.step()
     assert picture is not None and picture.moving and picture.revision == 2
+    # And then nothing has to settle: nothing moves any more.
+    assert {(tile.exact, tile.moving) for tile in b.finish()} == {(True, False)}
 
 
 def test_an_edit_is_shown_on_every_page_and_a_camera_on_its_own() -> None:

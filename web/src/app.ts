@@ -25,8 +25,8 @@ const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cag
 const FIGURES_EVERY = 300;
 
 /**
- * When the next picture is asked for, frames after the beginning of one that draws a picture. Sooner, and it would
- * wait here to be drawn and show an older drag; later, and there would be fewer of them.
+ * When a drag's next picture is asked for, frames after the beginning of one that draws a picture. Sooner, and it
+ * would wait here to be drawn and show an older drag; later, and there would be fewer of them.
  */
 const ASKED_AFTER = 0.5;
 
@@ -279,7 +279,7 @@ export class App {
       setTimeout(() => {
         for (const action of this.beforeAsking) action();
         for (const picture of pictures) this.send({ type: "presented", picture });
-      }, ASKED_AFTER * this.stage.frameTime);
+      }, this.drag === null ? 0 : ASKED_AFTER * this.stage.frameTime);
     }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];

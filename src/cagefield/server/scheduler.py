@@ -154,7 +154,8 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends with what is shown already, or on a fine picture, the fine one comes at once.
+        Where a drag ends nothing has to settle: the fine picture comes as soon as a quick one shows what was
+        dragged, or at once where that is shown already, or on a fine picture.
         """
         if revision == self._revision and dragging == self._dragging:
             return
@@ -163,8 +164,10 @@ class Scheduler:
         for page, p in self._pages.items():
             was_shown = same and p.shown_version == p.version
             self._changed(page, now)
-            if let_go and (was_shown or p.showing.exact):
-                p.shown_version, p.changed = p.version, -math.inf
+            if let_go:
+                p.changed = -math.inf
+                if was_shown or p.showing.exact:
+                    p.shown_version = p.version
 
     def presented(self, page: int, picture: int) -> None:
         """A page has shown a picture, and all that were sent before it."""
