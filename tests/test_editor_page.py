@@ -17,10 +17,13 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cages import EDGES
+from cagefield.cameras import Camera
 from cagefield.edits import load_edits
+from cagefield.scene import Scene
 from editor_cone import EDITS, cone, difference, moved
 from editor_page import PATIENCE, EditorPage, editor_page
 from editor_server import EditorServer, editor_server
+from scenes import ball_field
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
@@ -293,3 +296,29 @@ def test_a_server_that_is_killed_in_a_drag_is_found_again(
         assert editor.state["edits"][0]["deformed"] == state["edits"][0]["deformed"]
         assert not editor.page.is_visible(".lost")
         editor.drag(editor.grip("Z"), (0, -20))
+
+
+def test_a_camera_amid_the_field_orbits_around_what_it_sees(tmp_path: Path) -> None:
+    eye, ball = np.array([0.2, -0.9, 0.3]), np.array([0.0, 0.0, 0.1])
+    camera = Camera.look_at(eye, ball, width=64, height=48, fov_x=0.9)
+    Scene(ball_field(), cameras={"test": (camera,)}).save(tmp_path / "ball")
+
+    def pose() -> NDArray[np.float64]:
+        return np.array(page.page.evaluate("cagefield.camera.c2w"), dtype=float).reshape(4, 4)
+
+    with editor_server(tmp_path / "ball") as server, editor_page(server.link) as page:
+        page.ready()
+        page.settle()
+        box, before = page.box, pose()
+        middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        distance = page.page.evaluate("([x, y]) => cagefield.depth(x, y)", list(middle))
+        assert 0.3 < distance < 0.6
+        seen = before[:3, 3] - distance * before[:3, 2]
+        with page.held(middle, (60, 20)):
+            pass
+        page.settle()
+        after = pose()
+        turned = after[:3, 2] @ before[:3, 2]
+        assert turned < 0.95
+        # It still looks at the point, from as far: to a hundredth, the depth's resolution.
+        np.testing.assert_allclose(after[:3, 3] - distance * after[:3, 2], seen, atol=0.01 * distance)

@@ -61,6 +61,8 @@ export class App {
   /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
   private undrawn: Arrived[] = [];
   private drawn: Arrived[] = [];
+  /** Whether the camera stands inside the field's bounds, whose middle then is nothing to orbit around. */
+  private amid = false;
   private placedAfter: number | null = null;
   /** When the figures below the picture were last set. */
   private figured = -Infinity;
@@ -209,6 +211,7 @@ export class App {
       const [low, high] = hello.bounds;
       const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
       this.stage.look(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
+      this.amid = this.stage.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
     }
     this.camera.restate();
     this.sendLook();
@@ -255,6 +258,7 @@ export class App {
         const image = await decoding;
         const decoded = performance.now();
         this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
+        this.orbitSeen();
         this.lastPicture = header;
         this.lastNews = performance.now();
         this.undrawn.push({ header, received, decoded });
@@ -263,6 +267,14 @@ export class App {
         this.send({ type: "presented", picture: header.picture });
       }
     });
+  }
+
+  /** Once: from amid the field, the orbit's centre is what is seen in the middle of the view. */
+  private orbitSeen(): void {
+    const distance = this.amid ? this.pictures.depth.at(0.5, 0.5) : null;
+    if (distance === null) return;
+    this.stage.orbitAt(distance);
+    this.amid = false;
   }
 
   private framed(time: number): void {

@@ -113,6 +113,11 @@ export class Stage {
     this.changed();
   }
 
+  /** Orbits around the point of the camera's axis at this distance. */
+  orbitAt(distance: number): void {
+    this.orbit?.target.copy(this.camera.position).addScaledVector(this.forward, distance);
+  }
+
   /** Moves the camera along its axis, and turns its orbit, so that a ball fills much of the view. */
   focus(centre: Vec3, radius: number): void {
     if (this.orbit === null) return;
