@@ -92,12 +92,12 @@ class NerfConfig:
 
     @classmethod
     def small(cls, **options: Any) -> NerfConfig:
-        """The preset for a CPU: networks of 4 layers of 128, 32 + 32 samples a ray, a higher rate."""
+        """The preset for a CPU: networks of 4 layers of 128, 32 + 32 samples a ray, many small steps at a high rate."""
         small = {
             "depth": 4,
             "width": 128,
             "samples": (32, 32),
-            "batch_rays": 512,
+            "batch_rays": 64,
             "rate": 2e-3,
             "precrop": 100,
             "octaves": (8, 3),
