@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -11,13 +12,16 @@ from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.hexahedron import Array
-from cagefield.keyframes import Keyframe
+from cagefield.keyframes import Keyframe, Timeline, stills
 from cagefield.server import protocol
 from cagefield.server.document import Entry
 from cagefield.server.kinds import kind_of
 from cagefield.server.moving import Moved, move_corners
 from cagefield.server.protocol import Corners, Vec3
 from cagefield.server.session import Session
+
+STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
+"""How densely pages are told of a camera path; a longer one has them further apart."""
 
 
 def operation_of(message: protocol.OperationMessage) -> Operation:
@@ -47,6 +51,15 @@ def camera_of(message: protocol.CameraMessage) -> Camera:
 def key_of(message: protocol.Key) -> Keyframe:
     """The keyframe that a message states."""
     return Keyframe(tuple(message.c2w), message.fov_y_deg, message.seconds, dict(message.parts))
+
+
+def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[protocol.Still]:
+    """The camera path as pages play it. Raises CameraError where it does not move."""
+    fps = min(STILLS_PER_SECOND, MOST_STILLS / Timeline(keys, loop=loop).seconds)
+    return [
+        protocol.Still(c2w=still.camera.c2w.reshape(-1).tolist(), fov_y_deg=still.fov_y_deg)
+        for still in stills(keys, loop=loop, fps=fps, width=2, height=2)
+    ]
 
 
 def vec3(value: Array) -> Vec3:
