@@ -9,12 +9,10 @@ export function duration(keys: readonly Key[], loop: boolean): number {
 }
 
 /** The camera at a share of the path's time: evenly from one of the stills beside it to the other. */
-export function stillAt(stills: readonly Still[], loop: boolean, share: number): Still {
-  const steps = loop ? stills.length : stills.length - 1;
-  const at = MathUtils.clamp(share, 0, 1) * steps;
-  const before = Math.min(Math.floor(at), stills.length - 1);
-  const one = stills[before];
-  const other = stills[loop ? (before + 1) % stills.length : Math.min(before + 1, stills.length - 1)];
+export function stillAt(stills: readonly Still[], share: number): Still {
+  const at = MathUtils.clamp(share, 0, 1) * (stills.length - 1);
+  const before = Math.min(Math.floor(at), stills.length - 2);
+  const [one, other] = stills.slice(before);
   const t = at - before;
   const poses = [one, other].map(({ c2w }) => new Matrix4().fromArray(c2w).transpose());
   const [from, to] = poses.map((pose) => new Vector3().setFromMatrixPosition(pose));

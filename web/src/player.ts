@@ -97,7 +97,7 @@ export class Player {
     run.started ??= this.now();
     const since = (this.now() - run.started) / 1000;
     const seconds = run.loop ? since % run.whole : Math.min(since, run.whole);
-    const { c2w, fov_y_deg } = stillAt(run.stills, run.loop, seconds / run.whole);
+    const { c2w, fov_y_deg } = stillAt(run.stills, seconds / run.whole);
     this.app.send({ type: "play", play: run.play, seconds });
     this.app.stage.pose(c2w, fov_y_deg);
     if (!run.loop && since >= run.whole) this.stop();

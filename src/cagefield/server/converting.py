@@ -12,7 +12,7 @@ from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.hexahedron import Array
-from cagefield.keyframes import Keyframe, Timeline, stills
+from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server import protocol
 from cagefield.server.document import Entry
 from cagefield.server.kinds import kind_of
@@ -55,10 +55,13 @@ def key_of(message: protocol.Key) -> Keyframe:
 
 def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[protocol.Still]:
     """The camera path as pages play it. Raises CameraError where it does not move."""
-    fps = min(STILLS_PER_SECOND, MOST_STILLS / Timeline(keys, loop=loop).seconds)
+    line = Timeline(keys, loop=loop)
+    count = min(max(2, round(line.seconds * STILLS_PER_SECOND) + 1), MOST_STILLS)
+    at = np.linspace(0.0, line.seconds, count)
+    poses = line.poses(at).reshape(-1, 16).tolist()
     return [
-        protocol.Still(c2w=still.camera.c2w.reshape(-1).tolist(), fov_y_deg=still.fov_y_deg)
-        for still in stills(keys, loop=loop, fps=fps, width=2, height=2)
+        protocol.Still(c2w=c2w, fov_y_deg=fov)
+        for c2w, fov in zip(poses, line.fovs_y_deg(at).tolist(), strict=True)
     ]
 
 

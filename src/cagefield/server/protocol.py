@@ -459,7 +459,7 @@ class Answer(Message):
     grid: list[list[Vec3]] = []
     """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
     stills: list[Still] = []
-    """The path's cameras, evenly spread over its time; the last is at its end, before the first in a loop."""
+    """The path's cameras, evenly spread over its time, from its beginning to its end."""
     failed: bool = False
     """True where it could not be found out; a notice says why."""
 
