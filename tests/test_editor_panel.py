@@ -491,6 +491,8 @@ def test_playing_a_path_shows_the_edits_on_their_way_and_then_as_they_are(editor
     editor.drag(editor.grip("Z"), (0, -40))
     lifted = cone(editor.pixels()).at
     assert start[1] - lifted[1] > 20
+    while editor.state["keys"]:
+        editor.changed(lambda: page.click(".key .drop >> nth=0"))
     for _ in range(2):
         editor.changed(lambda: editor.press("k"))
     # Nothing of the edit for as long as the test may take.
