@@ -405,7 +405,7 @@ def test_a_page_that_plays_the_path_sees_the_edits_as_far_as_they_have_gone(serv
         client.send("apply", edit=number, target="field", operation={"kind": "translate", "by": by})
         start = {name: hello["start"][name] for name in ("c2w", "fov_y_deg")}
         client.send("set_path", keys=[start | {"seconds": 2.0, "parts": {number: 0.0}}, start])
-        state = client.state(lambda s: len(s["keys"]) == 2)
+        state = client.state(lambda s: [key["parts"] for key in s["keys"]] == [{str(number): 0.0}, {}])
         client.look_from(hello)
 
         def seen(revision: int) -> tuple[int, np.ndarray[Any, Any]]:
