@@ -449,6 +449,7 @@ def test_a_camera_path_is_recorded_played_and_rendered(editor: EditorPage, folde
     assert cone(editor.pixels()).at == pytest.approx(lifted, abs=1.0)  # what is looked at is edited
     page.click("button.play")
     editor.until(f"Math.abs(cagefield.camera.c2w[3] - {second['c2w'][3]}) < 1e-6")
+    editor.settle()
     editor.press("Home")
 
     with page.expect_download() as download:
@@ -482,6 +483,53 @@ def test_a_camera_path_is_recorded_played_and_rendered(editor: EditorPage, folde
     while any(file.name.startswith(("long", ".long")) for file in folder.iterdir()):
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_playing_a_path_shows_the_edits_on_their_way_and_then_as_they_are(editor: EditorPage) -> None:
+    page = editor.page
+    start = cone(editor.pixels()).at
+    editor.drag(editor.grip("Z"), (0, -40))
+    lifted = cone(editor.pixels()).at
+    assert start[1] - lifted[1] > 20
+    while editor.state["keys"]:
+        editor.changed(lambda: page.click(".key .drop >> nth=0"))
+    for _ in range(2):
+        editor.changed(lambda: editor.press("k"))
+    # Nothing of the edit for as long as the test may take.
+    seconds = page.locator('.key input[type="number"]').first
+    seconds.fill("3600")
+    editor.changed(lambda: seconds.press("Enter"))
+    editor.changed(lambda: page.locator('.key input[type="range"]').first.fill("0"))
+    before = editor.state
+
+    def playing() -> None:
+        page.click("button.play")
+        editor.until(
+            "cagefield.now.preview !== null && cagefield.picture.revision > cagefield.now.state.revision"
+        )
+        time.sleep(1.0)  # pictures of the path have no end
+
+    playing()
+    assert not page.evaluate("cagefield.settled")
+    # Quick pictures, of half the resolution perhaps.
+    assert cone(editor.pixels(cages=True)).at == pytest.approx(start, abs=3.0)
+    page.click("button.play")
+    editor.until("cagefield.now.preview === null")
+    editor.settle()
+    assert cone(editor.pixels()).at == pytest.approx(lifted, abs=1.0)
+    assert editor.state["history"] == before["history"]
+    assert editor.edit["operations"]
+
+    playing()
+    page.mouse.move(80, 400)
+    page.mouse.wheel(0, 1)  # the user takes the view
+    editor.until("cagefield.now.preview === null")
+    editor.settle()
+    playing()
+    editor.changed(lambda: editor.press("Control+z"))
+    editor.until("cagefield.now.preview === null")
+    editor.settle()
+    assert editor.state["keys"][0]["parts"] == {}
 
 
 def render(editor: EditorPage, out: Path, width: int, height: int, fps: int) -> None:

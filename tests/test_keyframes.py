@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.camera_paths import load_camera_path
 from cagefield.errors import CameraError
-from cagefield.keyframes import Keyframe, dump_path, load_keys, stills
+from cagefield.keyframes import Keyframe, Timeline, dump_path, load_keys, stills
 
 
 def key(x: float, turn_deg: float = 0.0, fov: float = 50.0, seconds: float = 1.0, **parts: float) -> Keyframe:
@@ -132,3 +132,18 @@ def test_impossible_keys_are_refused() -> None:
 def test_the_files_aspect_is_the_pictures(tmp_path: Path) -> None:
     document = json.loads(dump_path((key(0),), loop=False, width=200, height=100))
     assert document["camera_path"][0]["aspect"] == document["keyframes"][0]["aspect"] == 2.0
+
+
+def test_a_timeline_is_where_the_stills_are_at_any_time() -> None:
+    keys = [key(0.0, 0, 40.0, 1.0, e2=0.0), key(1.0, 30, 50.0, 2.0), key(4.0, 90, 60.0, 0.5)]
+    for loop, seconds in ((False, 3.0), (True, 3.5)):
+        line = Timeline(keys, loop=loop)
+        assert line.seconds == seconds
+        found = stills(keys, loop=loop, fps=10.0, width=80, height=40)
+        at = np.arange(len(found)) / 10.0
+        np.testing.assert_allclose(line.poses(at), [still.camera.c2w for still in found], atol=1e-12)
+        np.testing.assert_allclose(line.fovs_y_deg(at), [still.fov_y_deg for still in found])
+        np.testing.assert_allclose(line.parts(at)[2], [still.parts[2] for still in found])
+    for few in ([], keys[:1]):
+        with pytest.raises(CameraError, match=f"with {len(few)} keyframes does not move; record at least"):
+            Timeline(few, loop=True)

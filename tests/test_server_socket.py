@@ -398,6 +398,45 @@ def test_a_video_and_the_test_views_are_rendered_in_the_background(
         assert "exists already" in client.notice()["text"]
 
 
+def test_a_page_that_plays_the_path_sees_the_edits_as_far_as_they_have_gone(server: EditorServer) -> None:
+    with page(server) as (client, hello), page(server) as (other, _):
+        number = load(client, BALL)["edits"][0]["id"]
+        by = (0.3 * np.array(hello["start"]["c2w"]).reshape(4, 4)[:3, 0]).tolist()
+        client.send("apply", edit=number, target="field", operation={"kind": "translate", "by": by})
+        start = {name: hello["start"][name] for name in ("c2w", "fov_y_deg")}
+        client.send("set_path", keys=[start | {"seconds": 2.0, "parts": {number: 0.0}}, start])
+        state = client.state(lambda s: [key["parts"] for key in s["keys"]] == [{str(number): 0.0}, {}])
+        client.look_from(hello)
+
+        def seen(revision: int) -> tuple[int, np.ndarray[Any, Any]]:
+            """A whole picture of a revision from that one on, and where the ball is on it."""
+            last = client.until(lambda m: m["type"] == "picture" and m["final"] and m["revision"] >= revision)
+            return last["revision"], red_at(pixels(client))
+
+        revision, whole = seen(state["revision"])
+        client.send("ask", request=3, what="path")
+        told = client.until(lambda m: m["type"] == "answer" and m["request"] == 3)["stills"]
+        assert len(told) == 61 and all(np.allclose(still["c2w"], start["c2w"]) for still in told)
+
+        client.send("play_begin", play=1)
+        begun = {"type": "preview", "page": hello["page"], "play": 1, "on": True}
+        for each in (client, other):
+            assert each.until(lambda m: m["type"] == "preview") == begun
+        revision, first = seen(revision + 1)
+        client.send("play", play=1, seconds=1.0)
+        revision, middle = seen(revision + 1)
+        # The ball goes from where it is in the field to where the edit takes it, evenly between two keys.
+        assert whole[0] - first[0] > 6.0
+        assert middle == pytest.approx(0.5 * (first + whole), abs=1.0)
+        client.send("play_end", play=1)
+        for each in (client, other):
+            # The server tells of the state first: pictures from then on are of it.
+            end = each.state(lambda s: s["pictured"] > revision)
+            assert end["history"] == state["history"] and end["edits"][0]["operations"]
+            assert each.until(lambda m: m["type"] == "preview") == begun | {"on": False}
+        assert seen(end["pictured"])[1] == pytest.approx(whole, abs=0.1)
+
+
 def test_a_cancelled_video_leaves_nothing(server: EditorServer, tmp_path: Path) -> None:
     with page(server) as (client, hello):
         pose = hello["start"]["c2w"]

@@ -18,6 +18,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.keyframes import Keyframe, Still
 from cagefield.server import jobs
+from cagefield.server.blending import blended
 from cagefield.server.chores import Chores
 from cagefield.server.document import Document
 from cagefield.server.grid_lines import grid_lines
@@ -230,7 +231,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(studio: Studio) ->
     task = ErrorTask(1, values_of((MOVED,))[0], 0)
     stopped = Working(studio).do(task, lambda _: True)
     assert isinstance(stopped, Stopped)
-    session: Any = SimpleNamespace(drags={}, drawn=lambda: (MOVED,))
+    session: Any = SimpleNamespace(moving=False, drawn=lambda: (MOVED,))
     measured = []
     chores = Chores(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
     chores._warming = WARM_STAGES
@@ -278,11 +279,11 @@ KEYS = tuple(
 def test_edits_are_blended_along_a_path() -> None:
     gone = Edit.delete(Cage.box((0.5, 0, 0), 0.1))
     document = Document.of([MOVED, gone, MOVED.replace(enabled=False)], keys=KEYS)
-    assert jobs.blended(document, {1: 0.0, 2: 0.0}) == ()
-    half = jobs.blended(document, {1: 0.5, 2: 0.5})
+    assert blended(document, {1: 0.0, 2: 0.0}) == ()
+    half = blended(document, {1: 0.5, 2: 0.5})
     np.testing.assert_allclose(half[0].deformed.pivot, (0.125, 0, 0))
     assert half[1] == gone
-    assert jobs.blended(document, {}) == (MOVED, gone)
+    assert blended(document, {}) == (MOVED, gone)
 
 
 def test_jobs_refuse_what_they_could_not_write(tmp_path: Path) -> None:

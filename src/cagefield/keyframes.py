@@ -64,6 +64,48 @@ class Still:
     camera: Camera
     parts: dict[int, float]
 
+    @property
+    def fov_y_deg(self) -> float:
+        """Vertical field of view."""
+        return math.degrees(2.0 * math.atan(0.5 * self.camera.height / self.camera.fy))
+
+
+class Timeline:
+    """What lies between two or more keys: poses, fields of view and edits' parts by seconds from the first.
+
+    `seconds` is how long it takes, from the first key to the last, or all round with `loop`.
+    """
+
+    def __init__(self, keys: Sequence[Keyframe], *, loop: bool) -> None:
+        """Raises CameraError for fewer than two keys."""
+        if len(keys) < 2:
+            raise CameraError(f"a camera path with {len(keys)} keyframes does not move; record at least two")
+        ring = [*keys, keys[0]] if loop else list(keys)
+        times = np.concatenate([[0.0], np.cumsum([key.seconds for key in ring[:-1]])])
+        self.seconds = float(times[-1])
+        ends = "periodic" if loop else "natural"
+        self._eyes = CubicSpline(times, [key.pose[:3, 3] for key in ring], bc_type=ends)
+        self._turns = _turns([key.pose[:3, :3] for key in ring], times, loop)
+        self._fovs = PchipInterpolator(times, [key.fov_y_deg for key in ring])
+        self._parts = {
+            name: PchipInterpolator(times, [key.parts.get(name, 1.0) for key in ring])
+            for name in sorted({name for key in keys for name in key.parts})
+        }
+
+    def poses(self, at: Floats) -> Floats:
+        """c2w [N,4,4] at times [N]."""
+        found = np.tile(np.eye(4), (len(at), 1, 1))
+        found[:, :3, :3], found[:, :3, 3] = self._turns(at).as_matrix(), self._eyes(at)
+        return found
+
+    def fovs_y_deg(self, at: Floats) -> Floats:
+        """Vertical fields of view [N] at times [N]."""
+        return np.asarray(self._fovs(at))
+
+    def parts(self, at: Floats) -> dict[int, Floats]:
+        """The part [N] of each edit that a key names, at times [N]."""
+        return {name: np.clip(curve(at), 0.0, 1.0) for name, curve in self._parts.items()}
+
 
 def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, height: int) -> tuple[Still, ...]:
     """The pictures of a path at `fps`, from the first key to the last, or all round with `loop`.
@@ -75,29 +117,22 @@ def stills(keys: Sequence[Keyframe], *, loop: bool, fps: float, width: int, heig
         raise CameraError("a camera path needs at least one keyframe; record one")
     if len(keys) == 1:
         return (_still(keys[0].pose, keys[0].fov_y_deg, dict(keys[0].parts), width, height),)
-    ring = [*keys, keys[0]] if loop else list(keys)
-    times = np.concatenate([[0.0], np.cumsum([key.seconds for key in ring[:-1]])])
-    count = max(2, round(float(times[-1]) * fps) + (0 if loop else 1))
+    line = Timeline(keys, loop=loop)
+    count = max(2, round(line.seconds * fps) + (0 if loop else 1))
     if count > 100_000:
         raise CameraError(f"the camera path has {count} pictures; make it shorter or lower its fps")
-    at = np.linspace(0.0, times[-1], count, endpoint=not loop)
-    eyes = CubicSpline(times, [key.pose[:3, 3] for key in ring], bc_type="periodic" if loop else "natural")(
-        at
+    at = np.linspace(0.0, line.seconds, count, endpoint=not loop)
+    poses, fovs, parts = line.poses(at), line.fovs_y_deg(at), line.parts(at)
+    return tuple(
+        _still(
+            poses[n],
+            float(fovs[n]),
+            {name: float(values[n]) for name, values in parts.items()},
+            width,
+            height,
+        )
+        for n in range(count)
     )
-    turns = _turns([key.pose[:3, :3] for key in ring], times, loop)(at).as_matrix()
-    fovs = PchipInterpolator(times, [key.fov_y_deg for key in ring])(at)
-    names = sorted({name for key in keys for name in key.parts})
-    parts = {
-        name: np.clip(PchipInterpolator(times, [key.parts.get(name, 1.0) for key in ring])(at), 0.0, 1.0)
-        for name in names
-    }
-    found = []
-    for n in range(count):
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = turns[n], eyes[n]
-        here = {name: float(values[n]) for name, values in parts.items()}
-        found.append(_still(pose, float(fovs[n]), here, width, height))
-    return tuple(found)
 
 
 def _turns(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
@@ -145,7 +180,7 @@ def dump_path(
         "camera_path": [
             {
                 "camera_to_world": still.camera.c2w.reshape(-1).tolist(),
-                "fov": math.degrees(2.0 * math.atan(0.5 * height / still.camera.fy)),
+                "fov": still.fov_y_deg,
                 "aspect": aspect,
             }
             for still in pictures

@@ -10,16 +10,17 @@ import { Handles } from "./handles";
 import { Latency } from "./latency";
 import { Lines } from "./lines";
 import { Pictures } from "./pictures";
+import { Player } from "./player";
 import { recallCamera, recallTools } from "./remembered";
 import { scenery, shownCages } from "./scenery";
 import { Stage } from "./stage";
-import { Store, obstacle, selected, target } from "./store";
+import { Store, obstacle, selected, showsCages, target } from "./store";
 import { decode, unpack } from "./wire";
 import type { Operation } from "./operations";
-import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, ServerMessage, State, Vec3 } from "./protocol";
+import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
 
 /** What of the page's state shows in the canvas. */
-const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection"] as const;
+const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection", "preview"] as const;
 
 /** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
 const FIGURES_EVERY = 300;
@@ -44,6 +45,7 @@ export class App {
   readonly gizmo: Gizmo;
   readonly camera: CameraFeed;
   readonly latency = new Latency();
+  readonly player: Player;
   drag: Drag | null = null;
   /** Called before a picture is asked for: what it should show is to be sent. */
   beforeAsking: (() => void)[] = [];
@@ -75,6 +77,7 @@ export class App {
     this.gizmo = new Gizmo(this.stage.scene, this.stage.camera);
     this.camera = new CameraFeed(this.stage, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
+    this.player = new Player(this);
     this.stage.beforeFrame.push(() => this.arrange());
     this.stage.beforeFrame.push(() => this.acknowledge());
     this.stage.afterFrame.push((time) => this.framed(time));
@@ -166,7 +169,7 @@ export class App {
     const { segments, dots } = scenery(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
-    if (edit === null || !now.cages || obstacle(edit, now.mode) !== null || (now.tool === "select" && now.corners.length === 0)) {
+    if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null || (now.tool === "select" && now.corners.length === 0)) {
       this.gizmo.hide();
       return;
     }
@@ -193,6 +196,9 @@ export class App {
         break;
       case "notice":
         this.store.set({ notice: message });
+        break;
+      case "preview":
+        this.takePreview(message);
         break;
       case "preparing":
         this.store.set({ preparing: message });
@@ -232,13 +238,20 @@ export class App {
     }
   }
 
+  private takePreview(preview: Preview): void {
+    const { preview: shown } = this.store.now;
+    if (preview.on) this.store.set({ preview });
+    else if (shown?.page === preview.page && shown.play === preview.play) this.store.set({ preview: null });
+    this.player.told(preview);
+  }
+
   private lost(): void {
     const dragging = this.drag !== null;
     this.drag = null;
     for (const resolve of this.questions.values()) resolve(null);
     this.questions.clear();
     this.grid.forget();
-    this.store.set({ connection: "lost", limit: null });
+    this.store.set({ connection: "lost", limit: null, preview: null });
     if (dragging) this.say("the server went away in the middle of a drag, which is lost", "warning");
     this.stage.invalidate();
   }

@@ -15,7 +15,7 @@ export interface Inspector {
   readonly camera: { c2w: number[]; seq: number };
   /** The drag that goes on: what the cages follow of it, and why not all. */
   readonly drag: { id: number; seq: number; ended: boolean; why: string | null; followed: Operation | null } | null;
-  /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag. */
+  /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag, no preview. */
   readonly settled: boolean;
   /** Milliseconds since a picture or a state came. */
   readonly quiet: number;
@@ -59,8 +59,8 @@ export function inspector(app: App): Inspector {
     },
     get settled() {
       const picture = app.lastPicture;
-      const { state, view, before, split } = app.store.now;
-      if (app.drag !== null || picture === null || state === null || !app.camera.resting) return false;
+      const { state, view, before, split, preview } = app.store.now;
+      if (app.drag !== null || preview !== null || picture === null || state === null || !app.camera.resting) return false;
       const seen = picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
       return picture.final && seen && picture.view === view && picture.before === before && picture.split === split;
     },

@@ -48,4 +48,7 @@ addEventListener("beforeunload", (event) => {
   if (app.store.now.hello !== null) remember(app.store.now, app.stage.c2w);
   if (app.store.now.state?.saved === false) event.preventDefault();
 });
+document.addEventListener("visibilitychange", () => {
+  if (document.hidden) app.player.stop();
+});
 window.cagefield = inspector(app);

@@ -7,7 +7,7 @@ import { cornersMove, onLine, onPlane } from "./gestures";
 import { lengthStep, snapped, type Operation } from "./operations";
 import { distanceToEdges, pick, pickCorner } from "./picking";
 import { draggable, shownCages } from "./scenery";
-import { obstacle, selected, target, type Hover } from "./store";
+import { obstacle, selected, showsCages, target, type Hover } from "./store";
 
 const SNAP_ANGLE = 15;
 const SNAP_FACTOR = 0.1;
@@ -161,7 +161,7 @@ export class Pointer {
     const { now } = this.app.store;
     const edit = selected(now);
     this.app.gizmo.leave();
-    if (edit === null || !now.cages || obstacle(edit, now.mode) !== null) return null;
+    if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null) return null;
     const { project } = this.app.stage;
     const { x, y } = this.at;
     const cages = draggable(now, shownCages(edit, this.app.drag));

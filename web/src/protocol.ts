@@ -18,6 +18,9 @@ export type PageMessage =
   | DragMove
   | DragEnd
   | DragCancel
+  | PlayBegin
+  | Play
+  | PlayEnd
   | Apply
   | SetCage
   | Place
@@ -35,7 +38,7 @@ export type PageMessage =
   | SetPath
   | RenderJob
   | CancelJob;
-export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preparing | Job;
+export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
 /**
  * A whole operation at once, from numeric fields.
@@ -91,12 +94,14 @@ export interface MoveCornersBy {
   by: Vec3;
 }
 /**
- * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid".
+ * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
+ *
+ * The "path" is the camera path between its keyframes, as its video goes.
  */
 export interface Ask {
   type: "ask";
   request: number;
-  what: "surface" | "edit_text" | "grid";
+  what: "surface" | "edit_text" | "grid" | "path";
   x?: number;
   y?: number;
   edit?: number | null;
@@ -257,6 +262,28 @@ export interface Place {
   y?: number | null;
 }
 /**
+ * Where on the path the page is; passed over where that preview is over.
+ */
+export interface Play {
+  type: "play";
+  play: number;
+  seconds: number;
+}
+/**
+ * The page plays the camera path: pictures show the edits as its video will, at its beginning first.
+ */
+export interface PlayBegin {
+  type: "play_begin";
+  play: number;
+}
+/**
+ * The page plays no more: pictures show the edits as they are.
+ */
+export interface PlayEnd {
+  type: "play_end";
+  play: number;
+}
+/**
  * The page has shown a picture; until then the server sends at most one more.
  */
 export interface PresentedMessage {
@@ -316,7 +343,7 @@ export interface SetPath {
   loop?: boolean;
 }
 /**
- * The answer to an `ask`: a point and its normal, a text, or a grid; or nothing.
+ * The answer to an `ask`: a point and its normal, a text, a grid, or the path; or nothing.
  */
 export interface Answer {
   type: "answer";
@@ -325,7 +352,15 @@ export interface Answer {
   normal: Vec3 | null;
   text: string | null;
   grid: Vec3[][];
+  stills: Still[];
   failed: boolean;
+}
+/**
+ * A camera on the camera path.
+ */
+export interface Still {
+  c2w: number[];
+  fov_y_deg: number;
 }
 /**
  * What became of a `drag`: `part` of the operation was followed; `why` where that is less than all.
@@ -410,6 +445,15 @@ export interface Preparing {
   type: "preparing";
   done: number;
   of: number;
+}
+/**
+ * A page's preview of the camera path has begun, or is over; `play` is that page's number for it.
+ */
+export interface Preview {
+  type: "preview";
+  page: number;
+  play: number;
+  on: boolean;
 }
 /**
  * Everything that pages show of the edits; sent to all pages after each change.

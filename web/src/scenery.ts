@@ -6,7 +6,7 @@ import type { Dot } from "./handles";
 import { colour, type Segment } from "./lines";
 import { facesTowards } from "./picking";
 import type { Corners, EditState, Vec3 } from "./protocol";
-import { obstacle, selected, type Editor } from "./store";
+import { obstacle, selected, showsCages, type Editor } from "./store";
 
 export interface Scenery {
   segments: Segment[];
@@ -49,7 +49,7 @@ export function draggable(editor: Editor, cages: Cages): { cage: "inner" | "oute
 /** Lines and dots for everything that is to be seen of the edits. */
 export function scenery(editor: Editor, drag: Drag | null, grid: Vec3[][], eye: Vec3): Scenery {
   const out: Scenery = { segments: [], dots: [] };
-  if (!editor.cages || editor.state === null) return out;
+  if (!showsCages(editor) || editor.state === null) return out;
   const chosen = selected(editor);
   for (const edit of editor.state.edits) {
     if (edit === chosen || !edit.enabled) continue;

@@ -46,6 +46,9 @@ export class Stage {
   frameTime = 16;
   /** Called when the camera or the canvas is another. */
   cameraChanged: (() => void)[] = [];
+  /** Called when the user turns the view, or goes to another one. */
+  taken: (() => void)[] = [];
+  private around: Vec3 = [0, 0, 0];
   private scheduled = false;
   private size = new Vector2(1, 1);
 
@@ -93,22 +96,34 @@ export class Stage {
 
   /** Looks from a camera-to-world pose, row by row, and orbits around the point of its axis next to `around`. */
   look(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
-    const pose = new Matrix4().fromArray([...c2w]).transpose();
+    this.take();
     const { camera } = this;
-    camera.fov = fov_y_deg;
-    camera.position.setFromMatrixPosition(pose);
-    camera.quaternion.setFromRotationMatrix(pose);
-    const forward = new Vector3(0, 0, -1).applyQuaternion(camera.quaternion);
-    const distance = Math.max(new Vector3(...around).sub(camera.position).dot(forward), 0.1);
-    const target = camera.position.clone().addScaledVector(forward, distance);
+    this.place(c2w, fov_y_deg);
+    this.around = around;
     if (this.orbit === null || camera.up.distanceTo(new Vector3(...up)) > 1e-6) {
       camera.up.set(...up);
       this.orbit?.dispose();
       this.orbit = new OrbitControls(camera, this.canvas);
       this.orbit.zoomToCursor = true;
+      this.orbit.addEventListener("start", () => this.take());
       this.orbit.addEventListener("change", () => this.changed());
     }
-    this.orbit.target.copy(target);
+    this.settle();
+  }
+
+  /** Looks from a pose as it is, however it leans, until the view is settled. */
+  pose(c2w: readonly number[], fov_y_deg: number): void {
+    this.place(c2w, fov_y_deg);
+    this.changed();
+  }
+
+  /** Orbits, upright, around the point of the camera's axis next to the middle of what there is to see. */
+  settle(): void {
+    if (this.orbit === null) return;
+    const { camera } = this;
+    const forward = this.forward;
+    const distance = Math.max(new Vector3(...this.around).sub(camera.position).dot(forward), 0.1);
+    this.orbit.target.copy(camera.position).addScaledVector(forward, distance);
     this.orbit.update();
     this.changed();
   }
@@ -121,6 +136,7 @@ export class Stage {
   /** Moves the camera along its axis, and turns its orbit, so that a ball fills much of the view. */
   focus(centre: Vec3, radius: number): void {
     if (this.orbit === null) return;
+    this.take();
     const away = this.camera.position.clone().sub(this.orbit.target).normalize();
     const narrow = Math.min(1, this.camera.aspect) * Math.tan(MathUtils.degToRad(this.camera.fov / 2));
     this.orbit.target.set(...centre);
@@ -166,6 +182,17 @@ export class Stage {
   /** The direction in which the camera looks. */
   get forward(): Vector3 {
     return new Vector3(0, 0, -1).applyQuaternion(this.camera.getWorldQuaternion(new Quaternion()));
+  }
+
+  private place(c2w: readonly number[], fov_y_deg: number): void {
+    const pose = new Matrix4().fromArray([...c2w]).transpose();
+    this.camera.fov = fov_y_deg;
+    this.camera.position.setFromMatrixPosition(pose);
+    this.camera.quaternion.setFromRotationMatrix(pose);
+  }
+
+  private take(): void {
+    for (const action of this.taken) action();
   }
 
   private changed(): void {

@@ -1,7 +1,7 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "./cage";
 import type { Axes } from "./operations";
-import type { EditState, Hello, Job, LookMessage, Notice, Preparing, State } from "./protocol";
+import type { EditState, Hello, Job, LookMessage, Notice, Preparing, Preview, State } from "./protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<LookMessage["view"]>;
@@ -49,6 +49,8 @@ export interface Editor {
   /** How much of the renderer is ready, or null before it was said. */
   preparing: Preparing | null;
   jobs: Job[];
+  /** What a page plays of the camera path, and pictures show, or null. */
+  preview: Preview | null;
   figures: Figures;
 }
 
@@ -74,6 +76,7 @@ export const START: Editor = {
   notice: null,
   preparing: null,
   jobs: [],
+  preview: null,
   figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false },
 };
 
@@ -119,6 +122,11 @@ export class Store {
 export function selected(editor: Editor): EditState | null {
   const state = editor.state;
   return state?.edits.find((edit) => edit.id === state.selected) ?? null;
+}
+
+/** Whether cages are to be seen: a preview has none, as its video. */
+export function showsCages(editor: Editor): boolean {
+  return editor.cages && editor.preview === null;
 }
 
 /** What a drag of the selected edit moves: the field in Edit mode, cages in Set mode. */

@@ -2,14 +2,12 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { Connection, socketAddress, type Handlers, type Socket } from "../src/connection";
 import { HELD, bindings, named } from "../src/keys";
 import { Latency } from "../src/latency";
-import { duration, viewAt } from "../src/path";
 import { scenery } from "../src/scenery";
 import { START, Store, obstacle, selected, target } from "../src/store";
 import type { Actions } from "../src/actions";
 import type { App } from "../src/app";
 import type { Pointer } from "../src/pointer";
-import type { Key } from "../src/protocol";
-import { expectClose } from "./cages";
+import type { Preview } from "../src/protocol";
 import { edit, state } from "./fake_server";
 
 describe("the connection", () => {
@@ -93,12 +91,14 @@ describe("what is drawn", () => {
     expect(scenery({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
   });
 
-  it("has the other edits in their colours, hidden ones not, and nothing where cages are off", () => {
+  it("has the other edits in their colours, hidden ones not, and nothing where cages are off or a page plays", () => {
     const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
     const { segments } = scenery({ ...START, state: state({ edits }) }, null, [], eye);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
     expect(scenery({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments).toHaveLength(0);
+    const preview: Preview = { type: "preview", page: 1, play: 1, on: true };
+    expect(scenery({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(0);
   });
 
   it("has no handles where the edit is locked", () => {
@@ -147,26 +147,5 @@ describe("latency", () => {
     }
     expect(latency.perSecond(1000)).toBeCloseTo(10, 6);
     expect(latency.perSecond(5000)).toBe(0);
-  });
-});
-
-describe("the camera path", () => {
-  const at = (x: number, fov_y_deg: number): Key => ({ c2w: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1], fov_y_deg, seconds: 2, parts: {} });
-  const keys = [at(0, 40), at(1, 50), at(2, 60)];
-
-  it("goes through its keyframes at their times", () => {
-    expect(duration(keys, false)).toBe(4);
-    expect(duration(keys, true)).toBe(6);
-    for (const [n, key] of keys.entries()) {
-      const view = viewAt(keys, false, 2 * n);
-      expectClose(view.c2w, key.c2w, 6);
-      expect(view.fov_y_deg).toBeCloseTo(key.fov_y_deg, 9);
-    }
-    expectClose(viewAt(keys, true, 6).c2w, keys[0].c2w, 6);
-  });
-
-  it("goes evenly between keyframes in a row", () => {
-    expect(viewAt(keys, false, 1).c2w[3]).toBeCloseTo(0.5, 1);
-    expect(viewAt(keys, false, 99).c2w[3]).toBeCloseTo(2, 6);
   });
 });

@@ -87,7 +87,7 @@ class Chores:
         return found
 
     def _unmeasured(self) -> Edit | None:
-        if self._session.drags:
+        if self._session.moving:
             return None
         known = [edit for edit, _ in self._errors]
         edits = (edit for edit in self._session.drawn() if edit.lattice and edit.adjustment == "continuous")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -11,13 +12,16 @@ from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.hexahedron import Array
-from cagefield.keyframes import Keyframe
+from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server import protocol
 from cagefield.server.document import Entry
 from cagefield.server.kinds import kind_of
 from cagefield.server.moving import Moved, move_corners
 from cagefield.server.protocol import Corners, Vec3
 from cagefield.server.session import Session
+
+STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
+"""How densely pages are told of a camera path; a longer one has them further apart."""
 
 
 def operation_of(message: protocol.OperationMessage) -> Operation:
@@ -47,6 +51,18 @@ def camera_of(message: protocol.CameraMessage) -> Camera:
 def key_of(message: protocol.Key) -> Keyframe:
     """The keyframe that a message states."""
     return Keyframe(tuple(message.c2w), message.fov_y_deg, message.seconds, dict(message.parts))
+
+
+def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[protocol.Still]:
+    """The camera path as pages play it. Raises CameraError where it does not move."""
+    line = Timeline(keys, loop=loop)
+    count = min(max(2, round(line.seconds * STILLS_PER_SECOND) + 1), MOST_STILLS)
+    at = np.linspace(0.0, line.seconds, count)
+    poses = line.poses(at).reshape(-1, 16).tolist()
+    return [
+        protocol.Still(c2w=c2w, fov_y_deg=fov)
+        for c2w, fov in zip(poses, line.fovs_y_deg(at).tolist(), strict=True)
+    ]
 
 
 def vec3(value: Array) -> Vec3:

@@ -59,6 +59,8 @@ class Hub:
         self._stacks: dict[int, tuple[EditStack, bool]] = {}
         """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
         self._trouble: str | None = None
+        self._preview: tuple[int, int] | None = None
+        """The page and the number of the preview that pages were told of."""
 
     # ---- pages ----
 
@@ -72,15 +74,18 @@ class Hub:
         page.outbox.put(self.state())
         if self.greeting is not None:
             page.notice("info", self.greeting)
+        if self._preview is not None:
+            page.outbox.put(protocol.Preview(page=self._preview[0], play=self._preview[1], on=True))
         page.outbox.put(self.chores.preparing())
         for job in self.chores.jobs():
             page.outbox.put(job)
         return page
 
     def leave(self, page: Page) -> None:
-        """A page is gone; its drag is given up."""
+        """A page is gone; its drag is given up, and what it plays is over."""
         self.pages.pop(page.number, None)
         self.session.drag_cancel(page.number)
+        self.session.play_end(page.number)
         self.desk.scheduler.leave(page.number)
         self.changed()
 
@@ -153,8 +158,9 @@ class Hub:
 
     def pump(self) -> None:
         """Has rendered what is new to see."""
+        self._tell_preview()
         self._look_again()
-        self.desk.scheduler.edits(self._pictures, bool(self.session.drags), time.monotonic())
+        self.desk.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
         self.desk.pump()
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
@@ -193,6 +199,16 @@ class Hub:
     def chore(self) -> Chore | None:
         """What may be done now that no page waits for anything."""
         return self.chores.next(self.desk.scheduler.generation)
+
+    def _tell_preview(self) -> None:
+        """Tells the pages which preview is over, and which has begun."""
+        preview = self.session.preview
+        now = None if preview is None else (preview.page, preview.number)
+        before, self._preview = self._preview, now
+        if before != now:
+            for which, on in ((before, False), (now, True)):
+                if which is not None:
+                    self.broadcast(protocol.Preview(page=which[0], play=which[1], on=on))
 
     def _look_again(self) -> None:
         shown = self._what_is_shown()

@@ -3,17 +3,15 @@ no page waits for one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 from cagefield.cameras import Camera
-from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
 from cagefield.keyframes import Still, stills
+from cagefield.server.blending import blended
 from cagefield.server.document import Document
-from cagefield.server.reasons import problem
 from cagefield.server.tasks import FrameTask, Shown, values_of
 
 What: TypeAlias = Literal["test_views", "camera_path"]
@@ -89,27 +87,6 @@ def camera_path(
         raise CagefieldError(f"{out} exists already; give another name, or choose to overwrite")
     found = stills(document.keys, loop=document.loop, fps=fps, width=size[0], height=size[1])
     return Job(number, "camera_path", out, fps, found, document)
-
-
-def blended(document: Document, parts: Mapping[int, float]) -> tuple[Edit, ...]:
-    """The edits that are shown, each gone through to its part; a deletion is there from one half on.
-
-    Raises CagefieldError where an edit is possible as a whole, but not there.
-    """
-    found = []
-    for entry in document.entries:
-        part = parts.get(entry.id, 1.0)
-        edit = entry.edit
-        if not edit.enabled or problem(edit) is not None or (edit.deleted and part < 0.5):
-            continue
-        if part < 1.0:
-            edit = edit.replace(operations=tuple(operation.part(part) for operation in edit.operations))
-            why = problem(edit)
-            if why is not None:
-                raise CagefieldError(f'edit "{edit.name}" is not possible at {part:.0%}: {why}')
-        if edit.changes_anything:
-            found.append(edit)
-    return tuple(found)
 
 
 def _within(camera: Camera, size: tuple[int, int]) -> Camera:

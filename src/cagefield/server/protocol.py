@@ -8,6 +8,9 @@ corners, corner k = x + 2y + 4z.
 A drag goes: `drag_begin`, any number of `drag` (each states the whole operation since the beginning, so
 the server may skip all but the newest), then `drag_end` or `drag_cancel`. The server answers with `dragged`:
 how much of the operation could be followed, and where the cages then are.
+
+A page plays the camera path so: `play_begin`, then `play` with each camera on the way, then `play_end`. All
+pages are told with `preview` that it began, and that it is over, also where something else has ended it.
 """
 
 from __future__ import annotations
@@ -163,6 +166,28 @@ class DragCancel(Message):
     drag: int
 
 
+class PlayBegin(Message):
+    """The page plays the camera path: pictures show the edits as its video will, at its beginning first."""
+
+    type: Literal["play_begin"] = "play_begin"
+    play: Annotated[int, Field(ge=1)]
+
+
+class Play(Message):
+    """Where on the path the page is; passed over where that preview is over."""
+
+    type: Literal["play"] = "play"
+    play: int
+    seconds: Annotated[float, Field(ge=0, le=1e7)]
+
+
+class PlayEnd(Message):
+    """The page plays no more: pictures show the edits as they are."""
+
+    type: Literal["play_end"] = "play_end"
+    play: int
+
+
 class Apply(Message):
     """A whole operation at once, from numeric fields."""
 
@@ -279,11 +304,14 @@ class LoadEdits(Message):
 
 
 class Ask(Message):
-    """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"."""
+    """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
+
+    The "path" is the camera path between its keyframes, as its video goes.
+    """
 
     type: Literal["ask"] = "ask"
     request: int
-    what: Literal["surface", "edit_text", "grid"]
+    what: Literal["surface", "edit_text", "grid", "path"]
     x: Annotated[float, Field(ge=0, le=1)] = 0.5
     y: Annotated[float, Field(ge=0, le=1)] = 0.5
     edit: EditId | None = None
@@ -326,9 +354,9 @@ class CancelJob(Message):
 
 
 PageMessage: TypeAlias = Annotated[
-    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | Apply
-    | SetCage | Place | FitInner | OuterMargin | Change | SceneChange | Command | Mirror | Reorder | GoTo
-    | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
+    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | PlayBegin
+    | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange | Command
+    | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
     Field(discriminator="type"),
 ]  # fmt: skip
 
@@ -413,8 +441,15 @@ class Dragged(Message):
     outer: Corners | None
 
 
+class Still(Message):
+    """A camera on the camera path."""
+
+    c2w: Pose
+    fov_y_deg: float
+
+
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, a text, or a grid; or nothing."""
+    """The answer to an `ask`: a point and its normal, a text, a grid, or the path; or nothing."""
 
     type: Literal["answer"] = "answer"
     request: int
@@ -423,6 +458,8 @@ class Answer(Message):
     text: str | None = None
     grid: list[list[Vec3]] = []
     """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
+    stills: list[Still] = []
+    """The path's cameras, evenly spread over its time, from its beginning to its end."""
     failed: bool = False
     """True where it could not be found out; a notice says why."""
 
@@ -433,6 +470,15 @@ class Notice(Message):
     type: Literal["notice"] = "notice"
     level: Literal["info", "warning", "error"]
     text: str
+
+
+class Preview(Message):
+    """A page's preview of the camera path has begun, or is over; `play` is that page's number for it."""
+
+    type: Literal["preview"] = "preview"
+    page: int
+    play: int
+    on: bool
 
 
 class Preparing(Message):
@@ -457,7 +503,7 @@ class Job(Message):
 
 
 ServerMessage: TypeAlias = Annotated[
-    Hello | State | Dragged | Answer | Notice | Preparing | Job, Field(discriminator="type")
+    Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job, Field(discriminator="type")
 ]
 
 

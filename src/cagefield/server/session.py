@@ -15,7 +15,8 @@ from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
 from cagefield.hexahedron import Array
-from cagefield.keyframes import Keyframe
+from cagefield.keyframes import Keyframe, Timeline
+from cagefield.server.blending import blended
 from cagefield.server.document import Document, Entry
 from cagefield.server.drags import Drags
 from cagefield.server.history import History
@@ -23,6 +24,7 @@ from cagefield.server.kinds import Kind, with_kind, with_shell
 from cagefield.server.moving import Moved, Target, move
 from cagefield.server.naming import fresh_name, named, of
 from cagefield.server.placing import outer_around, pair_around
+from cagefield.server.previews import Preview
 from cagefield.server.reasons import problem
 from cagefield.server.reflecting import mirrored
 
@@ -40,6 +42,8 @@ class Session:
         self.voxel = voxel
         self.selected: int | None = document.entries[-1].id if document.entries else None
         self.drags = Drags()
+        self.preview: Preview | None = None
+        """What a page plays; over with the next change of the document, or drag."""
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
@@ -58,6 +62,11 @@ class Session:
         return self.drags.shown(self.document)
 
     @property
+    def moving(self) -> bool:
+        """True while pictures show what is not in the document: drags, or a preview."""
+        return bool(self.drags) or self.preview is not None
+
+    @property
     def saved(self) -> bool:
         """True where the document is as it was last saved."""
         return self.document == self._saved
@@ -72,7 +81,9 @@ class Session:
         return found
 
     def drawn(self) -> tuple[Edit, ...]:
-        """The edits that the picture shows: enabled, changing something, and possible."""
+        """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
+        if self.preview is not None:
+            return self.preview.edits
         edits = (entry.edit for entry in self.shown.entries)
         return tuple(
             edit for edit in edits if edit.enabled and edit.changes_anything and self.problem(edit) is None
@@ -89,6 +100,7 @@ class Session:
         """A page begins to drag; a drag of its own that went on is given up."""
         self.drag_cancel(page)
         self.drags.begin(page, number, self._unlocked(edit), target)
+        self.preview = None
         self.selected = edit
         self.revision += 1
 
@@ -116,6 +128,42 @@ class Session:
         """The page's drag is given up, if there is one."""
         if self.drags.cancel(page):
             self.revision += 1
+
+    # ---- the preview ----
+
+    def play_begin(self, page: int, number: int) -> None:
+        """A page begins to play the camera path, from its beginning; what was played before is over.
+
+        Raises EditError while anybody drags, CagefieldError where the path or an edit on it is not possible.
+        """
+        if self.drags:
+            raise EditError("an edit is being dragged; play the camera path when the drag is over")
+        timeline = Timeline(self.document.keys, loop=self.document.loop)
+        self.preview = Preview(page, number, timeline, self.drawn())
+        self.revision += 1
+        self.play(page, number, 0.0)
+
+    def play(self, page: int, number: int, seconds: float) -> None:
+        """Shows the edits as the video will at a time; nothing where this is not played any more.
+
+        Raises CagefieldError, and the preview is over, where an edit is not possible there.
+        """
+        preview = self.preview
+        if preview is None or not preview.is_of(page, number):
+            return
+        self.preview = None
+        self.revision += 1
+        edits = blended(self.document, preview.parts(seconds), self.problem)
+        self.preview = replace(preview, edits=edits)
+
+    def play_end(self, page: int, number: int | None = None) -> None:
+        """What the page plays is over: that of a number, or whatever it is."""
+        preview = self.preview
+        if preview is not None and preview.is_of(page, preview.number if number is None else number):
+            self.preview = None
+            self.revision += 1
+
+    # ---- operations ----
 
     def apply(self, number: int, target: Target, operation: Operation) -> Moved:
         """A whole operation at once. Raises EditError where not all of it is possible."""
@@ -283,6 +331,7 @@ class Session:
 
     def _travel(self, step: Callable[[History[Document]], History[Document]]) -> None:
         self.drags.clear()
+        self.preview = None
         self.history = step(self.history)
         if not self.document.has(self.selected):
             entries = self.document.entries
@@ -311,5 +360,6 @@ class Session:
         self.selected = entry.id
 
     def _push(self, name: str, document: Document) -> None:
+        self.preview = None
         self.history = self.history.push(name, document)
         self.revision += 1

@@ -29,7 +29,7 @@ MOST_REFUSED = 2000
 
 
 class Inbox:
-    """Messages that wait to be done; of two drag or camera messages in a row only the newer one waits."""
+    """Messages that wait to be done; of drag, camera or play messages in a row only the newest waits."""
 
     def __init__(self) -> None:
         self._waiting: deque[protocol.PageMessage] = deque()
@@ -37,8 +37,12 @@ class Inbox:
 
     def put(self, message: protocol.PageMessage) -> None:
         """One message more."""
-        if self._waiting and _replaces(message, self._waiting[-1]):
-            self._waiting.pop()
+        for n in range(len(self._waiting) - 1, -1, -1):
+            if _replaces(message, self._waiting[n]):
+                del self._waiting[n]
+                break
+            if not isinstance(self._waiting[n], (protocol.CameraMessage, protocol.Play)):
+                break
         self._waiting.append(message)
         self._some.set()
 
@@ -53,6 +57,8 @@ class Inbox:
 def _replaces(new: protocol.PageMessage, old: protocol.PageMessage) -> bool:
     if isinstance(new, protocol.CameraMessage):
         return isinstance(old, protocol.CameraMessage)
+    if isinstance(new, protocol.Play):
+        return isinstance(old, protocol.Play) and old.play == new.play
     if isinstance(new, (protocol.DragMove, protocol.DragEnd)):
         return isinstance(old, protocol.DragMove) and old.drag == new.drag
     return False

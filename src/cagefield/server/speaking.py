@@ -16,6 +16,7 @@ from cagefield.server.converting import (
     dragged_of,
     key_of,
     operation_of,
+    stills_of,
     view_height,
 )
 from cagefield.server.hub import Hub, Page
@@ -65,6 +66,9 @@ class Speaker:
             return protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
         if message.what == "grid":
             return protocol.Answer(request=message.request, grid=await self._grid(message.edit))
+        if message.what == "path":
+            document = self._session.document
+            return protocol.Answer(request=message.request, stills=stills_of(document.keys, document.loop))
         found = await self._surface(message.x, message.y)
         if found is None:
             return protocol.Answer(request=message.request)
@@ -111,6 +115,31 @@ class Speaker:
         self._page.drag = 0
         self._session.drag_cancel(self._page.number)
         self._hub.changed()
+
+    # ---- playing ----
+
+    def _play_begin(self, message: protocol.PlayBegin) -> None:
+        try:
+            self._session.play_begin(self._page.number, message.play)
+        except CagefieldError:
+            self._page.outbox.put(protocol.Preview(page=self._page.number, play=message.play, on=False))
+            raise
+        finally:
+            self._hub.changed()
+
+    def _play(self, message: protocol.Play) -> None:
+        try:
+            self._session.play(self._page.number, message.play, message.seconds)
+        except CagefieldError:
+            self._hub.changed()
+            raise
+        self._hub.pump()
+
+    def _play_end(self, message: protocol.PlayEnd) -> None:
+        self._session.play_end(self._page.number, message.play)
+        self._hub.changed()
+
+    # ---- operations ----
 
     def _apply(self, message: protocol.Apply) -> None:
         self._session.apply(message.edit, message.target, operation_of(message.operation))

@@ -2,7 +2,7 @@
 import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
-import { duration, viewAt } from "../path";
+import { duration } from "../path";
 import type { Key, Vec3 } from "../protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
@@ -14,8 +14,7 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   };
   const keys = (): Key[] => app.store.now.state?.keys ?? [];
   const replaced = (index: number, key: Partial<Key>): Key[] => keys().map((old, i) => (i === index ? { ...old, ...key } : old));
-  const playing = player(app);
-  const play = iconButton(Play, "Play the path in this page", () => playing.toggle(), "play");
+  const play = iconButton(Play, "Play the path in this page, as its video will be", () => app.player.toggle(), "play");
   const loop = iconButton(Repeat, "Back to the first keyframe: a loop", () => send(keys(), !app.store.now.state?.loop), "loop");
   const film = h("button", { type: "button", class: "text", onclick: () => dialogs.render("camera_path") }, "Render video…");
   const file = iconLink(Download, "Download the camera path, as nerfstudio has it", `camera_path.json${location.search}`, "camera_path.json");
@@ -57,7 +56,7 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
     file.hidden = state.keys.length === 0;
     loop.classList.toggle("on", state.loop);
   });
-  playing.changed = (on) => play.replaceChildren(icon(on ? Square : Play));
+  app.player.changed = (on) => play.replaceChildren(icon(on ? Square : Play));
   return section(
     "Camera path",
     h("div", { class: "bar" }, iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"), play, loop, file, h("span", { class: "space" }), length),
@@ -65,32 +64,6 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
     h("div", { class: "bar" }, film, views),
   );
 } // prettier-ignore
-
-/** Moves the page's camera along the path until its end, or until it is stopped. */
-function player(app: App): { toggle: () => void; changed: (on: boolean) => void } {
-  let started: number | null = null;
-  const self = {
-    changed: ((): void => undefined) as (on: boolean) => void,
-    toggle(): void {
-      started = started === null ? performance.now() : null;
-      self.changed(started !== null);
-      if (started !== null) requestAnimationFrame(step);
-    },
-  };
-  function step(): void {
-    const { state } = app.store.now;
-    if (started === null || state === null) return;
-    const seconds = (performance.now() - started) / 1000;
-    const whole = duration(state.keys, state.loop);
-    if (whole > 0) {
-      const view = viewAt(state.keys, state.loop, state.loop ? seconds % whole : seconds);
-      look(app, view.c2w, view.fov_y_deg);
-    }
-    if (whole > 0 && (state.loop || seconds < whole)) requestAnimationFrame(step);
-    else self.toggle();
-  }
-  return self;
-}
 
 function look(app: App, c2w: number[], fov_y_deg: number): void {
   const { hello } = app.store.now;

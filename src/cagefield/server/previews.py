@@ -1,0 +1,29 @@
+"""The preview: a page plays the camera path, and pictures show the edits as the path's video will then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cagefield.edits import Edit
+from cagefield.keyframes import Timeline
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What a page plays: the page, its number for it, the path, and the edits as they are shown now."""
+
+    page: int
+    number: int
+    timeline: Timeline
+    edits: tuple[Edit, ...]
+
+    def is_of(self, page: int, number: int) -> bool:
+        """True where it is what that page calls by that number."""
+        return (self.page, self.number) == (page, number)
+
+    def parts(self, seconds: float) -> dict[int, float]:
+        """How far each edit that a key names has gone at a time; before and after the path as at its ends."""
+        at = np.array([min(max(seconds, 0.0), self.timeline.seconds)])
+        return {name: float(values[0]) for name, values in self.timeline.parts(at).items()}
