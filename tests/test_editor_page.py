@@ -298,7 +298,7 @@ def test_a_server_that_is_killed_in_a_drag_is_found_again(
         editor.drag(editor.grip("Z"), (0, -20))
 
 
-def test_a_camera_amid_the_field_orbits_around_what_it_sees(tmp_path: Path) -> None:
+def test_a_camera_amid_the_field_orbits_around_what_it_sees(opened: EditorPage, tmp_path: Path) -> None:
     eye, ball = np.array([0.2, -0.9, 0.3]), np.array([0.0, 0.0, 0.1])
     camera = Camera.look_at(eye, ball, width=64, height=48, fov_x=0.9)
     Scene(ball_field(), cameras={"test": (camera,)}).save(tmp_path / "ball")
@@ -306,7 +306,8 @@ def test_a_camera_amid_the_field_orbits_around_what_it_sees(tmp_path: Path) -> N
     def pose() -> NDArray[np.float64]:
         return np.array(page.page.evaluate("cagefield.camera.c2w"), dtype=float).reshape(4, 4)
 
-    with editor_server(tmp_path / "ball") as server, editor_page(server.link) as page:
+    with editor_server(tmp_path / "ball") as server:
+        page = opened.tab(server.link)
         page.ready()
         page.settle()
         box, before = page.box, pose()
@@ -322,3 +323,4 @@ def test_a_camera_amid_the_field_orbits_around_what_it_sees(tmp_path: Path) -> N
         assert turned < 0.95
         # It still looks at the point, from as far: to a hundredth, the depth's resolution.
         np.testing.assert_allclose(after[:3, 3] - distance * after[:3, 2], seen, atol=0.01 * distance)
+        page.page.close()

@@ -92,7 +92,7 @@ class NerfConfig:
 
     @classmethod
     def small(cls, **options: Any) -> NerfConfig:
-        """The preset for a CPU: networks of 4 layers of 128, 32 + 32 samples a ray, small steps at a high rate."""
+        """The preset for a CPU: 4 layers of 128, 32 + 32 samples a ray, small batches at a high rate."""
         small = {
             "depth": 4,
             "width": 128,
