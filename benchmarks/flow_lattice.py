@@ -35,8 +35,9 @@ from cagefield.edits.operations import (
 )
 from cagefield.warps import FlowShell
 from cagefield.warps.continuous import ContinuousWarp
-from cagefield.warps.device import LATTICE_STRAIN, DeviceStack
-from cagefield.warps.flow_device import table
+from cagefield.warps.device_stack import DeviceStack
+from cagefield.warps.edit_lattice import LATTICE_STRAIN
+from cagefield.warps.flow_table import table
 
 BOX, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 BENT = Cage.box((0.1, 0, 0), 0.6, (0.05, 0.1, 0.1)).move_corner(2, (-0.15, 0.15, -0.1))

@@ -41,7 +41,7 @@ from cagefield.edits.operations import (
 )
 from cagefield.errors import CagefieldError
 from cagefield.hexahedron import Array, Mask
-from cagefield.warps import FlowShell, flow_device
+from cagefield.warps import FlowShell, flow_device, flow_table
 from cagefield.warps.extended import Extended
 from cagefield.warps.inverting import inverted
 
@@ -158,7 +158,7 @@ def measure(edit: Edit, rng: np.random.Generator, n: int, kind: type, compared: 
     assert edit.outer is not None
     shell = FlowShell(edit.inner, edit.deformed, edit.outer)
     knots = shell.knots
-    there, back = (Compiled(flow_device.table_along(shell, k).astype(kind)) for k in (knots, knots[::-1]))
+    there, back = (Compiled(flow_table.table_along(shell, k).astype(kind)) for k in (knots, knots[::-1]))
     size = float(np.ptp(edit.outer.corners, axis=0).max())
     p = _shell_points(edit.outer, edit.deformed, rng, n)
     q, J = back(p)

@@ -27,7 +27,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural import procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
-from cagefield.training.voxel import VoxelConfig
+from cagefield.training.voxel_config import VoxelConfig
 
 Factors = tuple[float, float, float]
 
