@@ -8,7 +8,8 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.datasets.procedural import make_scene
-from cagefield.training.voxel import VoxelConfig, train_voxel
+from cagefield.training.voxel import train_voxel
+from cagefield.training.voxel_config import VoxelConfig
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from websockets.sync.client import ClientConnection, connect
 
@@ -46,11 +46,12 @@ class EditorServer:
 
 
 @contextlib.contextmanager
-def editor_server(scene: Path, *options: str) -> Iterator[EditorServer]:
-    """`cagefield view SCENE` on a free port."""
+def editor_server(scene: Path, *options: str, errors: IO[str] | None = None) -> Iterator[EditorServer]:
+    """`cagefield view SCENE` on a free port; its stderr goes to a file `errors`, if one is given."""
     process = subprocess.Popen(
         [sys.executable, "-m", "cagefield", "view", str(scene), "--port", "0", "--no-browser", *options],
         stdout=subprocess.PIPE,
+        stderr=errors,
         text=True,
         env=os.environ | {"PYTHONUNBUFFERED": "1"},
     )

@@ -10,7 +10,7 @@ from cagefield.benchmarking.workbench import Settings
 from cagefield.cameras import turntable
 from cagefield.fields.voxel import VoxelField
 from cagefield.scene import Scene
-from cagefield.training.voxel import VoxelConfig
+from cagefield.training.voxel_config import VoxelConfig
 
 SH_C0 = 0.28209479177387814
 

@@ -19,7 +19,7 @@ from cagefield.cli import main
 from cagefield.datasets.procedural import procedural_scene
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
-from cagefield.training.voxel import VoxelConfig
+from cagefield.training.voxel_config import VoxelConfig
 
 TINY = Settings(
     views=16,

@@ -138,7 +138,7 @@ def test_growing_reaches_all_26_neighbours() -> None:
         ({"resolution": 8}, "resolution is 8; it must be from 16 to 1024"),
         ({"views": 0}, "views must be 1 to 256"),
         ({"opacity": 1.0}, r"opacity in \(0, 1\)"),
-        ({"sh_degree": 3}, "degree of the spherical harmonics must be 0 to 2"),
+        ({"sh_degree": 3}, "sh_degree is 3; it must be from 0 to 2"),
         ({"bounds": [[0, 0, 0], [1, 0, 1]]}, "bounds must be a finite box"),
         ({"bounds": [[2, 2, 2], [3, 3, 3]]}, "the field is empty in"),
     ],

@@ -67,18 +67,18 @@ def test_interrupted_training_is_saved_and_resumed(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]
-    from cagefield.training import voxel
+    from cagefield.training.voxel_run import VoxelRun
 
-    advance = voxel._Run.advance
+    advance = VoxelRun.advance
 
-    def pressed_at_40(run: voxel._Run) -> None:
+    def pressed_at_40(run: VoxelRun) -> None:
         import signal
 
         advance(run)
         if run.step == 40:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(voxel._Run, "advance", pressed_at_40)
+    monkeypatch.setattr(VoxelRun, "advance", pressed_at_40)
     assert main(argv) == 130
     out, err = capsys.readouterr()
     assert "40 steps" in out and "--resume goes on" in out and err.endswith("cagefield: interrupted\n")

@@ -47,7 +47,7 @@ def test_a_missing_scene_is_one_line(capsys: pytest.CaptureFixture[str], tmp_pat
             "version: 1\nedits:\n  - inner: {center: [.nan, 0, 0], size: 1}\n",
             "numbers must be finite",
         ),
-        ("camera_path.json", "{", "holds no camera path's keyframes"),
+        ("camera_path.json", "{", "camera_path.json is not JSON"),
         ("field.safetensors", "cut off", "it may be truncated"),
         ("scene.json", "{}", "give a scene folder"),
         ("cameras.json", "{", "is not readable JSON"),

@@ -205,5 +205,5 @@ def test_damaged_and_missing_parts(tmp_path):
 def test_without_pycolmap_the_cure_is_named(tmp_path, monkeypatch):
     _write(tmp_path, n=2)
     monkeypatch.setitem(sys.modules, "pycolmap", None)
-    with pytest.raises(DatasetError, match=r"needs pycolmap; run pip install 'cagefield\[colmap\]'"):
+    with pytest.raises(DatasetError, match=r"needs pycolmap; run pip install pycolmap"):
         load_dataset(tmp_path)

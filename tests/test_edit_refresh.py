@@ -114,7 +114,7 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
         start = Renderer(field(), stack)
         counts = [
             counted(monkeypatch, flow_lattice, "sample"),
-            counted(monkeypatch, smooth_occupancy, "_images"),
+            counted(monkeypatch, smooth_occupancy, "images_of"),
             counted(monkeypatch, smooth_occupancy, "_refined"),
         ]
         # Another edit each time: an equal one would find its lattice there.
@@ -132,7 +132,7 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
 def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     from cagefield.warps import flow_lattice
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     # All in the same outer cage: what one of them costs does not depend on where the others are.
     chain = EditStack(HALF.rotate((0, 0, 0.01 * number)) for number in range(10))
@@ -152,7 +152,7 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
     from cagefield.rendering import smooth_occupancy
 
     mapped: list[tuple[int, int]] = []
-    images = smooth_occupancy._images
+    images = smooth_occupancy.images_of
 
     def counting(grid: Any, stack: Any, *rest: Any) -> Any:
         found = images(grid, stack, *rest)
@@ -167,7 +167,7 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
             renderer = renderer.with_edits(stack.set(number, moved), coarse=True)
         return renderer, list(mapped)
 
-    monkeypatch.setattr(smooth_occupancy, "_images", counting)
+    monkeypatch.setattr(smooth_occupancy, "images_of", counting)
     chain = EditStack(HALF.rotate((0, 0, 0.02 * number)) for number in range(10))
     _, alone = drag(EditStack([HALF]), 0)
     quick, together = drag(chain, place)

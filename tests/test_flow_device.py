@@ -27,7 +27,7 @@ def device() -> None:
 
 
 def compare(edits: list[Edit], n: int) -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     stack = EditStack(edits)
     rng = np.random.default_rng(0)
@@ -69,7 +69,7 @@ def test_random_edits_against_the_reference(edit: Edit) -> None:
 
 @pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
 def test_lattice_error_falls_with_its_order(name: str) -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     edit = EDITS[name]
     p = shell_points(shell_of(edit), 400).astype(np.float32)
@@ -87,7 +87,7 @@ def test_lattice_error_falls_with_its_order(name: str) -> None:
 
 def nodes_and_reference(edit: Edit, resolution: int) -> tuple[Array, Array]:
     """(displacements [R^3,3] by the lattice's kernel, those of the exact map)."""
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     nodes = DeviceStack.from_stack(EditStack([edit.replace(lattice=resolution)])).lattice
     warp = edit.exact_warp
@@ -116,9 +116,9 @@ def test_lattice_nodes_are_the_maps_values(name: str) -> None:
 def test_lattice_with_the_references_steps_is_the_reference(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cagefield.warps import device
+    from cagefield.warps import edit_lattice
 
-    monkeypatch.setattr(device, "LATTICE_STRAIN", 0.125)
+    monkeypatch.setattr(edit_lattice, "LATTICE_STRAIN", 0.125)
     nodes, expected = nodes_and_reference(EDITS[name], 9)
     apart = np.abs(nodes - expected).max(axis=1)
     # Rounding in float32; in bent cages the steps' own error, which differs in the outer cage's coordinates.

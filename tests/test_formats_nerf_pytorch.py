@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import argparse
 import os
+import pickle
+import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -211,8 +215,18 @@ def test_files_that_are_no_checkpoints_are_refused(tmp_path) -> None:
     whole = yenchenlin_file(tmp_path / "b.tar").read_bytes()
     for content in (whole[: len(whole) // 2], b"", b"hello"):
         (tmp_path / "c.tar").write_bytes(content)
-        with pytest.raises(FieldError, match=r"not a readable checkpoint|is no checkpoint"):
+        with pytest.raises(FieldError, match=r"not a readable checkpoint|is no checkpoint") as refusal:
             read_checkpoint(tmp_path / "c.tar")
+        # a reason in words, or none
+        assert re.search(r"\((\d*)\)", str(refusal.value)) is None
+
+
+def test_a_pickle_of_another_kind_is_refused_without_a_warning(tmp_path) -> None:
+    (tmp_path / "a.tar").write_bytes(pickle.dumps({"args": argparse.Namespace()}, protocol=4))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(FieldError, match="so it is refused"):
+            read_checkpoint(tmp_path / "a.tar")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data/nerf-pytorch is not there")

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.camera_paths import load_camera_path
 from cagefield.errors import CameraError
-from cagefield.keyframes import Keyframe, Timeline, dump_path, load_keys, stills
+from cagefield.keyframe_files import dump_path, is_path, load_keys
+from cagefield.keyframes import Keyframe, Timeline, stills
 
 
 def key(x: float, turn_deg: float = 0.0, fov: float = 50.0, seconds: float = 1.0, **parts: float) -> Keyframe:
@@ -109,24 +110,95 @@ def test_times_are_read_as_nerfstudio_means_them(tmp_path: Path) -> None:
     assert [k.seconds for k in load_keys(file)[0]] == [0.5, 3.0, 3.0]
 
 
-@pytest.mark.parametrize(
-    "text", ["[]", "{}", '{"keyframes": [{"matrix": [1], "fov": 50}]}', '{"keyframes": 3}', "nothing"]
-)
+@pytest.mark.parametrize("text", ["[]", "{}", "nothing", '{"keyframes": 3}', '{"keyframes": [', "[" * 10**5])
 def test_a_file_without_keys_says_so(tmp_path: Path, text: str) -> None:
     file = tmp_path / "path.json"
     file.write_text(text)
-    with pytest.raises(CameraError, match=r"path\.json"):
+    with pytest.raises(CameraError, match=r"path\.json.* write the camera path again.*remove it") as caught:
+        load_keys(file)
+    assert "\n" not in str(caught.value)
+
+
+POSE = np.eye(4).ravel().tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"matrix": [1.0]}, r'keyframes\[1\]: "matrix" must hold 16 numbers'),
+        ({"matrix": [*POSE[:15], "one"]}, r'keyframes\[1\]: "matrix" must hold 16 numbers'),
+        ({"matrix": [math.nan, *POSE[1:]]}, r'keyframes\[1\]: "matrix" must hold 16 numbers'),
+        (
+            {"matrix": [2.0, *POSE[1:]]},
+            r"keyframes\[1\]: c2w is not a rigid motion.*take scale and shear out",
+        ),
+        ({"fov": None}, r'keyframes\[1\]: "fov" must be a number, got nothing'),
+        ({"fov": 180}, r"keyframes\[1\]: the field of view is 180; give 0.2 to 178 degrees"),
+        (
+            {"override_transition_sec": "soon"},
+            r'keyframes\[1\]: "override_transition_sec" must be .* got "soon"',
+        ),
+        (
+            {"override_transition_sec": 0},
+            r"keyframes\[0\]: the time to the next key is 0 s; give 0.01 to 3600",
+        ),
+        ({"cagefield_parts": [1]}, r'keyframes\[1\]: "cagefield_parts" must give numbers from 0 to 1'),
+        ({"cagefield_parts": {"arm": 1}}, r'keyframes\[1\]: "cagefield_parts" must give numbers from 0 to 1'),
+        ({"cagefield_parts": {"3": 7}}, r"keyframes\[1\]: the part of edit 3 is 7; give 0 to 1"),
+        (
+            {"cagefield_parts": {"0": 1}},
+            r"keyframes\[1\]: a part of edit 0 is given; edits are numbered from 1",
+        ),
+    ],
+)
+def test_a_bad_value_in_a_file_is_named_with_its_cure(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    document = json.loads(dump_path((key(0.0), key(1.0)), loop=False))
+    document["keyframes"][1] |= change
+    file = tmp_path / "path.json"
+    file.write_text(json.dumps(document))
+    with pytest.raises(CameraError, match=r"path\.json: " + message):
         load_keys(file)
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"keyframes": [3]}, r'keyframes\[0\]: a keyframe must have the keys "matrix" and "fov", got 3'),
+        ({"default_transition_sec": "x"}, '"default_transition_sec" must be a number, got "x"'),
+        ({"is_cycle": 1}, '"is_cycle" is 1; give true or false'),
+    ],
+)
+def test_a_bad_value_beside_the_keys_is_named(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    document = json.loads(dump_path((key(0.0), key(1.0)), loop=False)) | change
+    file = tmp_path / "path.json"
+    file.write_text(json.dumps(document))
+    with pytest.raises(CameraError, match=message):
+        load_keys(file)
+
+
+def test_a_camera_path_is_told_from_edits_even_when_damaged() -> None:
+    text = dump_path((key(0.0),), loop=False)
+    assert is_path(text) and is_path(text[:60])
+    assert not is_path('{"edits": [{"name": "camera_path"}]}') and not is_path("edits: []")
+
+
 def test_impossible_keys_are_refused() -> None:
-    pose = tuple(np.eye(4).reshape(-1))
+    pose = tuple(POSE)
     with pytest.raises(CameraError, match="16 finite numbers"):
         Keyframe((1.0,), 50.0)
-    with pytest.raises(CameraError, match="field of view"):
+    with pytest.raises(CameraError, match="not a rigid motion"):
+        Keyframe((0.0,) * 15 + (1.0,), 50.0)
+    with pytest.raises(CameraError, match=r"field of view is 180; give 0.2 to 178 degrees"):
         Keyframe(pose, 180.0)
-    with pytest.raises(CameraError, match="seconds"):
-        Keyframe(pose, 50.0, 0.0)
+    for seconds in (0.0, math.inf, math.nan):
+        with pytest.raises(CameraError, match="the time to the next key is"):
+            Keyframe(pose, 50.0, seconds)
+    with pytest.raises(CameraError, match="part of edit 2 is -1; give 0 to 1"):
+        Keyframe(pose, 50.0, 1.0, {2: -1.0})
 
 
 def test_the_files_aspect_is_the_pictures(tmp_path: Path) -> None:

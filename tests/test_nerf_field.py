@@ -35,7 +35,7 @@ except ValueError as error:
         cwd=__file__.rpartition("/")[0],
         check=True,
     )
-    assert done.stdout == ("this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'\n")
+    assert done.stdout == ("this NeRF needs PyTorch, which is not installed; pip install torch\n")
     assert isinstance(small_field(), Field)
 
 
@@ -46,6 +46,7 @@ except ValueError as error:
         ({"near": 0.0, "lindisp": True}, "near must be above 0 where samples are even in 1/depth"),
         ({"samples": (2, 8)}, r"samples must be \(coarse from 3, fine from 0\)"),
         ({"ndc": (0.0, 1.0)}, "ndc must be two ratios"),
+        ({"ndc": (0.6, 0.5), "bounded": True}, "goes on to infinity; leave out bounded"),
     ],
 )
 def test_impossible_sampling_is_refused(options, message) -> None:
@@ -110,6 +111,25 @@ def test_many_directions_share_one_trunk() -> None:
         expected = field(p, d[:, k])
         np.testing.assert_allclose(sigma, expected[0], rtol=1e-5, atol=1e-6)
         np.testing.assert_allclose(rgb[:, k], expected[1], rtol=1e-4, atol=1e-5)
+
+
+def test_a_bounded_field_is_empty_outside_its_bounds_and_the_same_within() -> None:
+    whole, bounded = small_field(), small_field(bounded=True)
+    p = np.random.default_rng(2).uniform(-3.0, 3.0, (6000, 3)).astype(np.float32)
+    d = directions(6000)
+    inside = (np.abs(p) <= 1.5).all(axis=1)
+    sigma, rgb = whole(p, d)
+    assert sigma[~inside].max() > 1.0
+    found, colour = bounded(p, d)
+    # the same positions, in other blocks
+    np.testing.assert_allclose(found, np.where(inside, sigma, 0.0), atol=1e-4)
+    np.testing.assert_allclose(colour[inside], rgb[inside], atol=1e-5)
+    np.testing.assert_allclose(
+        bounded.seen_along(p, np.stack([d, -d], axis=1))[0], np.where(inside, sigma, 0.0), atol=1e-4
+    )
+    raw = bounded.signed_density(p, d)
+    assert raw[~inside].max() <= 0.0 and np.any(raw[inside] > 1.0)
+    assert bounded(p[~inside], d[~inside])[0].max() == 0.0
 
 
 def test_ndc_stretch_is_the_length_of_the_finite_difference() -> None:
@@ -277,13 +297,14 @@ def test_kernels_take_tensors_themselves() -> None:
         np.testing.assert_array_equal(one.numpy(), other.numpy())
 
 
-def test_moving_everything_with_the_camera_gives_the_same_picture() -> None:
+# The cage holds all that the camera's rays meet between near and far; of a bounded field its bounds do.
+@pytest.mark.parametrize(("bounded", "size"), [(False, 40.0), (True, 3.2)])
+def test_moving_everything_with_the_camera_gives_the_same_picture(bounded, size) -> None:
     """All of the field moved rigidly inside one cage, and the camera with it."""
-    field = small_field(samples=(24, 32))
+    field = small_field(samples=(24, 32), bounded=bounded)
     shift = np.array([0.7, -0.3, 0.2])
     turn = 0.5
-    # the cage holds all that the camera's rays meet between near and far
-    edit = Edit(Cage.box((0, 0, 0), 40.0), adjustment="discrete").rotate((0, 0, turn)).translate(shift)
+    edit = Edit(Cage.box((0, 0, 0), size), adjustment="discrete").rotate((0, 0, turn)).translate(shift)
     R = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = R, shift

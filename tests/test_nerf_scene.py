@@ -46,6 +46,7 @@ def equal(one: NerfField, other: NerfField) -> bool:
         small_field(),
         small_field(lindisp=True, near=1.5, samples=(8, 0)),
         small_field(ndc=(0.6, 0.45), near=0.0, far=1.0),
+        small_field(bounded=True),
         NerfField(dataclasses.replace(small_mlp(), rectified_feature=True), None, [[-1] * 3, [2] * 3]),
     ],
 )
@@ -131,6 +132,14 @@ def test_configs_of_both_projects_are_read(tmp_path) -> None:
         ("args.txt", "hello\n", 'no line "key = value" in it'),
         ("config.yml", "dataset: {near: 1}\n", "not a nerf-pytorch config"),
         ("config.yml", "a: [", "not a readable config"),
+        ("args.txt", "title = other\nlrate = 1\n", "it has none of N_importance, .*; give the config of"),
+        ("config.yml", "a: 1\n", r"not a nerf-pytorch config \('dataset' is missing\); give the config of"),
+        ("args.txt", "dataset_type = llff\nno_ndc = True\n", "no_ndc = True: .* is not read; train it here"),
+        (
+            "config.yml",
+            "dataset: {near: 6, far: 2, no_ndc: true}\nnerf: {validation: {num_coarse: 10, num_fine: 20}}\n",
+            "near is 6 and far 2; they must satisfy",
+        ),
         (
             "config.yml",
             "dataset: {near: 1, far: 3, no_ndc: true}\nmodels: {coarse: {log_sampling_xyz: false}}\n"
@@ -308,8 +317,10 @@ def test_baking_anew_changes_the_voxels_alone(scene, tmp_path, capsys) -> None:
     for one, other in zip(kept.coarse.layers(), was.coarse.layers(), strict=True):
         np.testing.assert_array_equal(one[1].weight, other[1].weight)
     assert max(Scene.open(tmp_path / "new").field.resolution) == 20
+    dataclasses.replace(Scene.open(scene), preserve_opacity=False).save(tmp_path / "new", overwrite=True)
     printed(capsys, "bake", tmp_path / "new", "--overwrite", "--resolution", 16, "--compare", 0)
-    assert max(Scene.open(tmp_path / "new").field.resolution) == 16
+    again = Scene.open(tmp_path / "new")
+    assert max(again.field.resolution) == 16 and not again.preserve_opacity
 
 
 def test_agreement_is_the_psnr_of_the_pictures(scene) -> None:

@@ -37,6 +37,11 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
     assert float(seconds) < 1.0
 
 
+def test_kernel_modules_print_nothing() -> None:
+    done = in_new_process("import cagefield.warps.device_stack, cagefield.rendering.march")
+    assert done.stdout == done.stderr == ""
+
+
 def test_every_export_is_what_it_says() -> None:
     names = [name for name in dir(cagefield) if name != "__version__"]
     assert {"Cage", "Camera", "Edit", "EditStack", "Scene", "VoxelField", "load_dataset"} <= set(names)

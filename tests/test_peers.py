@@ -20,7 +20,7 @@ from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.hexahedron import Array
-from cagefield.warps.device import DeviceStack
+from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.hexahedron import HexahedronMap
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)

@@ -14,7 +14,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
 from cagefield.fields.voxel import VoxelField
-from cagefield.scene import check_destination
+from cagefield.scene_files import check_destination
 from cagefield.training.voxel import TrainResult
 from scenes import ball_field, ball_scene, files_of
 
@@ -286,3 +286,10 @@ def test_unbounded_scenes_render_beyond_their_box() -> None:
     fused, exact = scene.render(camera), scene.render(camera, exact=True)
     assert np.abs(fused.opacity - exact.opacity).mean() < 0.02
     assert fused.opacity.mean() > 0.05
+
+
+def test_edits_that_are_no_stack_are_refused() -> None:
+    edit = Edit.delete(Cage.box((0, 0, 0), 0.2))
+    assert list(ball_scene().with_edits(EditStack([edit])).edits) == [edit]
+    with pytest.raises(SceneError, match=r"edits must be an EditStack, got list; give EditStack\(\["):
+        ball_scene().with_edits([edit])  # type: ignore[arg-type]

@@ -12,8 +12,8 @@ from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.server import desk as module
 from cagefield.server.desk import RESTARTS, Chore, Desk, Stamp
+from cagefield.server.pictures import Request
 from cagefield.server.regions import WHOLE, Rect
-from cagefield.server.scheduler import Request
 from cagefield.server.tasks import (
     Answered,
     Failed,

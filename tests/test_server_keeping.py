@@ -11,7 +11,8 @@ import pytest
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Translate, load_edits, save_edits
 from cagefield.errors import SceneError
-from cagefield.keyframes import Keyframe, load_keys
+from cagefield.keyframe_files import load_keys
+from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
 from cagefield.server.keeping import Keeper
 from cagefield.server.session import Session

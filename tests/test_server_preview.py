@@ -15,7 +15,7 @@ from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Translate, dump_edits
 from cagefield.errors import CagefieldError, CameraError, EditError
 from cagefield.keyframes import Keyframe, stills
-from cagefield.server import protocol
+from cagefield.server import from_page, wire
 from cagefield.server.blending import blended
 from cagefield.server.converting import MOST_STILLS, STILLS_PER_SECOND, stills_of
 from cagefield.server.document import Document
@@ -196,7 +196,7 @@ class Played:
         self.heard()
 
     def say(self, page: int, kind: str, **values: Any) -> None:
-        message = protocol.page_messages.validate_python({"type": kind, **values})
+        message = from_page.page_messages.validate_python({"type": kind, **values})
         rest = self.speakers[page].hear(message)
         assert rest is None
 
@@ -308,16 +308,16 @@ def test_of_messages_on_the_way_along_the_path_only_the_newest_wait() -> None:
     inbox = Inbox()
     pose = np.eye(4).reshape(-1).tolist()
 
-    def camera(seq: int) -> protocol.CameraMessage:
-        return protocol.CameraMessage(seq=seq, c2w=pose, width=64, height=64, fov_y_deg=50.0, moving=True)
+    def camera(seq: int) -> wire.CameraMessage:
+        return wire.CameraMessage(seq=seq, c2w=pose, width=64, height=64, fov_y_deg=50.0, moving=True)
 
-    begin, end = protocol.PlayBegin(play=1), protocol.PlayEnd(play=1)
+    begin, end = from_page.PlayBegin(play=1), from_page.PlayEnd(play=1)
     for message in (
         begin,
-        *(m for n in range(5) for m in (protocol.Play(play=1, seconds=n), camera(n))),
+        *(m for n in range(5) for m in (from_page.Play(play=1, seconds=n), camera(n))),
         end,
         camera(9),
     ):
         inbox.put(message)
     waiting = list(inbox._waiting)
-    assert waiting == [begin, protocol.Play(play=1, seconds=4), camera(4), end, camera(9)]
+    assert waiting == [begin, from_page.Play(play=1, seconds=4), camera(4), end, camera(9)]

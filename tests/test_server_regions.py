@@ -12,8 +12,9 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
+from cagefield.server.pictures import Look, Region, Request
 from cagefield.server.regions import WHOLE, Rect, Showing, joined, pixels, seen, tiles
-from cagefield.server.scheduler import SETTLE_SECONDS, Look, Region, Request, Scheduler
+from cagefield.server.scheduler import SETTLE_SECONDS, Scheduler
 from cagefield.server.studio import Studio
 from cagefield.server.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from scenes import ball_scene

@@ -4,15 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cagefield.server.scheduler import (
-    MOST_MOVING,
-    MOST_TILES,
-    MOVING_SECONDS,
-    SETTLE_SECONDS,
-    Look,
-    Request,
-    Scheduler,
-)
+from cagefield.server.pictures import Look, Request
+from cagefield.server.scheduler import MOST_MOVING, MOST_TILES, MOVING_SECONDS, SETTLE_SECONDS, Scheduler
 
 SIDE = 800
 RATE = 1e6

@@ -25,8 +25,8 @@ from websockets.sync.client import connect
 from cagefield.edits import load_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.hub import Page
-from cagefield.server.protocol import MOST_BYTES
 from cagefield.server.sockets import _told
+from cagefield.server.wire import MOST_BYTES
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from sent_pictures import pixels_of

@@ -22,8 +22,8 @@ from cagefield.server.blending import blended
 from cagefield.server.chores import Chores
 from cagefield.server.document import Document
 from cagefield.server.grid_lines import grid_lines
+from cagefield.server.pictures import Look, Region
 from cagefield.server.placing import PROBES, fitted, probes
-from cagefield.server.scheduler import Look, Region
 from cagefield.server.studio import Studio
 from cagefield.server.tasks import (
     WARM_STAGES,

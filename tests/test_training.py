@@ -16,7 +16,8 @@ from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
 from cagefield.training.filling import OPAQUE
 from cagefield.training.progress import Snapshots
-from cagefield.training.voxel import VoxelConfig, train_voxel
+from cagefield.training.voxel import train_voxel
+from cagefield.training.voxel_config import VoxelConfig
 
 devices.start("cpu")
 
@@ -78,6 +79,17 @@ def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path)
     assert second.finished
     np.testing.assert_array_equal(second.field.vertices, trained.field.vertices)
     np.testing.assert_array_equal(second.field.density, trained.field.density)
+
+    def no_step(progress):
+        raise AssertionError("a finished run took a step")
+
+    written = checkpoint.stat().st_mtime_ns
+    third = train_voxel(
+        dataset, CONFIG, checkpoint=checkpoint, resume=True, on_progress=no_step, evaluate=False
+    )
+    assert third.finished and third.steps == 150
+    assert checkpoint.stat().st_mtime_ns == written
+    np.testing.assert_array_equal(third.field.density, trained.field.density)
 
 
 def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, trained):

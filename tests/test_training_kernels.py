@@ -13,10 +13,11 @@ from cagefield.loops import deal_of
 devices.start("cpu")
 
 from cagefield.rendering.grid import ivec3, to_device, vec3  # noqa: E402
-from cagefield.training import kernels  # noqa: E402
 from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
-from cagefield.training.kernels import HEAD  # noqa: E402
+from cagefield.training.march_kernel import MOST_SAMPLES, SAMPLE, march_batch  # noqa: E402
 from cagefield.training.photos import Photos  # noqa: E402
+from cagefield.training.records import HEAD  # noqa: E402
+from cagefield.training.update_kernels import gauss_newton, laplacian  # noqa: E402
 
 SIZE = 8
 N = 9
@@ -56,7 +57,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 
     rays = len(patches) * 16
     losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
     penalties = to_device(np.zeros(rays, np.float32))
-    scratch = to_device(np.zeros(grid.workers * kernels.MOST_SAMPLES * kernels.SAMPLE, np.float32))
+    scratch = to_device(np.zeros(grid.workers * MOST_SAMPLES * SAMPLE, np.float32))
     grid.accumulator.fill(0.0)
     if grid.contracted:
         lower, scale = np.zeros(3), np.full(3, 1 / 0.8)
@@ -64,7 +65,7 @@ def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 
     else:
         lower, scale = grid.bounds[0], (N - 1) / (grid.bounds[1] - grid.bounds[0])
         step = 0.7 / scale.max()
-    kernels.march_batch(
+    march_batch(
         to_device(patches),
         len(patches),
         4,
@@ -172,7 +173,7 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
     records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).sum(axis=0).astype(np.float64)
     before_density, before_sh, _, _ = grid.arrays()
     h = grid.cell.to_numpy()[1:].astype(np.float64)
-    kernels.gauss_newton(
+    gauss_newton(
         grid.density,
         grid.sh,
         grid.state,
@@ -208,7 +209,7 @@ def test_laplacian_is_the_gradient_of_neighbour_differences(tmp_path):
     data, grid = photos(tmp_path), state(1, False)
     march(grid, data, np.ones((3, 3)))
     before = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, -1).copy()
-    kernels.laplacian(
+    laplacian(
         grid.density,
         grid.sh,
         grid.index,

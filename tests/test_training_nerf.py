@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from cagefield import Scene, load_dataset
+from cagefield.cli import bake, main
 from cagefield.datasets.procedural import make_scene
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, FieldError
 from commands import printed, refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
@@ -34,11 +35,11 @@ def tiny(**options) -> NerfConfig:
 def test_it_learns(photos) -> None:
     dataset = load_dataset(photos)
     before = train_nerf(dataset, tiny(steps=1))
-    after = train_nerf(dataset, tiny(steps=150))
-    assert after.finished and after.steps == 150
-    # an untrained network shows grey fog; 150 steps find the background and the shape
-    assert after.train_psnr > before.train_psnr + 5.0
-    assert after.test_psnr > before.test_psnr + 4.0
+    after = train_nerf(dataset, tiny(steps=400))
+    assert after.finished and after.steps == 400
+    # an untrained network shows grey fog in the box around the scene; 400 steps find the shape
+    assert after.train_psnr > before.train_psnr + 3.0
+    assert after.test_psnr > before.test_psnr + 2.0
 
 
 def test_a_resumed_run_ends_where_an_uninterrupted_one_does(photos, tmp_path) -> None:
@@ -125,6 +126,7 @@ def test_a_field_without_fine_samples_has_one_network(photos) -> None:
         ({"depth": 0}, "depth is 0"),
         ({"width": 1}, "width is 1"),
         ({"batch_rays": 0}, "batch_rays is 0"),
+        ({"octaves": (-1, 4)}, r"octaves are \(-1, 4\); each must be from 0 to 16"),
         ({"minutes": -1.0}, "minutes is -1.0; it must be above 0"),
         ({"rate": 2.0}, "rate is 2.0; it must be between 0 and 1"),
     ],
@@ -154,3 +156,56 @@ def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, m
     monkeypatch.setitem(__import__("sys").modules, "cagefield.training.nerf", None)
     message = refused(capsys, "train", photos, "-o", tmp_path / "other", "--field", "nerf")
     assert "--field nerf needs PyTorch" in message
+
+
+@pytest.mark.parametrize(("words", "degree"), [([], 2), (["--sh-degree", 0], 0)])
+def test_the_voxels_of_a_nerf_have_the_degree_that_is_asked_for(
+    photos, tmp_path, monkeypatch, words, degree
+) -> None:
+    monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
+    found = []
+
+    def asked(original, cameras, background, options, **_) -> None:
+        found.append(options.sh_degree)
+        raise FieldError("enough")
+
+    monkeypatch.setattr(bake, "bake_scene", asked)
+    argv = ["train", photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 1, *words]
+    assert main([str(word) for word in argv]) == 2
+    assert found == [degree]
+
+
+def test_a_training_whose_baking_failed_is_kept(photos, tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
+    argv = [photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 60, "--resolution", 24]
+    bake_scene = bake.bake_scene
+
+    def fails(error: BaseException) -> None:
+        def raised(*arguments, **options):
+            raise error
+
+        monkeypatch.setattr(bake, "bake_scene", raised)
+
+    def names() -> list[str]:
+        return [entry.name for entry in tmp_path.iterdir()]
+
+    fails(FieldError("nothing to bake"))
+    capsys.readouterr()
+    assert main([str(arg) for arg in ("train", *argv)]) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    kept = "the training is kept: the same command with --resume goes straight to baking"
+    assert line == f"cagefield: nothing to bake; {kept}"
+    assert names() == ["scene.training"]
+    assert "give --resume to go on, or --overwrite" in refused(capsys, "train", *argv)
+    message = refused(capsys, "train", photos, "-o", tmp_path / "scene", "--steps", 2, "--resume")
+    assert "another kind of training; give the field that it was started with" in message
+
+    monkeypatch.setattr(training._Run, "advance", lambda run: pytest.fail("a finished run took a step"))
+    fails(KeyboardInterrupt())
+    assert main([str(arg) for arg in ("train", *argv, "--resume")]) == 130
+    assert capsys.readouterr().out == f"{kept}\n"
+    assert names() == ["scene.training"]
+
+    monkeypatch.setattr(bake, "bake_scene", bake_scene)
+    assert "60 steps, networks of 3 x 24" in printed(capsys, "train", *argv, "--resume")
+    assert names() == ["scene"]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from cagefield import devices
 from cagefield.cameras import Camera
 from cagefield.fields.seen import seen_by
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.renderer import Renderer
-from cagefield.training.filling import DEPTH, OPAQUE, filled
+from cagefield.training import filling
+from cagefield.training.filling import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
 from cagefield.training.unseen import LEAST_TRANSMITTANCE, unseen
 
 devices.start("cpu")
@@ -147,6 +150,67 @@ def test_under_a_block_the_ground_goes_on() -> None:
     # Two planes meet here: the ground's, and those of the block's sides, which end at it.
     assert (green > red).all()
     assert green.mean() > 0.7
+
+
+def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
+    ball, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    field, hidden = ball
+    whole = filled(field, hidden)
+    swept = filling._swept
+    calls = []
+    # Sweeps bring colours one voxel on each: DEPTH of them reach all that is filled of a ball.
+    monkeypatch.setattr(filling, "MOST_STEPS", DEPTH + 2)
+    monkeypatch.setattr(filling, "_swept", lambda *system: calls.append(1) or swept(*system))
+    short = filled(field, hidden)
+    assert len(calls) == 3  # each of the three axes
+    np.testing.assert_array_equal(short.vertices, whole.vertices)
+    np.testing.assert_array_equal(short.density, whole.density)
+    at = np.searchsorted(whole.vertices, np.flatnonzero(hidden & (dense(whole)[0] > 0)))
+    colour, given = short.sh[at, 0], field.sh[:, 0]
+    assert (colour >= given.min(axis=0) - 1e-6).all() and (colour <= given.max(axis=0) + 1e-6).all()
+    assert not np.array_equal(colour, whole.sh[at, 0])
+    # It is the surfaces' colours, not grey: as they run, red comes with x and blue goes.
+    x = grid().reshape(-1, 3)[whole.vertices[at], 0]
+    assert colour[x > 0.3, 0].min() > 0.25 and colour[x < -0.3, 0].max() < -0.25
+
+
+def block(n: int = 16) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """The system (pull, diagonal) of a block that nothing holds but its sources: no eigenvalue is smaller."""
+    number = np.arange(n**3).reshape(n, n, n)
+    pull = sparse.csr_matrix((n**3, n**3))
+    for axis, share in enumerate(REACH**2 * np.array([1.0, 1.0, ACROSS])):
+        a, b = filling._links(number, number, axis)
+        pull += sparse.csr_matrix((np.full(len(a), share), (a, b)), pull.shape)
+    return pull, 1.0 + np.asarray(pull.sum(axis=1))[:, 0]
+
+
+def test_the_bound_on_the_steps_holds_where_the_system_is_hardest(monkeypatch: pytest.MonkeyPatch) -> None:
+    pull, diagonal = block()
+    source = np.zeros((len(diagonal), 2))
+    source[0] = 1.0, -0.5
+
+    def never(*system):
+        raise AssertionError("not solved within the bound")
+
+    monkeypatch.setattr(filling, "MOST_STEPS", 111)
+    monkeypatch.setattr(filling, "_swept", never)
+    found = filling._solved(pull, diagonal, source)
+    direct = spsolve((sparse.diags(diagonal) - pull).tocsc(), source[:, 0])
+    # No eigenvalue is under 1, so the error is at most the residual.
+    assert np.linalg.norm(found - direct[:, None] * source[0]) < TOLERANCE * np.linalg.norm(source[0])
+
+
+def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    pull, diagonal = block()
+    source = np.zeros((len(diagonal), 2))
+    source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
+    monkeypatch.setattr(filling, "MOST_STEPS", 40)
+    weight, colour = filling._solved(pull, diagonal, source).T
+    # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
+    assert (weight > 0).all()
+    assert (colour >= 0).all() and (colour <= weight).all()
+    assert colour[0] > 0.99 * weight[0] and colour[-1] < 0.01 * weight[-1]
 
 
 def test_nothing_unseen_and_nothing_solid_leave_the_field_as_it_is(ball) -> None:

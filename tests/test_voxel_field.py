@@ -79,6 +79,12 @@ def test_file_round_trip_is_exact(tmp_path):
     assert again.contracted is False
 
 
+def test_a_file_may_be_read_by_whom_other_new_files_may(tmp_path):
+    (tmp_path / "other").touch()
+    linear_field(1).save(tmp_path / "field.safetensors")
+    assert (tmp_path / "field.safetensors").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
 def test_truncated_file_is_one_clear_error(tmp_path):
     path = tmp_path / "f.safetensors"
     linear_field().save(path)

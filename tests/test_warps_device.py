@@ -42,7 +42,7 @@ def off_faces(stack: EditStack, p: np.ndarray, margin: float = 1e-4) -> np.ndarr
 
 
 def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     expected = stack.to_canonical(p, d)
     points, viewdirs, stretch, emptied = DeviceStack.from_stack(stack).to_canonical(p, d)
@@ -107,7 +107,7 @@ def test_lattice_path_against_the_reference(name: str) -> None:
 
 
 def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     edits_ = [
         STACKS["affine"][0].replace(lattice=9),
@@ -120,7 +120,7 @@ def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
 
 
 def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     stack = EditStack(STACKS["chain"])
     packed = DeviceStack.from_stack(stack)
@@ -140,7 +140,7 @@ def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
 
 
 def test_boxes() -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     move = STACKS["move"][0]
     packed = DeviceStack.from_stack(
@@ -157,7 +157,7 @@ def test_boxes() -> None:
 
 @pytest.mark.parametrize("turn", [1.0, np.pi])
 def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
-    from cagefield.warps.device import DeviceStack
+    from cagefield.warps.device_stack import DeviceStack
 
     folded = EditStack([Edit(INNER, OUTER, shell="trilinear", allow_folding=True).rotate((0, 0, turn))])
     p, d = samples(5000)
@@ -168,11 +168,15 @@ def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
     assert (np.abs(points[within]) <= 0.8 + 1e-5).all() and np.array_equal(points[~within], p[~within])
 
 
-def test_lattices_are_kept_with_their_edit() -> None:
-    from cagefield.warps import device
+def test_lattices_are_kept_with_their_edit(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cagefield.warps import edit_lattice
+    from cagefield.warps.device_stack import DeviceStack
 
     edit = STACKS["affine"][0].replace(lattice=8)
-    device.DeviceStack.from_stack(EditStack([edit]))
-    kept = device._lattices[edit]
-    device.DeviceStack.from_stack(EditStack([edit, STACKS["move"][0]]))
-    assert device._lattices[edit] is kept
+    DeviceStack.from_stack(EditStack([edit]))
+    sampled: list[object] = []
+    monkeypatch.setattr(edit_lattice, "_sample_lattice", lambda *arguments: sampled.append(arguments))
+    DeviceStack.from_stack(EditStack([edit, STACKS["move"][0]]))
+    assert not sampled
+    DeviceStack.from_stack(EditStack([edit.translate((0.01, 0, 0))]))
+    assert len(sampled) == 1

@@ -9,7 +9,7 @@ const python = process.env.PYTHON ?? "python3";
 const schema = JSON.parse(execFileSync(python, ["-m", "cagefield.server.schema"], { encoding: "utf8" }));
 const compiled = await compile(schema, "Protocol", {
   additionalProperties: false,
-  bannerComment: "// Made by `npm run protocol` from src/cagefield/server/protocol.py; change that.",
+  bannerComment: "// Made by `npm run protocol` from what src/cagefield/server/schema.py collects; change that.",
   unreachableDefinitions: true,
   strictIndexSignatures: true,
   style: { printWidth: 110 },
@@ -23,6 +23,6 @@ const types = compiled
 if (!process.argv.includes("--check")) {
   writeFileSync(target, types);
 } else if (readFileSync(target, "utf8") !== types) {
-  console.error("web/src/protocol.ts is not what protocol.py says: run `npm run protocol`");
+  console.error("web/src/protocol.ts is not what the server says: run `npm run protocol`");
   process.exit(1);
 }

@@ -6,9 +6,13 @@ The names below are imported on first use: `import cagefield` stays quick and lo
 from __future__ import annotations
 
 import importlib
+import os
 from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+
+# Quadrants prints a line about itself when it is imported, which kernel modules do.
+os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
 
 if TYPE_CHECKING:
     from cagefield.cages import Cage as Cage

@@ -6,27 +6,18 @@ Quadrants is imported here and in the kernel modules only, never by ``import cag
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import io
 import os
-import shutil
-import time
 import warnings
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import DeviceError
+from cagefield.kernel_cache import forgive, kernel_cache
 
 DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
-
-KEPT_SECONDS = 30 * 86400.0
-"""How long kernels of other versions of the package are kept after they were last used."""
-
-LOCKED_SECONDS = 60.0
-"""How long a process may hold the lock of a folder of kernels: it writes a few megabytes."""
 
 _started: str | None = None
 
@@ -51,7 +42,6 @@ def start(device: str = "auto", *, double: bool = False) -> str:
                 "start a new process for another device"
             )
         return _started
-    os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
     import quadrants as qd
 
     qd.set_logging_level("error")
@@ -81,6 +71,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
             )
     except Exception as error:
         raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
+    forgive()
     _started = chosen
     return chosen
 
@@ -115,48 +106,6 @@ def floats(values: ArrayLike) -> NDArray[np.float64]:
 def ints(values: ArrayLike) -> NDArray[np.int32]:
     """A vector of integers as an argument of a kernel; see `floats`."""
     return np.asarray(values, dtype=np.int32)
-
-
-def kernel_cache() -> Path | None:
-    """The folder of the compiled kernels of this state of the package's source; None where none can be made.
-
-    Quadrants finds a kernel again by the source of its functions, without the constants that they name: two
-    states of the packages that hold kernels must not share a folder. Folders that nobody used for long are
-    removed.
-    """
-    try:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
-        folder = base / _source_digest()
-        folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-    except (OSError, RuntimeError):
-        return None
-    _tidy(folder)
-    return folder
-
-
-def _tidy(folder: Path) -> None:
-    """Removes what nobody needs beside a folder of kernels, and the lock of a process that died with it."""
-    with contextlib.suppress(OSError):
-        for other in list(folder.parent.iterdir()):
-            with contextlib.suppress(OSError):
-                if time.time() - other.stat().st_mtime > KEPT_SECONDS:
-                    shutil.rmtree(other, ignore_errors=True)
-    lock = folder / "kernel_compilation_manager" / "qdcache.lock"
-    with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
-            lock.unlink()
-
-
-def _source_digest() -> str:
-    """A digest of the source in all folders that hold kernels."""
-    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
-    folders = {path.parent for path, source in sources.items() if b"import quadrants" in source}
-    digest = hashlib.sha256()
-    for path, source in sources.items():
-        if path.parent in folders:
-            digest.update(source)
-    return digest.hexdigest()[:16]
 
 
 def parts() -> int:

@@ -1,6 +1,14 @@
-"""Errors that a user can act on: each names the value, the allowed range and the cure."""
+"""Errors that a user can act on: each names the value, the allowed range and the cure.
+
+Warnings are shown alike.
+"""
 
 from __future__ import annotations
+
+import contextlib
+import sys
+import warnings
+from collections.abc import Iterator
 
 
 class CagefieldError(ValueError):
@@ -37,3 +45,16 @@ class SceneError(CagefieldError):
 
 class DeviceError(CagefieldError):
     """A compute device that is not there."""
+
+
+@contextlib.contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Shows warnings as a line on stderr, without their place in the source."""
+
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+        if issubclass(category, UserWarning):
+            print("cagefield: warning: " + " ".join(str(message).split()), file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield

@@ -2,17 +2,14 @@
 
 Between keys the eye runs on a natural cubic spline, the direction on a rotation spline, and the field of view
 and the edits' parts on monotone cubics, which never leave the range of the keys beside them. A loop goes from
-the last key back to the first one, smoothly. The files are nerfstudio's camera paths, keyframes included; the
-edits' parts and a key's seconds stand in them under names that nerfstudio passes over.
+the last key back to the first one, smoothly.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -25,6 +22,12 @@ from cagefield.cameras import Camera
 from cagefield.errors import CameraError
 
 Floats = npt.NDArray[np.float64]
+
+FOV_Y_DEG = (0.2, 178.0)
+"""Least and largest vertical field of view."""
+
+SECONDS = (0.01, 3600.0)
+"""Least and longest time from a key to the next."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +43,24 @@ class Keyframe:
     parts: Mapping[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Raises CameraError for a pose that is not rigid, and for numbers that are out of range."""
         object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
         if len(self.c2w) != 16 or not all(map(math.isfinite, self.c2w)):
-            raise CameraError("a keyframe's c2w must hold 16 finite numbers, row by row")
-        if not 0.0 < self.fov_y_deg < 180.0:
-            raise CameraError(f"a keyframe's field of view is {self.fov_y_deg}; give 0 to 180 degrees")
-        if not self.seconds > 0.0:
-            raise CameraError(f"a keyframe's seconds are {self.seconds}; give a number above 0")
+            raise CameraError("the camera (c2w) must hold 16 finite numbers, row by row")
+        Camera(self.pose, 1, 1, 1.0, 1.0, 0.5, 0.5)
+        if not FOV_Y_DEG[0] <= self.fov_y_deg <= FOV_Y_DEG[1]:
+            raise CameraError(
+                f"the field of view is {self.fov_y_deg:g}; give {FOV_Y_DEG[0]:g} to {FOV_Y_DEG[1]:g} degrees"
+            )
+        if not SECONDS[0] <= self.seconds <= SECONDS[1]:
+            raise CameraError(
+                f"the time to the next key is {self.seconds:g} s; give {SECONDS[0]:g} to {SECONDS[1]:g}"
+            )
+        for name, part in self.parts.items():
+            if name < 1:
+                raise CameraError(f"a part of edit {name} is given; edits are numbered from 1")
+            if not 0.0 <= part <= 1.0:
+                raise CameraError(f"the part of edit {name} is {part:g}; give 0 to 1")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Keyframe, (self.c2w, self.fov_y_deg, self.seconds, dict(self.parts))
@@ -147,73 +161,3 @@ def _turns(matrices: list[Floats], times: Floats, loop: bool) -> RotationSpline:
 def _still(pose: Floats, fov_y_deg: float, parts: dict[int, float], width: int, height: int) -> Still:
     focal = 0.5 * height / math.tan(0.5 * math.radians(fov_y_deg))
     return Still(Camera(pose, width, height, focal, focal, 0.5 * width, 0.5 * height), parts)
-
-
-def dump_path(
-    keys: Sequence[Keyframe], *, loop: bool, fps: float = 24.0, width: int = 800, height: int = 800
-) -> str:
-    """The text of a nerfstudio camera-path file: its keyframes, and a camera for each picture."""
-    pictures = stills(keys, loop=loop, fps=fps, width=width, height=height) if keys else ()
-    aspect = width / height
-    document = {
-        "camera_type": "perspective",
-        "render_height": height,
-        "render_width": width,
-        "fps": fps,
-        "seconds": len(pictures) / fps,
-        "is_cycle": loop,
-        "smoothness_value": 0.0,
-        "default_fov": keys[0].fov_y_deg if keys else 50.0,
-        "default_transition_sec": 2.0,
-        "keyframes": [
-            {
-                "matrix": list(key.c2w),
-                "fov": key.fov_y_deg,
-                "aspect": aspect,
-                "override_transition_enabled": True,
-                # nerfstudio's is the time from the key before; the first key's, that of a loop's last leg.
-                "override_transition_sec": keys[n - 1].seconds,
-                "cagefield_parts": {str(name): part for name, part in key.parts.items()},
-            }
-            for n, key in enumerate(keys)
-        ],
-        "camera_path": [
-            {
-                "camera_to_world": still.camera.c2w.reshape(-1).tolist(),
-                "fov": still.fov_y_deg,
-                "aspect": aspect,
-            }
-            for still in pictures
-        ],
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
-    """(keyframes, loop) of a nerfstudio camera-path file. Raises CameraError where it holds none."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        given = document["keyframes"]
-        usual = float(document.get("default_transition_sec", 2.0))
-        keys = tuple(
-            Keyframe(
-                tuple(float(value) for value in key["matrix"]),
-                float(key["fov"]),
-                _seconds(given[(n + 1) % len(given)], usual),
-                {int(name): float(part) for name, part in key.get("cagefield_parts", {}).items()},
-            )
-            for n, key in enumerate(given)
-        )
-        return keys, bool(document.get("is_cycle", False))
-    except CameraError as error:
-        raise CameraError(f"{path}: {error}") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise CameraError(
-            f"{path} holds no camera path's keyframes ({error}); remove it or write it again"
-        ) from None
-
-
-def _seconds(key: dict[str, Any], usual: float) -> float:
-    """The time from the key before to this one."""
-    own = key.get("override_transition_sec")
-    return usual if own is None or not key.get("override_transition_enabled", True) else float(own)

@@ -16,36 +16,45 @@ a half of each.
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import secrets
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
-from cagefield.errors import CagefieldError, SceneError
+from cagefield.errors import SceneError
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
+from cagefield.fields.seen import seen_by
 from cagefield.fields.voxel import VoxelField
 from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
+from cagefield.scene_files import (
+    CAMERAS,
+    EDITS,
+    FIELD,
+    FILES,
+    FORMAT,
+    MANIFEST,
+    ORIGINAL,
+    VERSION,
+    check_destination,
+    read_cameras,
+    read_manifest,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
     from cagefield.rendering.renderer import Renderer
     from cagefield.training.voxel import TrainResult
-
-FORMAT = "cagefield-scene"
-VERSION = 1
-
-_FIELD, _EDITS, _CAMERAS, _MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
-_ORIGINAL = "original.safetensors"
-_FILES = (_FIELD, _ORIGINAL, _EDITS, _CAMERAS, _MANIFEST)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -95,6 +104,38 @@ class Scene:
         )
 
     @classmethod
+    def baked(
+        cls,
+        original: NerfField,
+        cameras: Mapping[str, tuple[Camera, ...]],
+        background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
+        *,
+        resolution: int = 256,
+        sh_degree: int = 2,
+        unbounded: bool = False,
+        on_progress: Callable[[float], None] | None = None,
+    ) -> Scene:
+        """The scene of a field and its voxels, unedited; of an `unbounded` one what the cameras see is baked.
+
+        Raises:
+            FieldError: options outside their range, a field that is empty.
+        """
+        from cagefield.fields.baking import bake
+
+        every = [camera for group in cameras.values() for camera in group]
+        near = original.near if original.ndc is None else 0.0
+        voxels = bake(
+            original,
+            resolution,
+            sh_degree=sh_degree,
+            eyes=np.array([camera.origin for camera in every]) if every else None,
+            contracted=unbounded,
+            seen=partial(seen_by, every, near=near) if unbounded and every else None,
+            on_progress=on_progress,
+        )
+        return cls(voxels, cameras=cameras, background=background, original=original)
+
+    @classmethod
     def open(cls, path: Path | str) -> Scene:
         """The scene in the folder `path`; edits that cannot be evaluated are an error when it is rendered.
 
@@ -106,14 +147,14 @@ class Scene:
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        background, gains, preserve_opacity = _read_manifest(folder)
-        for name in (_FIELD, _CAMERAS, _EDITS):
+        background, gains, preserve_opacity = read_manifest(folder)
+        for name in (FIELD, CAMERAS, EDITS):
             if not (folder / name).is_file():
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
-        cameras = _read_cameras(folder / _CAMERAS)
-        edits = load_edits(folder / _EDITS, check=False)
-        field = VoxelField.load(folder / _FIELD)
-        original = load_nerf(folder / _ORIGINAL) if (folder / _ORIGINAL).is_file() else None
+        cameras = read_cameras(folder / CAMERAS)
+        edits = load_edits(folder / EDITS, check=False)
+        field = VoxelField.load(folder / FIELD)
+        original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).is_file() else None
         try:
             return cls(
                 field,
@@ -125,7 +166,7 @@ class Scene:
                 preserve_opacity=preserve_opacity,
             )
         except SceneError as error:
-            raise SceneError(f"{folder / _MANIFEST}: {error}") from None
+            raise SceneError(f"{folder / MANIFEST}: {error}") from None
 
     def save(self, path: Path | str, overwrite: bool = False) -> None:
         """Writes the scene folder `path`, complete or not at all.
@@ -137,14 +178,14 @@ class Scene:
             SceneError: something else is there, or a scene and no `overwrite`.
         """
         target = check_destination(path, overwrite)
-        with replaced_folder(target, _FILES) as draft:
-            self.field.save(draft / _FIELD)
+        with replaced_folder(target, FILES) as draft:
+            self.field.save(draft / FIELD)
             if self.original is not None:
-                save_nerf(self.original, draft / _ORIGINAL)
-            save_edits(self.edits, draft / _EDITS)
-            _write_json(
+                save_nerf(self.original, draft / ORIGINAL)
+            save_edits(self.edits, draft / EDITS)
+            write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
-                draft / _CAMERAS,
+                draft / CAMERAS,
             )
             self.save_manifest(draft)
 
@@ -159,12 +200,18 @@ class Scene:
             manifest["gains"] = self.gains
         if not self.preserve_opacity:
             manifest["preserve_opacity"] = False
-        draft = folder / f".{_MANIFEST}.{secrets.token_hex(4)}"
-        _write_json(manifest, draft)
-        draft.replace(folder / _MANIFEST)
+        draft = folder / f".{MANIFEST}.{secrets.token_hex(4)}"
+        write_json(manifest, draft)
+        draft.replace(folder / MANIFEST)
 
     def with_edits(self, edits: EditStack) -> Scene:
-        """The same scene under another edit stack."""
+        """The same scene under another edit stack.
+
+        Raises:
+            SceneError: something else than a stack.
+        """
+        if not isinstance(edits, EditStack):
+            raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
         return scene
@@ -244,37 +291,6 @@ class Scene:
         return origin.with_edits(self.edits, preserve_opacity=self.preserve_opacity)
 
 
-def check_destination(path: Path | str, overwrite: bool) -> Path:
-    """The resolved folder that a scene may be written to: new, empty, or a scene to be replaced.
-
-    Called before a long training, so that its result has a place to go.
-
-    Raises:
-        SceneError: something is there that may not be replaced.
-    """
-    target = Path(path).resolve()
-    if not target.exists():
-        return target
-    if not target.is_dir():
-        raise SceneError(f"{path} is a file; give a new folder for the scene")
-    if not any(target.iterdir()):
-        return target
-    if not is_scene(target):
-        raise SceneError(f"{path} is a folder that holds no scene and is left as it is; give a new folder")
-    if not overwrite:
-        raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
-    return target
-
-
-def is_scene(path: Path | str) -> bool:
-    """True where `path` is a folder with the manifest of a scene, of any version."""
-    try:
-        document = json.loads((Path(path) / _MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(document, dict) and document.get("format") == FORMAT
-
-
 def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
     """The gains as tuples, none or `count` of them."""
     try:
@@ -289,49 +305,6 @@ def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
     return gains
 
 
-def _read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool]:
-    """Background, gains, unchecked, and the opacity choice."""
-    path = folder / _MANIFEST
-    if not path.is_file():
-        raise SceneError(
-            f"folder {folder} holds no {_MANIFEST}: it is not a scene; give the folder of a scene"
-        )
-    document = _read_json(path)
-    if document.get("format") != FORMAT:
-        raise SceneError(
-            f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"; give a scene folder'
-        )
-    version = document.get("version")
-    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise SceneError(f"{path}: version is {version!r}, expected a whole number from 1 to {VERSION}")
-    if version > VERSION:
-        raise SceneError(
-            f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
-        )
-    opacity = document.get("preserve_opacity", True)
-    if not isinstance(opacity, bool):
-        raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
-    try:
-        return background_rgb(document.get("background")), document.get("gains", ()), opacity
-    except (CagefieldError, TypeError, ValueError) as error:
-        raise SceneError(f"{path}: {error}") from None
-
-
-def _read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
-    cameras: dict[str, tuple[Camera, ...]] = {}
-    for split, members in _read_json(path).items():
-        if not isinstance(members, list):
-            raise SceneError(f'{path}: "{split}" must be a list of cameras; write the scene again')
-        read = []
-        for index, member in enumerate(members):
-            try:
-                read.append(Camera.from_dict(member))
-            except (CagefieldError, KeyError, TypeError, AttributeError) as error:
-                raise SceneError(f"{path}: {split}[{index}] is no camera: {error}") from error
-        cameras[split] = tuple(read)
-    return cameras
-
-
 def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
     """Near and far distance from the camera that hold the field's box; 8 times that if unbounded."""
     lower, upper = voxels.bounds
@@ -339,17 +312,3 @@ def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
     distance = float(((0.5 * (lower + upper) - camera.origin) ** 2).sum()) ** 0.5
     reach = 8.0 if voxels.contracted else 1.0
     return max(0.0, distance - reach * radius), distance + reach * radius
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
-    if not isinstance(document, dict):
-        raise SceneError(f"{path} must hold a JSON object; copy it back or train again")
-    return document
-
-
-def _write_json(document: Mapping[str, object], path: Path) -> None:
-    path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -63,8 +63,8 @@ export class App {
   /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
   private undrawn: Arrived[] = [];
   private drawn: Arrived[] = [];
-  /** Whether the camera stands inside the field's bounds, whose middle then is nothing to orbit around. */
-  private amid = false;
+  /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
+  private orbitFrom: number | null = null;
   private placedAfter: number | null = null;
   /** When the figures below the picture were last set. */
   private figured = -Infinity;
@@ -78,6 +78,7 @@ export class App {
     this.camera = new CameraFeed(this.stage, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
     this.player = new Player(this);
+    this.stage.guessed.push(() => this.orbitGuessed());
     this.stage.beforeFrame.push(() => this.arrange());
     this.stage.beforeFrame.push(() => this.acknowledge());
     this.stage.afterFrame.push((time) => this.framed(time));
@@ -217,7 +218,6 @@ export class App {
       const [low, high] = hello.bounds;
       const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
       this.stage.look(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
-      this.amid = this.stage.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
     }
     this.camera.restate();
     this.sendLook();
@@ -271,7 +271,7 @@ export class App {
         const image = await decoding;
         const decoded = performance.now();
         this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
-        this.orbitSeen();
+        this.orbitSeen(header.camera);
         this.lastPicture = header;
         this.lastNews = performance.now();
         this.undrawn.push({ header, received, decoded });
@@ -282,12 +282,22 @@ export class App {
     });
   }
 
-  /** Once: from amid the field, the orbit's centre is what is seen in the middle of the view. */
-  private orbitSeen(): void {
-    const distance = this.amid ? this.pictures.depth.at(0.5, 0.5) : null;
+  /** From amid the field, whose middle is nothing to orbit around, the next picture says what is. */
+  private orbitGuessed(): void {
+    const { hello } = this.store.now;
+    if (hello === null) return;
+    const [low, high] = hello.bounds;
+    const amid = this.stage.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
+    this.orbitFrom = amid ? this.camera.seq + 1 : null;
+  }
+
+  /** Once: the orbit's centre is what the picture of a camera message shows in the middle of the view. */
+  private orbitSeen(camera: number): void {
+    if (this.orbitFrom === null || camera < this.orbitFrom || camera !== this.camera.seq) return;
+    const distance = this.pictures.depth.at(0.5, 0.5);
     if (distance === null) return;
     this.stage.orbitAt(distance);
-    this.amid = false;
+    this.orbitFrom = null;
   }
 
   private framed(time: number): void {

@@ -1,4 +1,4 @@
-// Made by `npm run protocol` from src/cagefield/server/protocol.py; change that.
+// Made by `npm run protocol` from what src/cagefield/server/schema.py collects; change that.
 
 /**
  * @minItems 3
@@ -477,9 +477,8 @@ export interface State {
  *
  * The picture is a JPEG of `width` x `height` or, where it is small, its RGB bytes row by row: the part at
  * (x, y) of a picture of full_width x full_height that covers the page's view; smaller ones are stretched.
- * `depth_bytes` of
- * uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow it:
- * distance along the ray = value * depth_scale, 65535 where there is nothing.
+ * `depth_bytes` of uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow
+ * it: distance along the ray = value * depth_scale, 65535 where there is nothing.
  */
 export interface PictureHeader {
   type: "picture";

@@ -48,6 +48,8 @@ export class Stage {
   cameraChanged: (() => void)[] = [];
   /** Called when the user turns the view, or goes to another one. */
   taken: (() => void)[] = [];
+  /** Called when the orbit's centre was guessed: it lies beside the middle of what there is to see. */
+  guessed: (() => void)[] = [];
   private around: Vec3 = [0, 0, 0];
   private scheduled = false;
   private size = new Vector2(1, 1);
@@ -98,8 +100,6 @@ export class Stage {
   look(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
     this.take();
     const { camera } = this;
-    this.place(c2w, fov_y_deg);
-    this.around = around;
     if (this.orbit === null || camera.up.distanceTo(new Vector3(...up)) > 1e-6) {
       camera.up.set(...up);
       this.orbit?.dispose();
@@ -108,7 +108,11 @@ export class Stage {
       this.orbit.addEventListener("start", () => this.take());
       this.orbit.addEventListener("change", () => this.changed());
     }
+    // Only now: a new orbit turns the camera to its centre.
+    this.place(c2w, fov_y_deg);
+    this.around = around;
     this.settle();
+    this.orbit.update();
   }
 
   /** Looks from a pose as it is, however it leans, until the view is settled. */
@@ -117,15 +121,13 @@ export class Stage {
     this.changed();
   }
 
-  /** Orbits, upright, around the point of the camera's axis next to the middle of what there is to see. */
+  /** Orbits, once the view is turned, around the point of the camera's axis next to the middle of everything. */
   settle(): void {
     if (this.orbit === null) return;
-    const { camera } = this;
-    const forward = this.forward;
-    const distance = Math.max(new Vector3(...this.around).sub(camera.position).dot(forward), 0.1);
-    this.orbit.target.copy(camera.position).addScaledVector(forward, distance);
-    this.orbit.update();
+    const to = new Vector3(...this.around).sub(this.camera.position);
+    this.orbitAt(Math.max(to.dot(this.forward), 0.1));
     this.changed();
+    for (const action of this.guessed) action();
   }
 
   /** Orbits around the point of the camera's axis at this distance. */

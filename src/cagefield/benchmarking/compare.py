@@ -22,8 +22,9 @@ from cagefield.benchmarking.workbench import Workbench
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.rendering.frame import Frame
 from cagefield.scene import Scene
-from cagefield.warps.device import DeviceStack
+from cagefield.warps.device_stack import DeviceStack
 
 _TIMED_POINTS = 1 << 17
 
@@ -102,8 +103,13 @@ def compared_cameras(scene: Scene, bench: Workbench) -> tuple[Camera, ...]:
 
 
 def seen(scene: Scene, cameras: Sequence[Camera]) -> Pictures:
-    """Pictures [V,H,W,3] of a scene over white."""
-    return stacked([np.clip(scene.render(camera, background="white").rgb, 0.0, 1.0) for camera in cameras])
+    """Pictures [V,H,W,3] of a scene, as `shown`."""
+    return stacked([np.clip(shown(scene, camera).rgb, 0.0, 1.0) for camera in cameras])
+
+
+def shown(scene: Scene, camera: Camera) -> Frame:
+    """A scene's picture over white, of the original field, exactly, where it holds one."""
+    return scene.render(camera, background="white", exact=scene.original is not None)
 
 
 def map_time(edits: EditStack) -> MapTime:

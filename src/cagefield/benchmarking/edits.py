@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from cagefield.benchmarking.cases import Case, relit
-from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen
+from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen, shown
 from cagefield.benchmarking.distortion import Distortion, distortion
 from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, mean_psnr, pooled_psnr
 from cagefield.benchmarking.figures import changed_pixels as changed
@@ -23,8 +23,12 @@ from cagefield.datasets.procedural import procedural_scene
 from cagefield.datasets.procedural.writer import FOV_X
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
+from cagefield.training.voxel_config import VoxelConfig
 
 _TIMED_VIEWS, _ROUNDS = 2, 3
+
+_TIMED_EXACTLY = 40
+"""Width and height at which exact frames are timed: a picture of a NeRF takes seconds."""
 
 _EYES = {
     "digger": (1.6, -3.5, 1.3),
@@ -98,16 +102,16 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             after = bench.moved(case, cameras)
         if truth not in unedited:
             unedited[truth] = seen(scene, cameras)
-        shown = seen(edited, cameras)
+        pictures = seen(edited, cameras)
         if case.moved is not None:
             there = changed(before, after)
             if relit(case.moved(procedural_scene(name))):
-                carried = pooled_psnr(shown, bench.moved(case, cameras, carried=True), there)
+                carried = pooled_psnr(pictures, bench.moved(case, cameras, carried=True), there)
             known = ~bench.unseen(case, cameras, there)
             hidden = 1.0 - float(known.mean())
-            lost_seen = mean_psnr(unedited[truth], before, known) - mean_psnr(shown, after, known)
-        figures = compare(unedited[truth], shown, before, after)
-        both = (perceived(unedited[truth], before), perceived(shown, after)) if perceived else None
+            lost_seen = mean_psnr(unedited[truth], before, known) - mean_psnr(pictures, after, known)
+        figures = compare(unedited[truth], pictures, before, after)
+        both = (perceived(unedited[truth], before), perceived(pictures, after)) if perceived else None
         yield Score(
             case,
             truth,
@@ -128,9 +132,12 @@ def frame_ratio(scene: Scene, edited: Scene) -> float:
     """Median over interleaved rounds of the time of edited frames over that of unedited ones."""
     cameras = scene.cameras["test"][:_TIMED_VIEWS]
 
+    if scene.original is not None:
+        cameras = tuple(camera.resized(_TIMED_EXACTLY, _TIMED_EXACTLY) for camera in cameras)
+
     def render(which: Scene) -> None:
         for camera in cameras:
-            which.render(camera)
+            shown(which, camera)
 
     seconds = interleaved([lambda: render(scene), lambda: render(edited)], _ROUNDS)
     return float(np.median(seconds[:, 1] / seconds[:, 0]))
@@ -141,8 +148,13 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
     config = settings.config
     length = f"{config.steps} steps" if config.minutes is None else f"{config.minutes:g} minutes"
     explained = [
-        f"Fields: {settings.views} photos of {settings.size}x{settings.size} pixels, trained for {length} at "
-        f"{config.resolution} voxels along the longest axis.",
+        f"Fields: {settings.views} photos of {settings.size}x{settings.size} pixels, trained for {length}"
+        + (
+            f" at {config.resolution} voxels along the longest axis."
+            if isinstance(config, VoxelConfig)
+            else f": the original NeRF, networks of {config.depth} x {config.width}, "
+            f"{config.samples[0]} + {config.samples[1]} samples a ray, rendered exactly."
+        ),
         "PSNR (dB) and SSIM: mean over test views, never trained on; unedited: the trained field against "
         "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
         "Truth: photos of the scene whose part was really moved, with the light as it then falls "
@@ -154,7 +166,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "had, as an edited field does (where a part was turned).",
         "Unseen: pixels that show a surface that no training photo showed, or only through a gap under a "
         "voxel, such as the ground under a part that is moved; lost, seen: the PSNR lost on all others.",
-        "Frame time: edited over unedited, median of frames taken in turn.",
+        "Frame time: edited over unedited, median of frames taken in turn"
+        + ("." if isinstance(config, VoxelConfig) else f", {_TIMED_EXACTLY}x{_TIMED_EXACTLY} pixels."),
         "Min det J: least volume ratio over the shell of a continuous edit, of its map or the inverse; max "
         "stretch: largest factor by which a length grows or shrinks; map time: for a million points, in the "
         "renderer's kernel.",
@@ -231,8 +244,8 @@ def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, erro
     """Writes before, edited and truth (and their difference, dark, three times as strong) side by side."""
     camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
-    before = cast(Pictures, scene.render(camera, background="white").rgb8())
-    after = scene.with_edits(case.edits).render(camera, background="white").rgb8()
+    before = cast(Pictures, shown(scene, camera).rgb8())
+    after = shown(scene.with_edits(case.edits), camera).rgb8()
     truth = (
         bench.mapped(case.scene, case.edits, [camera]) if case.moved is None else bench.moved(case, [camera])
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cagefield.edits import EditStack
 from cagefield.hexahedron import Array
 from cagefield.rendering.sampled import PointMap
-from cagefield.warps.device import DeviceStack
+from cagefield.warps.device_stack import DeviceStack
 
 _WITH_KERNEL = ("flow", "trilinear")
 

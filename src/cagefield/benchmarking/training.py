@@ -12,8 +12,10 @@ from cagefield.benchmarking.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
+from cagefield.training.evaluation import evaluate_views
 from cagefield.training.progress import Progress, Snapshots
-from cagefield.training.voxel import TrainResult, VoxelConfig, evaluate_views, train_voxel
+from cagefield.training.voxel import TrainResult, train_voxel
+from cagefield.training.voxel_config import VoxelConfig
 
 SHARES = (0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
 """Shares of the training at which the curve has a point, before the last at its end."""

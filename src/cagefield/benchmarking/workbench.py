@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,11 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.images import replaced_whole
 from cagefield.rendering.sampled import render_sampled
 from cagefield.scene import Scene
-from cagefield.training.voxel import VoxelConfig, train_voxel
+from cagefield.training.voxel import train_voxel
+from cagefield.training.voxel_config import VoxelConfig
+
+if TYPE_CHECKING:
+    from cagefield.training.nerf import NerfConfig
 
 UInt8 = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -49,6 +54,9 @@ _MAPPED = (
 
 SOFTNESS = 0.004
 """Softness of the surfaces of a scene that is rendered as a field, in world units: half a voxel or less."""
+
+BAKED = 64
+"""Voxels along the longest axis that are baked of a NeRF; its pictures are its own."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +75,7 @@ class Settings:
     views: int = 100
     size: int = 400
     test_views: int = 20
-    config: VoxelConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
+    config: VoxelConfig | NerfConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
     exact_size: int = 128
     exact_views: int = 6
     exact_samples: int = 768
@@ -151,15 +159,7 @@ class Workbench:
         if path.is_dir() and not self.retrain:
             return Scene.open(path)
         with self.bar(f"{name}: training") as move:
-            result = train_voxel(
-                dataset,
-                config,
-                on_progress=lambda progress: move(progress.done, 1.0, str(progress)),
-                evaluate=False,
-            )
-        if not result.finished:
-            raise KeyboardInterrupt
-        scene = Scene.trained(result, dataset)
+            scene = trained(dataset, config, lambda progress: move(progress.done, 1.0, str(progress)))
         scene.save(path, overwrite=True)
         return scene
 
@@ -238,6 +238,22 @@ class Workbench:
         with replaced_whole(path) as temporary:
             np.savez_compressed(temporary, pictures=np.stack(made))
         return np.stack(made)
+
+
+def trained(dataset: Dataset, config: VoxelConfig | NerfConfig, on_progress: Callable[[Any], None]) -> Scene:
+    """The scene trained on a bounded data set; a NeRF's holds its voxels too."""
+    if isinstance(config, VoxelConfig):
+        result = train_voxel(dataset, config, on_progress=on_progress, evaluate=False)
+        if not result.finished:
+            raise KeyboardInterrupt
+        return Scene.trained(result, dataset)
+    from cagefield.training.nerf import train_nerf
+
+    learnt = train_nerf(dataset, config, on_progress=on_progress)
+    if not learnt.finished:
+        raise KeyboardInterrupt
+    cameras = {name: tuple(view.camera for view in getattr(dataset, name)) for name in ("train", "test")}
+    return Scene.baked(learnt.field, cameras, resolution=BAKED)
 
 
 def beside(camera: Camera, other: Camera, degrees: float) -> bool:

@@ -9,12 +9,11 @@ import contextlib
 import io
 import os
 import sys
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Protocol
 
 import cagefield
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, warnings_in_one_line
 
 if TYPE_CHECKING:
 
@@ -39,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         command = parse(args or ["--help"])
         if isinstance(command, int):
             return command
-        with _warnings_in_one_line():
+        with warnings_in_one_line():
             command.run()
     except CagefieldError as error:
         return _refuse(str(error))
@@ -91,19 +90,6 @@ def parse(args: list[str]) -> Command | int:
             return 0
         return _refuse(_without_box(complaint.getvalue()))
     return command
-
-
-@contextlib.contextmanager
-def _warnings_in_one_line() -> Iterator[None]:
-    """Shows warnings as a line on stderr, without their place in the source."""
-
-    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-        if issubclass(category, UserWarning):
-            print("cagefield: warning: " + " ".join(str(message).split()), file=sys.stderr)
-
-    with warnings.catch_warnings():
-        warnings.showwarning = show
-        yield
 
 
 def _without_box(text: str) -> str:

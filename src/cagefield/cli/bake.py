@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,6 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.cameras import Camera
-    from cagefield.edits import EditStack
     from cagefield.fields.nerf import NerfField
     from cagefield.scene import Scene
 
@@ -35,7 +35,8 @@ class Bake:
     def run(self) -> None:
         """Bakes, writes the scene, prints the PSNR between the two fields."""
         from cagefield import devices
-        from cagefield.scene import Scene, check_destination
+        from cagefield.scene import Scene
+        from cagefield.scene_files import check_destination
 
         destination = self.out or self.scene
         if self.out is None and not self.overwrite:
@@ -55,10 +56,9 @@ class Bake:
             scene.cameras,
             scene.background,
             self.baking,
-            edits=scene.edits,
             unbounded=scene.field.contracted,
         )
-        baked.save(destination, overwrite=self.overwrite)
+        dataclasses.replace(scene, field=baked.field).save(destination, overwrite=self.overwrite)
         print(f"{figures}\nscene written to {destination}")
 
 
@@ -68,7 +68,6 @@ def bake_scene(
     background: tuple[float, float, float] | None,
     options: BakingOptions,
     *,
-    edits: EditStack | None = None,
     unbounded: bool = False,
 ) -> tuple[Scene, str]:
     """The scene of a NeRF baked into voxels, with a progress bar on stderr, and a line of figures.
@@ -76,31 +75,22 @@ def bake_scene(
     Of an `unbounded` one what the cameras see is baked.
     """
     import time
-    from functools import partial
 
-    import numpy as np
-
-    from cagefield.edits import EditStack
-    from cagefield.fields.baking import bake
-    from cagefield.fields.seen import seen_by
     from cagefield.rendering.agreement import agreement
     from cagefield.scene import Scene
 
     began = time.perf_counter()
-    every = [camera for group in cameras.values() for camera in group]
-    near = original.near if original.ndc is None else 0.0
     with progress_bar("Baking") as move:
-        voxels = bake(
+        scene = Scene.baked(
             original,
-            options.resolution,
+            cameras,
+            background,
+            resolution=options.resolution,
             sh_degree=options.sh_degree,
-            eyes=np.array([camera.origin for camera in every]) if every else None,
-            contracted=unbounded,
-            seen=partial(seen_by, every, near=near) if unbounded and every else None,
+            unbounded=unbounded,
             on_progress=lambda done: move(done, 1.0, ""),
         )
-    seconds = time.perf_counter() - began
-    scene = Scene(voxels, edits or EditStack([]), cameras=cameras, background=background, original=original)
+    seconds, voxels = time.perf_counter() - began, scene.field
     nx, ny, nz = voxels.resolution
     line = f"baked {nx} x {ny} x {nz} voxels, {len(voxels.vertices)} stored, in {seconds:.0f} s"
     seen = cameras.get("test") or next((group for group in cameras.values() if group), ())

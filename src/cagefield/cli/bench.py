@@ -7,7 +7,7 @@ import shlex
 import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,6 +26,7 @@ from cagefield.cli.options import (
     parse_size,
     progress_bar,
 )
+from cagefield.cli.train import FieldKind, Preset, nerf_config
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -51,7 +52,11 @@ class BenchEdits:
     """Width and height of the photos in pixels."""
     test_views: int = 20
     """Number of test photos."""
-    training: Training = field(default_factory=TrainingOptions)
+    field: FieldKind = "voxel"
+    """nerf is the original NeRF, rendered exactly: needs PyTorch, and --no-methods."""
+    preset: Preset = "auto"
+    """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
+    training: Training = dataclasses.field(default_factory=TrainingOptions)
     exact_size: int = 128
     """Width and height of the pictures of continuous edits, whose truth is slow to render."""
     exact_views: int = 6
@@ -95,6 +100,10 @@ class BenchEdits:
 
         cases = chosen(self.scenes, self.edits)
         check_known(self.methods)
+        if self.field != "nerf" and self.preset != "auto":
+            raise CagefieldError("--preset is for the original NeRF; give --field nerf too")
+        if self.field == "nerf" and not self.no_methods:
+            raise CagefieldError("methods are compared on voxels only; give --no-methods with --field nerf")
         if self.only_pictures and self.pictures is None:
             raise CagefieldError("--only-pictures needs a folder for them; give --pictures FOLDER")
         if self.picture_size < 1:
@@ -106,11 +115,13 @@ class BenchEdits:
         if self.pictures is not None:
             for case in cases:
                 check_file(picture_path(self.pictures, case), self.overwrite)
+        devices.start(self.device)
+        nerf = self.field == "nerf"
         settings = Settings(
             self.views,
             self.size,
             self.test_views,
-            self.training.config(),
+            nerf_config(self.training, self.preset) if nerf else self.training.config(),
             self.exact_size,
             self.exact_views,
             self.exact_samples,
@@ -118,7 +129,6 @@ class BenchEdits:
             self.compared_views,
             self.discrete_views,
         )
-        devices.start(self.device)
         with _work_folder(self.workdir) as folder:
             bench = Workbench(settings, folder, progress_bar, self.retrain)
             if not self.only_pictures:
@@ -242,7 +252,7 @@ class BenchTraining:
     photos: Photos
     out: Output
     """CSV file for the curve; the same as a Markdown table beside it, ending .md."""
-    training: Training = field(default_factory=TrainingOptions)
+    training: Training = dataclasses.field(default_factory=TrainingOptions)
     curve_views: int = 10
     """Number of test views for the points of the curve; the last point is on all."""
     scene_out: Path | None = None
@@ -257,7 +267,8 @@ class BenchTraining:
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_text
         from cagefield.benchmarking.training import Point, measure
-        from cagefield.scene import Scene, check_destination
+        from cagefield.scene import Scene
+        from cagefield.scene_files import check_destination
 
         if self.out.suffix.lower() != ".csv":
             raise CagefieldError(f"{self.out} must end in .csv; the Markdown table goes beside it")

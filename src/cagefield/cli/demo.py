@@ -100,7 +100,7 @@ class Demo:
         from cagefield import devices
         from cagefield.cli.train import summary, train_scene
         from cagefield.datasets import load_dataset
-        from cagefield.training.voxel import VoxelConfig
+        from cagefield.training.voxel_config import VoxelConfig
 
         devices.start(self.device)
         dataset = load_dataset(folder / "photos")

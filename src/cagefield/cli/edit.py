@@ -33,7 +33,8 @@ class ApplyEdits:
         from cagefield.cli.report import describe_edits
         from cagefield.edits import EditStack
         from cagefield.edits.files import load_edits
-        from cagefield.scene import Scene, check_destination
+        from cagefield.scene import Scene
+        from cagefield.scene_files import check_destination
 
         destination = self.out or self.scene
         if self.out is None and not (self.overwrite or self.check):

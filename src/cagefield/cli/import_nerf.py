@@ -41,7 +41,7 @@ class ImportNerf:
         from cagefield.formats.nerf_pytorch import read_checkpoint
         from cagefield.formats.nerf_pytorch_config import Settings, find_config, read_config
         from cagefield.formats.nerf_pytorch_import import import_nerf
-        from cagefield.scene import check_destination
+        from cagefield.scene_files import check_destination
 
         check_destination(self.out, self.overwrite)
         if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:

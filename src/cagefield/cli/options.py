@@ -15,7 +15,7 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
-    from cagefield.training.voxel import VoxelConfig
+    from cagefield.training.voxel_config import VoxelConfig
 
 Device = Annotated[
     Literal["auto", "cpu", "cuda", "metal", "vulkan"], tyro.conf.arg(help="Where kernels run.")
@@ -54,20 +54,21 @@ class TrainingOptions:
     """Train this many steps instead: on a CPU the same seed then gives the same field."""
     resolution: int = 256
     """Voxels along the longest axis at the end."""
-    sh_degree: int = 1
-    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view."""
+    sh_degree: int | None = None
+    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view; left out,
+    1, and 2 for voxels baked from a NeRF."""
     seed: int = 0
     """Of the order of the photos' pixels and of all other chance."""
 
     def config(self) -> VoxelConfig:
         """The trainer's configuration."""
-        from cagefield.training.voxel import VoxelConfig
+        from cagefield.training.voxel_config import VoxelConfig
 
         return VoxelConfig(
             steps=VoxelConfig.steps if self.steps is None else self.steps,
             minutes=self.minutes if self.steps is None else None,
             resolution=self.resolution,
-            sh_degree=self.sh_degree,
+            sh_degree=VoxelConfig.sh_degree if self.sh_degree is None else self.sh_degree,
             seed=self.seed,
         )
 
@@ -171,7 +172,7 @@ def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
             bar.update(task, completed=done, total=total, description=note)
             if not console.is_terminal and done >= (quarters + 1) * total / 4:
                 quarters = int(4 * done / total)
-                print(f"{what} {25 * quarters}%: {note}", file=sys.stderr)
+                print(f"{what} {25 * quarters}%" + (f": {note}" if note else ""), file=sys.stderr)
 
         yield move
 

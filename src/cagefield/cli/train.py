@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -22,7 +24,13 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
     from cagefield.scene import Scene
-    from cagefield.training.voxel import TrainResult, VoxelConfig
+    from cagefield.training.nerf import NerfConfig
+    from cagefield.training.voxel import TrainResult
+    from cagefield.training.voxel_config import VoxelConfig
+
+FieldKind = Literal["voxel", "nerf"]
+Preset = Literal["auto", "paper", "small"]
+Ndc = Literal["auto", "on", "off"]
 
 
 @dataclass(frozen=True)
@@ -32,11 +40,11 @@ class Train:
     photos: Photos
     out: Output
     """Scene folder."""
-    field: Literal["voxel", "nerf"] = "voxel"
+    field: FieldKind = "voxel"
     """voxel is what the editor shows; nerf is the original NeRF, needs PyTorch, and is baked at the end."""
-    preset: Literal["auto", "paper", "small"] = "auto"
+    preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
-    ndc: Literal["auto", "on", "off"] = "auto"
+    ndc: Ndc = "auto"
     """--field nerf in normalised device coordinates: auto where an LLFF or COLMAP capture looks one way."""
     training: Training = dataclasses.field(default_factory=TrainingOptions)
     device: Device = "auto"
@@ -48,8 +56,10 @@ class Train:
     def run(self) -> None:
         """Trains, writes the scene, prints the test PSNR."""
         from cagefield import devices
-        from cagefield.scene import check_destination
+        from cagefield.scene_files import check_destination
 
+        if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
+            raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
         target = check_destination(self.out, self.overwrite or self.resume)
         checkpoint = target.with_name(target.name + ".training")
         if checkpoint.exists() and not (self.resume or self.overwrite):
@@ -65,7 +75,8 @@ class Train:
         else:
             scene, result = train_scene(dataset, config, checkpoint, resume=self.resume)
             figures, finished = summary(result), result.finished
-        scene.save(self.out, overwrite=self.overwrite or self.resume)
+        with self._kept(finished):
+            scene.save(self.out, overwrite=self.overwrite or self.resume)
         print(f"{figures}\nscene written to {self.out}")
         if not finished:
             print("stopped early; the same command with --resume goes on")
@@ -74,23 +85,11 @@ class Train:
 
     def _train_nerf(self, dataset: Dataset, checkpoint: Path) -> tuple[Scene, str, bool]:
         """(scene, lines of figures, whether the training got to its end) of the original NeRF, baked."""
-        from cagefield import devices
         from cagefield.cli.bake import bake_scene
 
-        try:
-            from cagefield.training.nerf import NerfConfig, train_nerf
-        except ImportError as error:
-            raise CagefieldError(
-                "--field nerf needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
-            ) from error
-        small = self.preset == "small" or (self.preset == "auto" and not devices.is_gpu())
-        steps, minutes = self.training.steps, self.training.minutes
-        config = (NerfConfig.small if small else NerfConfig)(
-            steps=NerfConfig.steps if steps is None else steps,
-            minutes=minutes if steps is None else None,
-            ndc={"auto": None, "on": True, "off": False}[self.ndc],
-            seed=self.training.seed,
-        )
+        config = nerf_config(self.training, self.preset, self.ndc)
+        from cagefield.training.nerf import train_nerf
+
         with progress_bar("Training") as move:
             result = train_nerf(
                 dataset,
@@ -102,13 +101,17 @@ class Train:
         moved = result.space.dataset
         splits = {"train": moved.train, "test": moved.test, "val": moved.val}
         cameras = {name: tuple(view.camera for view in views) for name, views in splits.items() if views}
-        scene, baked = bake_scene(
-            result.field,
-            cameras,
-            (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
-            BakingOptions(self.training.resolution),
-            unbounded=dataset.unbounded,
-        )
+        with self._kept(result.finished):
+            scene, baked = bake_scene(
+                result.field,
+                cameras,
+                (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
+                BakingOptions(
+                    self.training.resolution,
+                    BakingOptions.sh_degree if self.training.sh_degree is None else self.training.sh_degree,
+                ),
+                unbounded=dataset.unbounded,
+            )
         line = (
             f"trained {result.seconds:.0f} s, {result.steps} steps, networks of {result.field.coarse}, "
             f"{result.space}; train PSNR {result.train_psnr:.2f} dB"
@@ -116,6 +119,42 @@ class Train:
         if result.test_psnr == result.test_psnr:
             line += f"; test PSNR {result.test_psnr:.2f} dB"
         return scene, f"{line}\n{baked}", result.finished
+
+    @contextmanager
+    def _kept(self, finished: bool) -> Iterator[None]:
+        """Says, where what follows a training fails, that the training itself is kept.
+
+        Raises:
+            CagefieldError: the one that was raised within, with that added.
+        """
+        rest = "goes straight to " + ("baking" if self.field == "nerf" else "writing the scene")
+        note = f"the training is kept: the same command with --resume {rest if finished else 'goes on'}"
+        try:
+            yield
+        except CagefieldError as error:
+            raise CagefieldError(f"{error}; {note}") from error
+        except BaseException:
+            print(note)
+            raise
+
+
+def nerf_config(training: TrainingOptions, preset: Preset, ndc: Ndc = "auto") -> NerfConfig:
+    """The configuration of a NeRF's trainer. Raises CagefieldError where PyTorch is missing."""
+    from cagefield import devices
+
+    try:
+        from cagefield.training.nerf import NerfConfig
+    except ImportError as error:
+        raise CagefieldError(
+            "--field nerf needs PyTorch, which is not installed; pip install torch"
+        ) from error
+    small = preset == "small" or (preset == "auto" and not devices.is_gpu())
+    return (NerfConfig.small if small else NerfConfig)(
+        steps=NerfConfig.steps if training.steps is None else training.steps,
+        minutes=training.minutes if training.steps is None else None,
+        ndc={"auto": None, "on": True, "off": False}[ndc],
+        seed=training.seed,
+    )
 
 
 def train_scene(

@@ -89,7 +89,7 @@ def _read_model(folder: Path) -> tuple[Any, list[Any]]:
         import pycolmap
     except ImportError:
         raise DatasetError(
-            f"{folder}: reading a COLMAP model needs pycolmap; run pip install 'cagefield[colmap]'"
+            f"{folder}: reading a COLMAP model needs pycolmap; run pip install pycolmap"
         ) from None
     check_whole(folder)
     try:

@@ -172,7 +172,7 @@ class Edit:
         if self.lattice is None or not isinstance(exact, ContinuousWarp):
             return exact
         if isinstance(exact.shell, FlowShell):
-            from cagefield.warps.device import lattice_of
+            from cagefield.warps.edit_lattice import lattice_of
 
             with suppress(DeviceError):
                 return replace(exact, lattice=lattice_of(self))
@@ -227,7 +227,7 @@ class Edit:
         if nodes is None or not isinstance(warp, ContinuousWarp):
             return 0.0, 0.0
         # The kernel's, which takes no time: float32's rounding is far below the lattice's error.
-        from cagefield.warps.device import lattice_of
+        from cagefield.warps.edit_lattice import lattice_of
 
         lattice = lattice_of(self.replace(lattice=nodes))
         points, distances = warp.shell_points(samples), [np.zeros(0)]

@@ -70,6 +70,8 @@ def bake(
     """
     if not 16 <= resolution <= 1024:
         raise FieldError(f"resolution is {resolution}; it must be from 16 to 1024")
+    if not 0 <= sh_degree <= 2:
+        raise FieldError(f"sh_degree is {sh_degree}; it must be from 0 to 2")
     if not 1 <= views <= 256 or not 0.0 < opacity < 1.0:
         raise FieldError(f"views must be 1 to 256 and opacity in (0, 1), got {views} and {opacity}")
     box = np.array(getattr(field, "bounds", None) if bounds is None else bounds, np.float64)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from cagefield.errors import FieldError
 
@@ -36,3 +39,15 @@ def read_tensors(
             f"{version!r}; update cagefield"
         )
     return metadata, tensors
+
+
+def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str, str]) -> None:
+    """Writes a field file, which others may read as they may any new file; its folder must exist."""
+    from safetensors.numpy import save_file
+
+    path = Path(path)
+    path.touch()
+    mode = path.stat().st_mode
+    # safetensors writes a temporary file, its owner's alone, and renames it.
+    save_file({name: np.ascontiguousarray(values) for name, values in tensors.items()}, path, header)
+    path.chmod(mode)

@@ -173,6 +173,7 @@ class NerfField:
         samples: (coarse, further fine ones) on each ray.
         lindisp: coarse samples even in 1/depth instead of depth.
         ndc: (width/2f, height/2f) for a network trained in normalised device coordinates.
+        bounded: the field is empty outside `bounds`, and its networks are not asked there.
 
     Raises:
         FieldError: impossible bounds, depths or numbers of samples.
@@ -186,6 +187,7 @@ class NerfField:
     samples: tuple[int, int] = (64, 128)
     lindisp: bool = False
     ndc: tuple[float, float] | None = None
+    bounded: bool = False
 
     def __post_init__(self) -> None:
         bounds = np.array(self.bounds, np.float64)
@@ -205,6 +207,8 @@ class NerfField:
             raise FieldError("near must be above 0 where samples are even in 1/depth, got 0")
         if self.ndc is not None and not min(self.ndc) > 0:
             raise FieldError(f"ndc must be two ratios width/2f, height/2f above 0, got {self.ndc}")
+        if self.ndc is not None and self.bounded:
+            raise FieldError("a field in NDC goes on to infinity; leave out bounded")
 
     @cached_property
     def torch(self) -> TorchNerf:
@@ -216,9 +220,7 @@ class NerfField:
         try:
             from cagefield.fields.nerf_torch import TorchNerf
         except ImportError as error:
-            raise FieldError(
-                "this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
-            ) from error
+            raise FieldError("this NeRF needs PyTorch, which is not installed; pip install torch") from error
         return TorchNerf(self)
 
     def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:

@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from cagefield.errors import FieldError
-from cagefield.fields.files import read_tensors
+from cagefield.fields.files import read_tensors, write_tensors
 from cagefield.fields.nerf import Linear, Mlp, NerfField
 
 KIND = "NerfField"
 FORMAT_VERSION = "1"
 
-_OPTIONS = ("near", "far", "samples", "lindisp", "ndc")
+_OPTIONS = ("near", "far", "samples", "lindisp", "ndc", "bounded")
 
 
 def save_nerf(field: NerfField, path: str | Path) -> None:
     """Writes the field to a safetensors file (float32); the folder must exist."""
-    from safetensors.numpy import save_file
-
     networks = {"coarse": field.coarse, "fine": field.fine}
     state = {}
     for part, network in networks.items():
@@ -31,7 +29,7 @@ def save_nerf(field: NerfField, path: str | Path) -> None:
     options["bounds"] = field.bounds.tolist()
     options["rectified_feature"] = [n.rectified_feature for n in networks.values() if n is not None]
     metadata = {"kind": KIND, "version": FORMAT_VERSION, "options": json.dumps(options)}
-    save_file(state, str(path), metadata=metadata)
+    write_tensors(path, state, metadata)
 
 
 def load_nerf(path: str | Path) -> NerfField:

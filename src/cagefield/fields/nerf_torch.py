@@ -109,6 +109,7 @@ class TorchNerf:
         self.device = torch_device() if device is None else device
         self.coarse = TorchMlp(field.coarse, self.device, trainable)
         self.fine = None if field.fine is None else TorchMlp(field.fine, self.device, trainable)
+        self._bounds = self.tensor(field.bounds)
 
     @property
     def network(self) -> TorchMlp:
@@ -128,10 +129,29 @@ class TorchNerf:
         `noise` is the standard deviation of what is added to the raw density in training.
         """
         network = self.network if network is None else network
+        if not self.field.bounded:
+            return self._inside(positions, viewdirs, network, noise)
+        rows = torch.nonzero(self._in_bounds(positions))[:, 0]
+        sigma, rgb = self._inside(positions[rows], viewdirs[rows], network, noise)
+        return (
+            sigma.new_zeros(len(positions)).index_put((rows,), sigma),
+            rgb.new_zeros(len(positions), 3).index_put((rows,), rgb),
+        )
+
+    def _in_bounds(self, positions: Tensor) -> Tensor:
+        """True [N] for positions [N,3] in the field's bounds, their faces included."""
+        return ((positions >= self._bounds[0]) & (positions <= self._bounds[1])).all(dim=1)
+
+    def _inside(
+        self, positions: Tensor, viewdirs: Tensor, network: TorchMlp, noise: float
+    ) -> tuple[Tensor, Tensor]:
+        """What a call returns, whether in bounds or not."""
         block = BLOCK.get(self.device.type, 1 << 16)
         if len(positions) > block and not torch.is_grad_enabled():
             parts = [
-                self(positions[start : start + block], viewdirs[start : start + block], network)
+                self._inside(
+                    positions[start : start + block], viewdirs[start : start + block], network, noise
+                )
                 for start in range(0, len(positions), block)
             ]
             return torch.cat([sigma for sigma, _ in parts]), torch.cat([rgb for _, rgb in parts])
@@ -154,9 +174,10 @@ class TorchNerf:
         return sigma.cpu().numpy(), rgb.cpu().numpy()
 
     def signed(self, positions: Tensor, viewdirs: Tensor) -> Tensor:
-        """Density [N] per world unit before its ReLU."""
+        """Density [N] per world unit before its ReLU, at most 0 outside the bounds of a bounded field."""
         if self.field.ndc is None:
-            return self.network.trunk(positions)[0]
+            raw = self.network.trunk(positions)[0]
+            return torch.where(self._in_bounds(positions), raw, -raw.abs()) if self.field.bounded else raw
         own, stretch = to_ndc(positions, viewdirs, self.field.ndc)
         return self.network.trunk(own)[0] * stretch
 
@@ -189,12 +210,14 @@ class TorchNerf:
             for start in range(0, len(p), block):
                 rows = slice(start, start + block)
                 own, along = self.tensor(p[rows]), self.tensor(d[rows])
-                scale = 1.0
+                scale: Tensor | float = 1.0
                 if self.field.ndc is not None:
                     flat = own[:, None].expand(along.shape).reshape(-1, 3)
                     scale = to_ndc(flat, along.reshape(-1, 3), self.field.ndc)[1].reshape(-1, views).mean(1)
                     own = to_ndc(own, along[:, 0], self.field.ndc)[0]
                 raw, hidden = self.network.trunk(own)
+                if self.field.bounded:
+                    scale = self._in_bounds(own).to(raw.dtype)
                 sigma[rows] = (torch.relu(raw) * scale).cpu().numpy()
                 rgb[rows] = self.network.colors(hidden, along).cpu().numpy()
         return sigma, rgb

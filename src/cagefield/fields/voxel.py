@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.contraction import contract
-from cagefield.fields.files import read_tensors
+from cagefield.fields.files import read_tensors, write_tensors
 
 FORMAT_VERSION = "1"
 
@@ -167,8 +167,6 @@ class VoxelField:
 
     def save(self, path: str | Path) -> None:
         """Writes the field to a safetensors file (float32); the folder must exist."""
-        from safetensors.numpy import save_file
-
         tensors = {
             "bounds": self.bounds,
             "resolution": np.array(self.resolution, dtype=np.int64),
@@ -177,7 +175,7 @@ class VoxelField:
             "sh": self.sh,
         }
         metadata = {"kind": "VoxelField", "version": FORMAT_VERSION, "contracted": str(int(self.contracted))}
-        save_file({k: np.ascontiguousarray(v) for k, v in tensors.items()}, str(path), metadata=metadata)
+        write_tensors(path, tensors, metadata)
 
     @classmethod
     def load(cls, path: str | Path) -> VoxelField:

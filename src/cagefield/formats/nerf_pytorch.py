@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import pickle
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,11 +79,12 @@ def _unpickled(path: Path) -> dict[str, Any]:
         import torch
     except ImportError as error:
         raise FieldError(
-            f"{path}: reading a checkpoint needs PyTorch, which is not installed; "
-            "pip install 'cagefield[nerf]'"
+            f"{path}: reading a checkpoint needs PyTorch, which is not installed; pip install torch"
         ) from error
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # torch's, of pickles that are refused anyway
+            content = torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         found = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
         what = f" ({found.group(1)})" if found else ""
@@ -91,9 +93,11 @@ def _unpickled(path: Path) -> dict[str, Any]:
             "run any code, so it is refused; save the two state dicts alone with torch.save and read that"
         ) from error
     except (RuntimeError, EOFError, OSError, ValueError, KeyError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:120]
+        # An end too early has no text, a wrong opcode is a KeyError of its number.
+        reason = "" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
         raise FieldError(
-            f"{path}: not a readable checkpoint ({reason}); it may be truncated, copy it again"
+            f"{path}: not a readable checkpoint ({reason or 'no file of torch.save'}); it may be truncated, "
+            "copy it again"
         ) from error
     if not isinstance(content, dict):
         raise FieldError(

@@ -16,6 +16,19 @@ from cagefield.errors import FieldError
 
 NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
 
+_CURE = "give the config of the checkpoint's own training (--config)"
+
+_OWN = {
+    "N_importance",
+    "N_samples",
+    "datadir",
+    "dataset_type",
+    "i_embed",
+    "no_ndc",
+    "use_viewdirs",
+    "white_bkgd",
+}
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -52,13 +65,15 @@ def read_config(path: Path | str) -> Settings:
         text = path.read_text(encoding="utf-8")
         document = yaml.safe_load(text) if path.suffix in (".yml", ".yaml") else None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise FieldError(f"{path}: not a readable config ({' '.join(str(error).split())[:120]})") from error
+        reason = " ".join(str(error).split())[:120].strip()
+        raise FieldError(f"{path}: not a readable config ({reason}); {_CURE}") from error
     try:
         return _krrish94(document) if isinstance(document, dict) else _yenchenlin(text)
     except FieldError as error:
         raise FieldError(f"{path}: {error}") from None
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FieldError(f"{path}: not a nerf-pytorch config ({type(error).__name__}: {error})") from error
+        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise FieldError(f"{path}: not a nerf-pytorch config ({reason}); {_CURE}") from error
 
 
 def _yenchenlin(text: str) -> Settings:
@@ -68,7 +83,9 @@ def _yenchenlin(text: str) -> Settings:
         if equals:
             values[key.strip()] = value.strip()
     if not values:
-        raise FieldError('no line "key = value" in it')
+        raise FieldError(f'no line "key = value" in it; {_CURE}')
+    if not _OWN & values.keys():
+        raise FieldError(f"not a nerf-pytorch config: it has none of {', '.join(sorted(_OWN))}; {_CURE}")
     if values.get("i_embed", "0") not in ("0", "-1"):
         raise FieldError(
             f"i_embed = {values['i_embed']}; only positional encodings (0) or none (-1) are read"
@@ -80,6 +97,11 @@ def _yenchenlin(text: str) -> Settings:
     # The parser's own default is llff
     forward = values.get("dataset_type", "llff") == "llff"
     ndc = forward and not flag("no_ndc")
+    if forward and not ndc:
+        raise FieldError(
+            "no_ndc = True: trained on an LLFF capture without NDC, in a world that nerf-pytorch centres and "
+            "may make a sphere, which is not read; train it here: cagefield train --field nerf --ndc off"
+        )
     return Settings(
         near=0.0 if ndc else 2.0,
         far=1.0 if ndc else 6.0,
@@ -96,9 +118,12 @@ def _krrish94(document: dict[str, Any]) -> Settings:
         for key in ("log_sampling_xyz", "log_sampling_dir"):
             if part.get(key, True) is not True:
                 raise FieldError(f"{key} is {part[key]}; only octaves (true) are read")
+    near, far = float(data["near"]), float(data["far"])
+    if not 0.0 <= near < far:
+        raise FieldError(f"near is {near:g} and far {far:g}; they must satisfy 0 <= near < far")
     return Settings(
-        near=float(data["near"]),
-        far=float(data["far"]),
+        near=near,
+        far=far,
         samples=(int(rays["num_coarse"]), int(rays["num_fine"])),
         lindisp=bool(rays.get("lindisp", False)),
         ndc=not data["no_ndc"],

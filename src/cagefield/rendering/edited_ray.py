@@ -1,7 +1,7 @@
 """One edit along a whole ray: where the edit is affine and shown by a lattice, so is the ray in it.
 
 A ray that meets one edit only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
-`cagefield.warps.device`), runs straight through the inner region also in canonical space, and straight
+`cagefield.warps.rows`), runs straight through the inner region also in canonical space, and straight
 through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
 multiplication in the inner region and one lattice lookup in the shell.
 """
@@ -12,7 +12,10 @@ import quadrants as qd
 
 from cagefield.rendering.grid import vec3
 from cagefield.rendering.traverse import safe_inverse, slab, vec2
-from cagefield.warps.device import (
+from cagefield.warps.edit_device import map_sample
+from cagefield.warps.hexahedron_device import image, read3, times
+from cagefield.warps.lattice_device import displacement, first_node, to_nodes
+from cagefield.warps.rows import (
     ALONE,
     BOX,
     CENTRE,
@@ -23,13 +26,6 @@ from cagefield.warps.device import (
     RESOLUTION,
     SIMPLE,
     TO_NODES,
-    displacement,
-    first_node,
-    image,
-    map_sample,
-    read3,
-    times,
-    to_nodes,
 )
 
 EditedRay = qd.types.struct(

@@ -166,6 +166,24 @@ def gather_rgb(sh: qd.template(), slots: ivec8, w: vec8, basis: qd.template(), K
 
 
 @qd.func
+def to_grid(p: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
+    """Grid coordinates of a position; the transform is that of `transform_of`."""
+    g = (p - lower) * scale
+    if qd.static(contracted):
+        g = (contract_point(g) + 2.0) * half
+    return g
+
+
+@qd.func
+def to_world(g: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
+    """The position at grid coordinates: the inverse of `to_grid`, up to that of `contract_point`."""
+    p = g / scale + lower
+    if qd.static(contracted):
+        p = uncontract_point(g / half - 2.0) / scale + lower
+    return p
+
+
+@qd.func
 def contract_point(q: vec3):
     """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
     m = qd.max(qd.abs(q).max(), 1.0)

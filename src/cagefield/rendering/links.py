@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering import smooth_occupancy as smooth
+from cagefield.rendering.deformed_occupancy import deform
 from cagefield.rendering.grid import DeviceGrid
 from cagefield.rendering.occupancy import Occupancy
-from cagefield.warps.device import DeviceStack
+from cagefield.warps.device_stack import DeviceStack
 
 
 def replaced(before: EditStack, after: EditStack) -> int | None:
@@ -59,8 +60,6 @@ class Chain:
     @classmethod
     def of(cls, edits: EditStack, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
         """The chain around a place among the active edits, none of which is discrete."""
-        from cagefield.rendering.deformed_occupancy import deform
-
         active = edits.active
         earlier = DeviceStack.from_stack(EditStack(active[:place]))
         below = deform(canonical, grid, earlier, jumps=False, coarse=True)

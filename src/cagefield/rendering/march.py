@@ -14,7 +14,6 @@ from cagefield.rendering.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.grid import (
     F32,
     I32,
-    contract_point,
     contract_velocity,
     corner_slots,
     corner_weights,
@@ -22,10 +21,11 @@ from cagefield.rendering.grid import (
     gather_rgb,
     ivec3,
     sh_basis,
+    to_grid,
     vec3,
 )
 from cagefield.rendering.traverse import is_occupied, look_ahead, safe_inverse, slab
-from cagefield.warps.device import Nodes, Params, map_sample
+from cagefield.warps.edit_device import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 ivec2 = qd.types.vector(2, qd.i32)
@@ -191,15 +191,6 @@ def march_tiles(
                 out[at + 5 + a] = normal[a]
             out[at + 3] = 1.0 - T
             out[at + 4] = depth
-
-
-@qd.func
-def to_grid(p: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
-    """Grid coordinates of a canonical position."""
-    g = (p - lower) * scale
-    if qd.static(contracted):
-        g = (contract_point(g) + 2.0) * half
-    return g
 
 
 @qd.func

@@ -120,3 +120,10 @@ def of_vertices(full: NDArray[np.bool_]) -> Occupancy:
         last = np.take(padded, range(2, padded.shape[axis], 2), axis)
         padded = even | odd | last
     return Occupancy.from_masks(np.zeros(3, np.int64), masks_of(padded))
+
+
+def cubes(points: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The cubes of a lattice [count] of whose eight points [count + 1] one is set."""
+    near = points[:-1] | points[1:]
+    near = near[:, :-1] | near[:, 1:]
+    return np.asarray(near[:, :, :-1] | near[:, :, 1:])

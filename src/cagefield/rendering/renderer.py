@@ -96,7 +96,8 @@ class Renderer:
         from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import for_kernels
         from cagefield.rendering.links import Chain, replaced
-        from cagefield.warps.device import DeviceStack, widened
+        from cagefield.warps.device_stack import DeviceStack
+        from cagefield.warps.rows import widened
 
         stack = DeviceStack.from_stack(self.edits)
         jumps = _jumps(self.edits)

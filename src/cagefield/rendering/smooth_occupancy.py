@@ -22,28 +22,14 @@ from numpy.typing import NDArray
 
 from cagefield.devices import ints
 from cagefield.loops import Deal, deal_of, dealt, turns
-from cagefield.rendering.grid import (
-    F32,
-    I32,
-    U8,
-    DeviceGrid,
-    contract_point,
-    ivec3,
-    transform_of,
-    uncontract_point,
-    vec3,
-)
-from cagefield.rendering.occupancy import BRICK, Occupancy
-from cagefield.warps.device import DeviceStack, Nodes, Params, map_sample
-
-MOST_CELLS = 12.0
-"""Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""
-
-UNKNOWN = 1e30
-"""Image of a point that was not mapped."""
+from cagefield.rendering.grid import F32, I32, U8, DeviceGrid, ivec3, vec3
+from cagefield.rendering.mapped_points import UNKNOWN, differences, images_of
+from cagefield.rendering.occupancy import BRICK, Occupancy, cubes
+from cagefield.rendering.reach import MOST_CELLS, is_blocked, is_dense
+from cagefield.warps.device_stack import DeviceStack
+from cagefield.warps.edit_device import Nodes
 
 Mask = NDArray[np.bool_]
-Proceed = Callable[[], None]
 
 
 def near_bricks(
@@ -63,10 +49,10 @@ def near_bricks(
     """
     if not coarse:
         points = tuple((count + 1).tolist())
-        images = _images(grid, stack, lower, np.ones(points, bool), BRICK, starts)
+        images = images_of(grid, stack, lower, np.ones(points, bool), BRICK, starts)
         return cubes(_occupied(images, canonical, points))
     points = _coarse_points(count)
-    images = _images(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
+    images = images_of(grid, stack, lower, np.ones(points, bool), 2 * BRICK, starts)
     near = cubes(_occupied(images, canonical, points, 2.0 * MOST_CELLS))
     return near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: count[0], : count[1], : count[2]]
 
@@ -75,7 +61,7 @@ def coarse_corners(
     grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
 ) -> NDArray[np.float32]:
     """Images [N,3], grid coordinates, under a stack, of the corners that a coarse look at bricks maps."""
-    return _images(grid, stack, lower, np.ones(_coarse_points(count), bool), 2 * BRICK)
+    return images_of(grid, stack, lower, np.ones(_coarse_points(count), bool), 2 * BRICK)
 
 
 def _coarse_points(count: NDArray[np.int64]) -> tuple[int, ...]:
@@ -89,7 +75,7 @@ def occupied_blocks(
     lower: NDArray[np.int64],
     bricks: Mask,
     new: Mask,
-    proceed: Proceed,
+    proceed: Callable[[], None],
 ) -> Mask:
     """Which of the `new` blocks [2bx,2by,2bz] are occupied, of the bricks that `near_bricks` found.
 
@@ -102,7 +88,7 @@ def occupied_blocks(
         i, j, k = corner >> 2 & 1, corner >> 1 & 1, corner & 1
         wanted[i : i + near.shape[0], j : j + near.shape[1], k : k + near.shape[2]] |= near
     proceed()
-    images = _images(grid, stack, lower, wanted, 2)
+    images = images_of(grid, stack, lower, wanted, 2)
     proceed()
     near &= new & cubes(_occupied(images, canonical, points))
     candidates = np.argwhere(near).astype(np.int32)
@@ -110,38 +96,6 @@ def occupied_blocks(
         proceed()
         near[tuple(candidates.T)] = _refined(candidates, images, points, grid)
     return near
-
-
-def _images(
-    grid: DeviceGrid,
-    stack: DeviceStack,
-    lower: NDArray[np.int64],
-    wanted: Mask,
-    spacing: int,
-    starts: NDArray[np.float32] | None = None,
-) -> NDArray[np.float32]:
-    """Images [N,3], grid coordinates, of the wanted lattice points, `spacing` cells apart; others UNKNOWN.
-
-    `starts` [N,3], grid coordinates, take the points' place where they are given.
-    """
-    images = np.empty((wanted.size, 3), np.float32)
-    _map_points(
-        images,
-        deal_of(len(images)),
-        np.zeros((1, 3), np.float32) if starts is None else starts,
-        int(starts is not None),
-        np.ascontiguousarray(wanted, np.uint8).reshape(-1),
-        ints(lower),
-        ints(wanted.shape),
-        spacing,
-        *transform_of(grid.field),
-        stack.params,
-        stack.lattice,
-        stack.n_edits,
-        int(grid.field.contracted),
-        stack.has_flows,
-    )
-    return images
 
 
 def _occupied(
@@ -162,13 +116,6 @@ def _occupied(
     return out.reshape(count).view(bool)
 
 
-def cubes(points: Mask) -> Mask:
-    """Cubes with one of eight points [count + 1]."""
-    near = points[:-1] | points[1:]
-    near = near[:, :-1] | near[:, 1:]
-    return np.asarray(near[:, :, :-1] | near[:, :, 1:])
-
-
 def _refined(
     candidates: NDArray[np.int32], images: NDArray[np.float32], count: tuple[int, ...], grid: DeviceGrid
 ) -> Mask:
@@ -185,101 +132,6 @@ def _refined(
         ints(grid.field.resolution),
     )
     return out.view(bool)
-
-
-@qd.kernel(fastcache=True)
-def _map_points(
-    images: Nodes,
-    deal: Deal,
-    starts: Nodes,
-    started: qd.i32,
-    wanted: U8,
-    lower: ivec3,
-    count: ivec3,
-    spacing: qd.i32,
-    origin: vec3,
-    scale: vec3,
-    half: vec3,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
-    contracted: qd.i32,
-    flows: qd.template(),
-):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
-        image = vec3(UNKNOWN, UNKNOWN, UNKNOWN)
-        if n < images.shape[0] and wanted[n] > 0:
-            at = lower + spacing * ivec3(n // (count.y * count.z), (n // count.z) % count.y, n % count.z)
-            g = qd.cast(at, qd.f32)
-            if started == 1:
-                g = starts[n]
-            p = g / scale + origin
-            if contracted == 1:
-                p = uncontract_point(g / half - 2.0) / scale + origin
-            q, _v, _empty = map_sample(p, vec3(1.0, 0.0, 0.0), params, lattice, n_edits, flows)
-            image = g
-            if qd.abs(q - p).max() > 0.0:
-                image = (q - origin) * scale
-                if contracted == 1:
-                    image = (contract_point(image) + 2.0) * half
-        if n < images.shape[0]:
-            images[n] = image
-
-
-@qd.func
-def differences(images: qd.template(), n: qd.i32, i: qd.i32, count: qd.i32, stride: qd.i32):
-    """(larger first difference, second difference) of the images at point n, the i-th of an axis."""
-    here = images[n]
-    before = vec3(0.0, 0.0, 0.0)
-    after = vec3(0.0, 0.0, 0.0)
-    both = 0
-    if i > 0:
-        q = images[n - stride]
-        if q.x < UNKNOWN:
-            before = here - q
-            both += 1
-    if i < count - 1:
-        q = images[n + stride]
-        if q.x < UNKNOWN:
-            after = q - here
-            both += 1
-    bend = vec3(0.0, 0.0, 0.0)
-    if both == 2:
-        bend = qd.abs(after - before)
-    return qd.max(qd.abs(before), qd.abs(after)), bend
-
-
-@qd.func
-def is_blocked(image: vec3, r: vec3, codes: qd.template(), bricks: ivec3, origin: ivec3):
-    """1 where an occupied block lies within r of an image, grid coordinates, else 0."""
-    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - (origin >> 1), 0)
-    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - (origin >> 1), 2 * bricks - 1)
-    found = 0
-    x = first.x >> 1
-    while x <= last.x >> 1 and found == 0:
-        in_x = between(x, first.x, last.x, 0xF0)
-        for y in range(first.y >> 1, (last.y >> 1) + 1):
-            in_xy = in_x & between(y, first.y, last.y, 0xCC)
-            for z in range(first.z >> 1, (last.z >> 1) + 1):
-                code = codes[(x * bricks.y + y) * bricks.z + z]
-                found |= code & in_xy & between(z, first.z, last.z, 0xAA)
-        x += 1
-    return qd.min(found, 1)
-
-
-@qd.func
-def between(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
-    """Bits of a brick's sub-blocks from the block `first` to `last` along an axis.
-
-    `upper` are the bits of its second sub-blocks.
-    """
-    bits = 0xFF
-    if first > 2 * brick:
-        bits = upper
-    if last <= 2 * brick:
-        bits = bits & ~upper
-    return bits
 
 
 @qd.kernel(fastcache=True)
@@ -316,22 +168,6 @@ def _occupied_points(
                 if empty == 0:
                     found = is_blocked(image, r, codes, bricks, origin)
             out[n] = qd.cast(found, qd.u8)
-
-
-@qd.func
-def is_dense(image: vec3, r: vec3, index: qd.template(), density: qd.template(), resolution: ivec3):
-    """1 where a cell within r of an image, grid coordinates, holds density, else 0."""
-    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
-    found = 0
-    x = first.x
-    while x <= last.x and found == 0:
-        for y in range(first.y, last.y + 1):
-            for z in range(first.z, last.z + 1):
-                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
-                    found = 1
-        x += 1
-    return found
 
 
 @qd.kernel(fastcache=True)

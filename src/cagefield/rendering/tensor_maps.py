@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.loops import Deal, deal_of, dealt, turns
-from cagefield.warps.device import DeviceStack, PackedStack, map_sample, read3
-
-Table = qd.types.ndarray(dtype=qd.f32, ndim=2)
-Nodes = qd.types.ndarray(dtype=qd.math.vec3, ndim=1)
+from cagefield.warps.device_stack import DeviceStack, PackedStack
+from cagefield.warps.edit_device import Nodes, Params, map_sample
+from cagefield.warps.hexahedron_device import read3
 
 
 class TensorMap:
@@ -71,10 +70,10 @@ class TensorMap:
 
 @qd.kernel(fastcache=True)
 def _map_tensors(
-    samples: Table,
+    samples: Params,
     deal: Deal,
-    out: Table,
-    params: Table,
+    out: Params,
+    params: Params,
     lattice: Nodes,
     n_edits: qd.i32,
     flows: qd.template(),

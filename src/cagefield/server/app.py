@@ -12,11 +12,11 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
-from cagefield.server import protocol
+from cagefield.server import from_server
 from cagefield.server.hub import Hub
 from cagefield.server.safety import Guard
 from cagefield.server.sockets import attend
@@ -36,7 +36,7 @@ _HEADERS = {
 }
 
 
-def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
+def application(hub: Hub, hello: from_server.Hello, guard: Guard) -> ASGIApp:
     """The application of one editor; starts the rendering process and ends it."""
 
     @contextlib.asynccontextmanager
@@ -52,10 +52,13 @@ def application(hub: Hub, hello: protocol.Hello, guard: Guard) -> ASGIApp:
         return _download(dump_edits(hub.session.document.stack), "edits.yaml", "application/yaml")
 
     async def camera_path(_: Request) -> Response:
-        from cagefield.keyframes import dump_path
+        from cagefield.keyframe_files import dump_path
 
         document = hub.session.document
-        text = dump_path(document.placed_keys, loop=document.loop)
+        try:
+            text = dump_path(document.placed_keys, loop=document.loop)
+        except CagefieldError as error:
+            return PlainTextResponse(str(error), 409)
         return _download(text, "camera_path.json", "application/json")
 
     async def screenshot(request: Request) -> Response:
@@ -114,7 +117,8 @@ class _Guarded:
             if refusal is None:
                 await self._app(scope, receive, send)
             else:
-                await WebSocket(scope, receive, send).close(1008, refusal[:120])
+                with contextlib.suppress(WebSocketDisconnect):
+                    await WebSocket(scope, receive, send).close(1008, refusal[:120])
             return
         respond = _with_headers(send)
         if refusal is not None:

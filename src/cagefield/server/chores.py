@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.server import jobs, protocol
+from cagefield.server import from_page, from_server, jobs
 from cagefield.server.desk import Chore
 from cagefield.server.jobs import Job
 from cagefield.server.keeping import Keeper
@@ -36,7 +36,7 @@ class Chores:
         session: Session,
         keeper: Keeper,
         measured: Callable[[], None],
-        tell: Callable[[protocol.ServerMessage], None],
+        tell: Callable[[from_server.ServerMessage], None],
     ) -> None:
         """`measured` is called when a lattice was, `tell` with jobs' progress for all pages."""
         self._session, self._keeper = session, keeper
@@ -61,9 +61,9 @@ class Chores:
 
     # ---- kernels ----
 
-    def preparing(self) -> protocol.Preparing:
+    def preparing(self) -> from_server.Preparing:
         """How many of the stages of `Studio.warm` are done."""
-        return protocol.Preparing(done=self._warmed, of=WARM_STAGES)
+        return from_server.Preparing(done=self._warmed, of=WARM_STAGES)
 
     def _warm(self) -> Chore:
         stage = self._warming
@@ -108,11 +108,11 @@ class Chores:
 
     # ---- jobs ----
 
-    def jobs(self) -> list[protocol.Job]:
+    def jobs(self) -> list[from_server.Job]:
         """How far the jobs that go on are."""
         return [_message(job, "running") for job in self._jobs]
 
-    def render(self, message: protocol.RenderJob) -> None:
+    def render(self, message: from_page.RenderJob) -> None:
         """Begins a job. Raises CagefieldError where it could not write its result."""
         out = Path(message.out).expanduser()
         if not out.is_absolute():
@@ -165,8 +165,8 @@ class Chores:
         self._tell(_message(job, state, text))
 
 
-def _message(job: Job, state: str, text: str = "") -> protocol.Job:
-    return protocol.Job.model_validate(
+def _message(job: Job, state: str, text: str = "") -> from_server.Job:
+    return from_server.Job.model_validate(
         {
             "job": job.number,
             "what": job.what,

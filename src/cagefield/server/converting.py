@@ -11,35 +11,36 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
+from cagefield.errors import CameraError
 from cagefield.hexahedron import Array
 from cagefield.keyframes import Keyframe, Timeline
-from cagefield.server import protocol
+from cagefield.server import from_page, from_server, operation_messages, wire
 from cagefield.server.document import Entry
 from cagefield.server.kinds import kind_of
 from cagefield.server.moving import Moved, move_corners
-from cagefield.server.protocol import Corners, Vec3
 from cagefield.server.session import Session
+from cagefield.server.wire import Corners, Vec3
 
 STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
 """How densely pages are told of a camera path; a longer one has them further apart."""
 
 
-def operation_of(message: protocol.OperationMessage) -> Operation:
+def operation_of(message: operation_messages.OperationMessage) -> Operation:
     """The operation that a message states."""
-    if isinstance(message, protocol.TranslateBy):
+    if isinstance(message, operation_messages.TranslateBy):
         return ops.Translate(message.by)
-    if isinstance(message, protocol.RotateBy):
+    if isinstance(message, operation_messages.RotateBy):
         return ops.Rotate(message.rotation_deg, message.axes)
-    if isinstance(message, protocol.ScaleBy):
+    if isinstance(message, operation_messages.ScaleBy):
         return ops.Scale.of(message.by, message.axes)
-    if isinstance(message, protocol.ShearBy):
+    if isinstance(message, operation_messages.ShearBy):
         return ops.Shear(
             message.xy, message.xz, message.yx, message.yz, message.zx, message.zy, axes=message.axes
         )
     return move_corners(tuple(message.corners), message.by)
 
 
-def camera_of(message: protocol.CameraMessage) -> Camera:
+def camera_of(message: wire.CameraMessage) -> Camera:
     """The camera that a page looks from. Raises CameraError for a pose that is not rigid."""
     focal = 0.5 * message.height / float(np.tan(0.5 * np.radians(message.fov_y_deg)))
     return Camera(
@@ -48,19 +49,26 @@ def camera_of(message: protocol.CameraMessage) -> Camera:
     )  # fmt: skip
 
 
-def key_of(message: protocol.Key) -> Keyframe:
-    """The keyframe that a message states."""
-    return Keyframe(tuple(message.c2w), message.fov_y_deg, message.seconds, dict(message.parts))
+def keys_of(message: from_page.SetPath) -> tuple[Keyframe, ...]:
+    """The keyframes that a message states. Raises CameraError for impossible ones."""
+    return tuple(_key_of(key, number) for number, key in enumerate(message.keys, start=1))
 
 
-def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[protocol.Still]:
+def _key_of(key: wire.Key, number: int) -> Keyframe:
+    try:
+        return Keyframe(tuple(key.c2w), key.fov_y_deg, key.seconds, dict(key.parts))
+    except CameraError as error:
+        raise CameraError(f"the camera path is not taken: keyframe {number}: {error}") from None
+
+
+def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[from_server.Still]:
     """The camera path as pages play it. Raises CameraError where it does not move."""
     line = Timeline(keys, loop=loop)
     count = min(max(2, round(line.seconds * STILLS_PER_SECOND) + 1), MOST_STILLS)
     at = np.linspace(0.0, line.seconds, count)
     poses = line.poses(at).reshape(-1, 16).tolist()
     return [
-        protocol.Still(c2w=c2w, fov_y_deg=fov)
+        from_server.Still(c2w=c2w, fov_y_deg=fov)
         for c2w, fov in zip(poses, line.fovs_y_deg(at).tolist(), strict=True)
     ]
 
@@ -76,10 +84,10 @@ def corners(cage: Cage) -> Corners:
     return cast(Corners, tuple(vec3(corner) for corner in cage.corners))
 
 
-def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | None) -> protocol.EditState:
+def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | None) -> from_server.EditState:
     """One edit as pages show it; `error` is its lattice's, in voxels."""
     edit = entry.edit
-    return protocol.EditState(
+    return from_server.EditState(
         id=entry.id,
         name=edit.name,
         colour=entry.colour,
@@ -104,10 +112,10 @@ def edit_state(entry: Entry, problem: str | None, error: tuple[float, float] | N
 
 def state_of(
     session: Session, path: str, pictured: int, errors: dict[int, tuple[float, float]]
-) -> protocol.State:
+) -> from_server.State:
     """Everything that pages show of the edits, drags included; `errors` of lattices by edit, where known."""
     document = session.shown
-    return protocol.State(
+    return from_server.State(
         revision=session.revision,
         pictured=pictured,
         edits=[
@@ -120,19 +128,17 @@ def state_of(
         path=path,
         preserve_opacity=document.preserve_opacity,
         keys=[
-            protocol.Key(
-                c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts)
-            )
+            wire.Key(c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts))
             for key in document.keys
         ],
         loop=document.loop,
     )
 
 
-def dragged_of(drag: int, seq: int, moved: Moved) -> protocol.Dragged:
+def dragged_of(drag: int, seq: int, moved: Moved) -> from_server.Dragged:
     """What became of a drag."""
     edit = moved.edit
-    return protocol.Dragged(
+    return from_server.Dragged(
         drag=drag,
         seq=seq,
         part=moved.part,

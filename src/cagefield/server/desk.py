@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 from cagefield.errors import CagefieldError
+from cagefield.server.pictures import Request
 from cagefield.server.regions import Rect
-from cagefield.server.scheduler import Request, Scheduler
+from cagefield.server.scheduler import Scheduler
 from cagefield.server.tasks import Answered, Failed, PictureDone, PictureTask, Ready, Result, Stopped, Task
 from cagefield.server.worker import Worker
 
@@ -224,7 +225,12 @@ class Desk:
 
         def call(*args: Any) -> None:
             loop = self._loop
-            if loop is not None and not loop.is_closed():
+            if loop is None:
+                return
+            try:
                 loop.call_soon_threadsafe(here, *args)
+            except RuntimeError:
+                if not loop.is_closed():
+                    raise
 
         return call

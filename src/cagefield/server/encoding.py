@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from cagefield.rendering.frame import Frame, to_uint8
-from cagefield.server.protocol import View
+from cagefield.server.wire import View
 
 NOTHING = 65535
 """Depth value where the picture shows nothing."""

@@ -9,14 +9,14 @@ from typing import Any
 
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
-from cagefield.server import protocol
+from cagefield.server import from_server
 from cagefield.server.chores import Chores
 from cagefield.server.converting import state_of
 from cagefield.server.desk import Chore, Desk, Level, Stamp
 from cagefield.server.keeping import Keeper
 from cagefield.server.outbox import Outbox
+from cagefield.server.pictures import Look, Request
 from cagefield.server.regions import WHOLE, Rect, seen
-from cagefield.server.scheduler import Look, Request
 from cagefield.server.session import Session
 from cagefield.server.tasks import PictureDone, PictureTask, Shown, Task, values_of
 
@@ -34,7 +34,7 @@ class Page:
 
     def notice(self, level: Level, text: str) -> None:
         """A line for this page's user."""
-        self.outbox.put(protocol.Notice(level=level, text=" ".join(text.split())))
+        self.outbox.put(from_server.Notice(level=level, text=" ".join(text.split())))
 
 
 class Hub:
@@ -64,7 +64,7 @@ class Hub:
 
     # ---- pages ----
 
-    def join(self, hello: protocol.Hello) -> Page:
+    def join(self, hello: from_server.Hello) -> Page:
         """A new page, told what there is."""
         self._pages += 1
         page = Page(self._pages)
@@ -75,7 +75,7 @@ class Hub:
         if self.greeting is not None:
             page.notice("info", self.greeting)
         if self._preview is not None:
-            page.outbox.put(protocol.Preview(page=self._preview[0], play=self._preview[1], on=True))
+            page.outbox.put(from_server.Preview(page=self._preview[0], play=self._preview[1], on=True))
         page.outbox.put(self.chores.preparing())
         for job in self.chores.jobs():
             page.outbox.put(job)
@@ -111,7 +111,7 @@ class Hub:
         for page in self.pages.values():
             page.notice(level, text)
 
-    def broadcast(self, message: protocol.ServerMessage, but: Page | None = None) -> None:
+    def broadcast(self, message: from_server.ServerMessage, but: Page | None = None) -> None:
         """A message for every page, but one."""
         for page in self.pages.values():
             if page is not but:
@@ -119,7 +119,7 @@ class Hub:
 
     # ---- the session ----
 
-    def state(self) -> protocol.State:
+    def state(self) -> from_server.State:
         """Everything that pages show of the edits."""
         self._look_again()
         return state_of(self.session, str(self.keeper.path), self._pictured, self.chores.errors())
@@ -208,7 +208,7 @@ class Hub:
         if before != now:
             for which, on in ((before, False), (now, True)):
                 if which is not None:
-                    self.broadcast(protocol.Preview(page=which[0], play=which[1], on=on))
+                    self.broadcast(from_server.Preview(page=which[0], play=which[1], on=on))
 
     def _look_again(self) -> None:
         shown = self._what_is_shown()
@@ -241,7 +241,7 @@ class Hub:
 def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
     """The binary message of a picture."""
     region = request.region
-    header = protocol.PictureHeader(
+    header = from_server.PictureHeader(
         picture=request.number,
         camera=request.camera,
         drag=stamp.drag,

@@ -48,6 +48,7 @@ class JobFiles:
             context.__exit__(type(error), error, None)
 
     def close(self) -> None:
-        """Gives up all jobs."""
+        """Gives up all jobs; what of their files cannot be removed stays."""
         for job in list(self._videos):
-            self.end(job, keep=False)
+            with suppress(OSError):
+                self.end(job, keep=False)

@@ -16,7 +16,8 @@ from pathlib import Path
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.edits.files import save_edits
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.keyframes import Keyframe, dump_path, load_keys
+from cagefield.keyframe_files import dump_path, load_keys
+from cagefield.keyframes import Keyframe
 from cagefield.rendering.images import replaced_whole
 from cagefield.scene import Scene
 from cagefield.server.document import Document
@@ -59,7 +60,7 @@ class Keeper:
         try:
             content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
         return None if document == self.document() else document
 
@@ -101,10 +102,11 @@ class Keeper:
                 f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
             )
         document = session.document
+        camera_path = dump_path(document.placed_keys, loop=document.loop)
         save_edits(document.stack, self.path / _EDITS)
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_whole(self.path / CAMERA_PATH) as draft:
-                draft.write_text(dump_path(document.placed_keys, loop=document.loop), encoding="utf-8")
+                draft.write_text(camera_path, encoding="utf-8")
         self._scene(document).save_manifest(self.path)
         self._done(session)
 
@@ -120,6 +122,7 @@ class Keeper:
             self.save(session)
             return
         document = session.document
+        camera_path = dump_path(document.placed_keys, loop=document.loop)
         try:
             self._scene(document).save(target, overwrite)
         except SceneError as error:
@@ -127,9 +130,7 @@ class Keeper:
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
         if document.keys:
-            (target / CAMERA_PATH).write_text(
-                dump_path(document.placed_keys, loop=document.loop), encoding="utf-8"
-            )
+            (target / CAMERA_PATH).write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path = target.resolve()

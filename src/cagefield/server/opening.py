@@ -14,14 +14,14 @@ from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.scene import Scene
-from cagefield.server import protocol
+from cagefield.server import from_server, wire
 from cagefield.server.converting import vec3
 from cagefield.server.hub import Hub
 from cagefield.server.keeping import Keeper
 from cagefield.server.session import Session
 
 
-def open_hub(path: Path, device: str = "auto") -> tuple[Hub, protocol.Hello]:
+def open_hub(path: Path, device: str = "auto") -> tuple[Hub, from_server.Hello]:
     """The editor of a scene folder, and what its pages are told first; what a crash left is restored.
 
     Raises CagefieldError for a folder that is no scene.
@@ -37,21 +37,21 @@ def open_hub(path: Path, device: str = "auto") -> tuple[Hub, protocol.Hello]:
     return hub, hello_of(scene, path.resolve().name)
 
 
-def hello_of(scene: Scene, name: str) -> protocol.Hello:
+def hello_of(scene: Scene, name: str) -> from_server.Hello:
     """What a page is told first."""
     cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds
     poses = [camera.c2w for camera in cameras]
     every = [camera.c2w for group in scene.cameras.values() for camera in group]
-    return protocol.Hello(
+    return from_server.Hello(
         version=cagefield.__version__,
         page=0,
         name=name,
         bounds=(vec3(lower), vec3(upper)),
         voxel=float(min(scene.field.voxel_size)),
         up=vec3(shared_up(np.stack(every))) if every else (0.0, 0.0, 1.0),
-        start=protocol.CameraMessage(
+        start=wire.CameraMessage(
             seq=0,
             c2w=first.c2w.reshape(-1).tolist(),
             width=min(max(first.width, 16), 4096),

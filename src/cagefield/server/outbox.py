@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 
-from cagefield.server import protocol
+from cagefield.server import from_server
 
 MOST_WAITING = 200
 """Lines that wait for a page that takes none; older ones are dropped."""
@@ -21,12 +21,12 @@ class Outbox:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, message: protocol.ServerMessage) -> None:
+    def put(self, message: from_server.ServerMessage) -> None:
         """One message more."""
         key: str = message.type
-        if isinstance(message, protocol.Job):
+        if isinstance(message, from_server.Job):
             key = f"job {message.job}"
-        if isinstance(message, (protocol.State, protocol.Dragged, protocol.Job)):
+        if isinstance(message, (from_server.State, from_server.Dragged, from_server.Job)):
             self._waiting = deque(item for item in self._waiting if item[0] != key)
         elif len(self._waiting) >= MOST_WAITING:
             self._waiting.popleft()

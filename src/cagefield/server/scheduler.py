@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from cagefield.server.protocol import View
+from cagefield.server.pictures import Look, Region, Request
 from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixels, tiles
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
@@ -41,46 +41,6 @@ SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
 
 FIRST_RATE = 4e5
 """Rays a second before any was measured."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
-
-    view: View = "colour"
-    before: bool = False
-    split: float | None = None
-
-
-@dataclass(frozen=True)
-class Region:
-    """A part of a picture of `full` (width, height), pixels."""
-
-    x: int
-    y: int
-    width: int
-    height: int
-    full_width: int
-    full_height: int
-
-
-@dataclass(frozen=True)
-class Request:
-    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view.
-
-    `complete` says that with it everything is drawn that was not as it should be.
-    """
-
-    number: int
-    page: int
-    camera: int
-    revision: int
-    look: Look
-    region: Region
-    moving: bool
-    exact: bool
-    final: bool
-    complete: bool = True
 
 
 @dataclass

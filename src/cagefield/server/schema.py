@@ -7,7 +7,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from cagefield.server.protocol import PageMessage, PictureHeader, ServerMessage
+from cagefield.server.from_page import PageMessage
+from cagefield.server.from_server import PictureHeader, ServerMessage
 
 _REF = "#/definitions/{model}"
 _NUMBER = {"type": "number"}

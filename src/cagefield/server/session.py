@@ -13,8 +13,9 @@ from dataclasses import replace
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Operation
-from cagefield.errors import EditError
+from cagefield.errors import CameraError, EditError
 from cagefield.hexahedron import Array
+from cagefield.keyframe_files import is_path
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.blending import blended
 from cagefield.server.document import Document, Entry
@@ -288,7 +289,15 @@ class Session:
         return dump_edits(EditStack([self.document.entry(number).edit]))
 
     def load_edits(self, text: str, append: bool) -> int:
-        """How many edits a text held; they replace the stack, or are appended to it."""
+        """How many edits a text held; they replace the stack, or are appended to it.
+
+        Raises EditFileError for a text that holds no edits, CameraError for a camera path's.
+        """
+        if is_path(text):
+            raise CameraError(
+                "this is a camera path, and no edits; save it as camera_path.json in the scene's folder, "
+                "then start the editor again"
+            )
         form = "json" if text.lstrip().startswith("{") else "yaml"
         edits = list(parse_edits(text, format=form, source="the text", check=False))
         document = self.document if append else replace(self.document, entries=())

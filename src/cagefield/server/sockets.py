@@ -11,11 +11,12 @@ from collections.abc import Coroutine, Iterator
 from typing import Any
 
 from pydantic import ValidationError
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from cagefield.errors import CagefieldError
-from cagefield.server import protocol
+from cagefield.server import from_page, from_server, wire
 from cagefield.server.hub import Hub, Page
+from cagefield.server.refusing import refusal
 from cagefield.server.safety import Allowance
 from cagefield.server.speaking import Speaker
 
@@ -32,21 +33,21 @@ class Inbox:
     """Messages that wait to be done; of drag, camera or play messages in a row only the newest waits."""
 
     def __init__(self) -> None:
-        self._waiting: deque[protocol.PageMessage] = deque()
+        self._waiting: deque[from_page.PageMessage] = deque()
         self._some = asyncio.Event()
 
-    def put(self, message: protocol.PageMessage) -> None:
+    def put(self, message: from_page.PageMessage) -> None:
         """One message more."""
         for n in range(len(self._waiting) - 1, -1, -1):
             if _replaces(message, self._waiting[n]):
                 del self._waiting[n]
                 break
-            if not isinstance(self._waiting[n], (protocol.CameraMessage, protocol.Play)):
+            if not isinstance(self._waiting[n], (wire.CameraMessage, from_page.Play)):
                 break
         self._waiting.append(message)
         self._some.set()
 
-    async def get(self) -> protocol.PageMessage:
+    async def get(self) -> from_page.PageMessage:
         """The next message, waited for."""
         while not self._waiting:
             self._some.clear()
@@ -54,19 +55,22 @@ class Inbox:
         return self._waiting.popleft()
 
 
-def _replaces(new: protocol.PageMessage, old: protocol.PageMessage) -> bool:
-    if isinstance(new, protocol.CameraMessage):
-        return isinstance(old, protocol.CameraMessage)
-    if isinstance(new, protocol.Play):
-        return isinstance(old, protocol.Play) and old.play == new.play
-    if isinstance(new, (protocol.DragMove, protocol.DragEnd)):
-        return isinstance(old, protocol.DragMove) and old.drag == new.drag
+def _replaces(new: from_page.PageMessage, old: from_page.PageMessage) -> bool:
+    if isinstance(new, wire.CameraMessage):
+        return isinstance(old, wire.CameraMessage)
+    if isinstance(new, from_page.Play):
+        return isinstance(old, from_page.Play) and old.play == new.play
+    if isinstance(new, (from_page.DragMove, from_page.DragEnd)):
+        return isinstance(old, from_page.DragMove) and old.drag == new.drag
     return False
 
 
-async def attend(socket: WebSocket, hub: Hub, hello: protocol.Hello) -> None:
+async def attend(socket: WebSocket, hub: Hub, hello: from_server.Hello) -> None:
     """Serves one page until it is gone."""
-    await socket.accept()
+    try:
+        await socket.accept()
+    except (WebSocketDisconnect, ConnectionError):
+        return
     page = hub.join(hello)
     inbox = Inbox()
     tasks = [
@@ -78,10 +82,18 @@ async def attend(socket: WebSocket, hub: Hub, hello: protocol.Hello) -> None:
     finally:
         for task in tasks:
             task.cancel()
-        for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
-                await task
+        ends = await asyncio.gather(*tasks, return_exceptions=True)
         hub.leave(page)
+    for end in ends:
+        if isinstance(end, Exception) and not _is_parting(socket, end):
+            _log.error("a page's socket failed", exc_info=end)
+
+
+def _is_parting(socket: WebSocket, error: Exception) -> bool:
+    """Whether the error says no more than that the page is gone, or that its socket was closed."""
+    if isinstance(error, RuntimeError):
+        return WebSocketState.DISCONNECTED in (socket.application_state, socket.client_state)
+    return isinstance(error, (WebSocketDisconnect, ConnectionError))
 
 
 async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
@@ -94,7 +106,7 @@ async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
         if text is None:
             page.notice("error", "a message must be text, one JSON object")
             continue
-        if len(text.encode()) > protocol.MOST_BYTES:
+        if len(text.encode()) > wire.MOST_BYTES:
             await socket.close(TOO_BIG, "message too big")
             return
         if not allowance.take(time.monotonic()):
@@ -106,16 +118,9 @@ async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
                 return
             continue
         try:
-            inbox.put(protocol.page_messages.validate_json(text))
+            inbox.put(from_page.page_messages.validate_json(text))
         except ValidationError as error:
-            page.notice("error", f"malformed message: {_first(error)}")
-
-
-def _first(error: ValidationError) -> str:
-    """The first thing wrong with a message, in a line."""
-    problem = error.errors(include_url=False, include_input=False)[0]
-    where = ".".join(str(part) for part in problem["loc"])
-    return f"{where}: {problem['msg']}" if where else str(problem["msg"])
+            page.notice("error", refusal(error))
 
 
 async def _do(speaker: Speaker, page: Page, inbox: Inbox) -> None:

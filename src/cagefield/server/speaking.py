@@ -9,19 +9,19 @@ import numpy as np
 
 from cagefield.cages import Cage
 from cagefield.errors import CagefieldError
-from cagefield.server import protocol
+from cagefield.server import from_page, from_server, wire
 from cagefield.server.converting import (
     cage_of,
     camera_of,
     dragged_of,
-    key_of,
+    keys_of,
     operation_of,
     stills_of,
     view_height,
 )
 from cagefield.server.hub import Hub, Page
+from cagefield.server.pictures import Look
 from cagefield.server.placing import fitted
-from cagefield.server.scheduler import Look
 from cagefield.server.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
 
 
@@ -32,7 +32,7 @@ class Speaker:
         self._hub, self._page = hub, page
         self._session = hub.session
 
-    def hear(self, message: protocol.PageMessage) -> Coroutine[Any, Any, None] | None:
+    def hear(self, message: from_page.PageMessage) -> Coroutine[Any, Any, None] | None:
         """Does what a message says and tells the pages what came of it.
 
         Returns the rest where it has to wait for the rendering process; other messages need not wait.
@@ -42,37 +42,37 @@ class Speaker:
 
     # ---- seeing ----
 
-    def _camera(self, message: protocol.CameraMessage) -> None:
+    def _camera(self, message: wire.CameraMessage) -> None:
         self._hub.camera(self._page, camera_of(message), message.seq, message.moving)
 
-    def _look(self, message: protocol.LookMessage) -> None:
+    def _look(self, message: from_page.LookMessage) -> None:
         self._hub.look(self._page, Look(message.view, message.before, message.split))
 
-    def _presented(self, message: protocol.PresentedMessage) -> None:
+    def _presented(self, message: from_page.PresentedMessage) -> None:
         self._hub.presented(self._page, message.picture)
 
-    async def _ask(self, message: protocol.Ask) -> None:
+    async def _ask(self, message: from_page.Ask) -> None:
         try:
             answer = await self._answer(message)
         except Exception:
-            self._page.outbox.put(protocol.Answer(request=message.request, failed=True))
+            self._page.outbox.put(from_server.Answer(request=message.request, failed=True))
             raise
         self._page.outbox.put(answer)
 
-    async def _answer(self, message: protocol.Ask) -> protocol.Answer:
+    async def _answer(self, message: from_page.Ask) -> from_server.Answer:
         if message.what == "edit_text":
             if message.edit is None:
                 raise CagefieldError("choose an edit to copy")
-            return protocol.Answer(request=message.request, text=self._session.edit_text(message.edit))
+            return from_server.Answer(request=message.request, text=self._session.edit_text(message.edit))
         if message.what == "grid":
-            return protocol.Answer(request=message.request, grid=await self._grid(message.edit))
+            return from_server.Answer(request=message.request, grid=await self._grid(message.edit))
         if message.what == "path":
             document = self._session.document
-            return protocol.Answer(request=message.request, stills=stills_of(document.keys, document.loop))
+            return from_server.Answer(request=message.request, stills=stills_of(document.keys, document.loop))
         found = await self._surface(message.x, message.y)
         if found is None:
-            return protocol.Answer(request=message.request)
-        return protocol.Answer(request=message.request, point=tuple(found[0]), normal=tuple(found[1]))
+            return from_server.Answer(request=message.request)
+        return from_server.Answer(request=message.request, point=tuple(found[0]), normal=tuple(found[1]))
 
     async def _grid(self, number: int | None) -> Any:
         if number is None:
@@ -92,18 +92,18 @@ class Speaker:
 
     # ---- drags ----
 
-    def _drag_begin(self, message: protocol.DragBegin) -> None:
+    def _drag_begin(self, message: from_page.DragBegin) -> None:
         self._page.drag, self._page.seq = message.drag, 0
         self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
         self._hub.changed()
 
-    def _drag(self, message: protocol.DragMove) -> None:
+    def _drag(self, message: from_page.DragMove) -> None:
         moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
         self._page.seq = message.seq
         self._page.outbox.put(dragged_of(message.drag, message.seq, moved))
         self._hub.changed(but=self._page)
 
-    def _drag_end(self, message: protocol.DragEnd) -> None:
+    def _drag_end(self, message: from_page.DragEnd) -> None:
         self._page.drag = 0
         try:
             moved = self._session.drag_end(self._page.number, message.drag, operation_of(message.operation))
@@ -111,23 +111,23 @@ class Speaker:
         finally:
             self._hub.changed()
 
-    def _drag_cancel(self, message: protocol.DragCancel) -> None:
+    def _drag_cancel(self, message: from_page.DragCancel) -> None:
         self._page.drag = 0
         self._session.drag_cancel(self._page.number)
         self._hub.changed()
 
     # ---- playing ----
 
-    def _play_begin(self, message: protocol.PlayBegin) -> None:
+    def _play_begin(self, message: from_page.PlayBegin) -> None:
         try:
             self._session.play_begin(self._page.number, message.play)
         except CagefieldError:
-            self._page.outbox.put(protocol.Preview(page=self._page.number, play=message.play, on=False))
+            self._page.outbox.put(from_server.Preview(page=self._page.number, play=message.play, on=False))
             raise
         finally:
             self._hub.changed()
 
-    def _play(self, message: protocol.Play) -> None:
+    def _play(self, message: from_page.Play) -> None:
         try:
             self._session.play(self._page.number, message.play, message.seconds)
         except CagefieldError:
@@ -135,23 +135,23 @@ class Speaker:
             raise
         self._hub.pump()
 
-    def _play_end(self, message: protocol.PlayEnd) -> None:
+    def _play_end(self, message: from_page.PlayEnd) -> None:
         self._session.play_end(self._page.number, message.play)
         self._hub.changed()
 
     # ---- operations ----
 
-    def _apply(self, message: protocol.Apply) -> None:
+    def _apply(self, message: from_page.Apply) -> None:
         self._session.apply(message.edit, message.target, operation_of(message.operation))
         self._hub.changed()
 
     # ---- cages ----
 
-    def _set_cage(self, message: protocol.SetCage) -> None:
+    def _set_cage(self, message: from_page.SetCage) -> None:
         self._session.set_cage(message.edit, message.cage, cage_of(message.corners))
         self._hub.changed()
 
-    async def _place(self, message: protocol.Place) -> None:
+    async def _place(self, message: from_page.Place) -> None:
         camera = self._page.camera
         if camera is None:
             raise CagefieldError("the page has sent no camera yet; try again")
@@ -165,7 +165,7 @@ class Speaker:
         self._session.place(point, view_height(camera, distance))
         self._hub.changed()
 
-    async def _fit_inner(self, message: protocol.FitInner) -> None:
+    async def _fit_inner(self, message: from_page.FitInner) -> None:
         cage: Cage = self._session.document.entry(message.edit).edit.inner
         below = Shown(values_of(self._session.below(message.edit)))
         dense = await self._hub.ask(lambda number: FitTask(number, below, cage))
@@ -173,24 +173,24 @@ class Speaker:
             self._session.fit_inner(message.edit, fitted(cage, np.array(dense)))
         self._hub.changed()
 
-    def _outer_margin(self, message: protocol.OuterMargin) -> None:
+    def _outer_margin(self, message: from_page.OuterMargin) -> None:
         self._session.outer_margin(message.edit, message.margin)
         self._hub.changed()
 
     # ---- options and the list ----
 
-    def _change(self, message: protocol.Change) -> None:
+    def _change(self, message: from_page.Change) -> None:
         named = message.model_dump(exclude={"type", "edit"}, exclude_none=True)
         if "lattice" in named:
             named["lattice"] = named["lattice"] or None
         self._session.change(message.edit, **named)
         self._hub.changed()
 
-    def _scene_change(self, message: protocol.SceneChange) -> None:
+    def _scene_change(self, message: from_page.SceneChange) -> None:
         self._session.preserve_opacity(message.preserve_opacity)
         self._hub.changed()
 
-    def _command(self, message: protocol.Command) -> None:
+    def _command(self, message: from_page.Command) -> None:
         session = self._session
         if message.name == "select":
             session.select(message.edit)
@@ -204,36 +204,36 @@ class Speaker:
             getattr(session, message.name)(message.edit)
         self._hub.changed()
 
-    def _mirror(self, message: protocol.Mirror) -> None:
+    def _mirror(self, message: from_page.Mirror) -> None:
         self._session.mirror(message.edit, "xyz".index(message.axis))
         self._hub.changed()
 
-    def _reorder(self, message: protocol.Reorder) -> None:
+    def _reorder(self, message: from_page.Reorder) -> None:
         self._session.reorder(message.edit, message.to)
         self._hub.changed()
 
-    def _go_to(self, message: protocol.GoTo) -> None:
+    def _go_to(self, message: from_page.GoTo) -> None:
         self._session.go_to(message.entry)
         self._hub.changed()
 
     # ---- keeping ----
 
-    def _save_as(self, message: protocol.SaveAs) -> None:
+    def _save_as(self, message: from_page.SaveAs) -> None:
         self._hub.save_as(message.path, message.overwrite)
         self._hub.changed()
 
-    def _load_edits(self, message: protocol.LoadEdits) -> None:
+    def _load_edits(self, message: from_page.LoadEdits) -> None:
         self._session.load_edits(message.text, message.append)
         self._hub.changed()
 
-    def _set_path(self, message: protocol.SetPath) -> None:
-        self._session.set_path(tuple(map(key_of, message.keys)), message.loop)
+    def _set_path(self, message: from_page.SetPath) -> None:
+        self._session.set_path(keys_of(message), message.loop)
         self._hub.changed()
 
-    def _render(self, message: protocol.RenderJob) -> None:
+    def _render(self, message: from_page.RenderJob) -> None:
         self._hub.chores.render(message)
         self._hub.pump()
 
-    def _cancel_job(self, message: protocol.CancelJob) -> None:
+    def _cancel_job(self, message: from_page.CancelJob) -> None:
         self._hub.chores.cancel(message.job)
         self._hub.pump()

@@ -15,7 +15,7 @@ from cagefield.rendering.frame import Float32, Frame
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
 from cagefield.server import encoding
-from cagefield.server.scheduler import Look, Region
+from cagefield.server.pictures import Look, Region
 from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
 
 QUICK_LATTICE = 32

@@ -10,7 +10,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit
 from cagefield.keyframes import Still
-from cagefield.server.scheduler import Look, Region
+from cagefield.server.pictures import Look, Region
 
 WARM_STAGES = 4
 """Steps in which the kernels of edited pictures are made ready."""
@@ -140,7 +140,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class PictureDone:
-    """A rendered part: encoded picture and depths (see `protocol.PictureHeader`)."""
+    """A rendered part: encoded picture and depths (see `from_server.PictureHeader`)."""
 
     number: int
     picture: bytes

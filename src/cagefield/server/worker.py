@@ -6,7 +6,6 @@ hands it tasks, passes results on, and starts it again when it is lost.
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import multiprocessing
 import signal
@@ -15,15 +14,17 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, warnings_in_one_line
 from cagefield.server.tasks import Failed, Ready, Result, Task
 
-TO_END = 3.0
+TO_END = 10.0
 """Seconds that the process has to end by itself: then it keeps the kernels that it compiled."""
 
-_LOST = (EOFError, ConnectionResetError, BrokenPipeError, OSError)
+_LOST = (EOFError, OSError)
+"""What sending and receiving raise where the other process has gone."""
 
 
+@warnings_in_one_line()
 def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
     """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -36,24 +37,25 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
         devices.start(device)
         working = Working(Studio(Scene.open(scene)))
     except CagefieldError as error:
-        with contextlib.suppress(*_LOST):
-            connection.send(Failed(0, str(error)))
+        _sent(connection, Failed(0, str(error)))
         return
-    connection.send(Ready())
-    while True:
+    going_on = _sent(connection, Ready())
+    while going_on:
         try:
             task = connection.recv()
         except _LOST:
-            task = None
-        if task is None:
-            working.close()
-            return
-        result = _done(working, task, generation)
-        try:
-            connection.send(result)
-        except _LOST:
-            working.close()
-            return
+            break
+        going_on = task is not None and _sent(connection, _done(working, task, generation))
+    working.close()
+
+
+def _sent(connection: Connection, content: Any) -> bool:
+    """Whether there was still somebody to send it to."""
+    try:
+        connection.send(content)
+    except _LOST:
+        return False
+    return True
 
 
 def _done(working: Any, task: Task, generation: ctypes.c_ulong) -> Result:
@@ -90,7 +92,10 @@ class Worker:
         self._connection: Connection | None = None
 
     def start(self) -> None:
-        """Starts the process; `Ready` or `Failed` with number 0 comes when it has its scene."""
+        """Starts the process; `Ready` or `Failed` with number 0 comes when it has its scene.
+
+        Where it is gone before it has begun, `on_lost` is called.
+        """
         here, there = self._context.Pipe()
         process = self._context.Process(
             target=serve,
@@ -98,16 +103,22 @@ class Worker:
             daemon=True,
             name="cagefield-renderer",
         )
-        process.start()
-        there.close()
+        try:
+            process.start()
+        except _LOST:
+            self._process = self._connection = None
+            here.close()
+            self._on_lost()
+            return
+        finally:
+            there.close()
         self._process, self._connection = process, here
         threading.Thread(target=self._listen, args=(here,), daemon=True).start()
 
     def send(self, task: Task) -> None:
         """Hands over a task; if the process is gone, `on_lost` is called instead of an answer."""
         if self._connection is not None:
-            with contextlib.suppress(*_LOST):
-                self._connection.send(task)
+            _sent(self._connection, task)
 
     def abandon(self, generation: int) -> None:
         """Tasks of older generations stop at their next look."""
@@ -123,8 +134,7 @@ class Worker:
         connection, self._connection = self._connection, None
         if connection is not None:
             self._generation.value = ctypes.c_ulong(-1).value
-            with contextlib.suppress(*_LOST):
-                connection.send(None)
+            _sent(connection, None)
             if self._process is not None:
                 self._process.join(TO_END)
             connection.close()

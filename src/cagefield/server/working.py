@@ -12,8 +12,8 @@ from cagefield.errors import CagefieldError
 from cagefield.server.encoding import picture_of, png
 from cagefield.server.grid_lines import grid_lines
 from cagefield.server.job_files import JobFiles
+from cagefield.server.pictures import Look
 from cagefield.server.placing import probes
-from cagefield.server.scheduler import Look
 from cagefield.server.studio import GivenUpError, Studio, giving_up
 from cagefield.server.tasks import (
     Answered,
@@ -113,7 +113,7 @@ class Working:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
-        from cagefield.warps.device import DeviceStack
+        from cagefield.warps.device_stack import DeviceStack
 
         points = probes(task.cage)
         stack = DeviceStack.from_stack(EditStack(self._studio.edits(task.shown.edits)))

@@ -33,6 +33,12 @@ REACH = 6.0
 ACROSS = 1.0 / 16.0
 """Conductivity across a surface's plane, over that in it."""
 
+TOLERANCE = 1e-4
+"""Relative residual to which the diffusion is solved."""
+
+MOST_STEPS = 200
+"""Steps of an iterative solution, at most; see `_solved`."""
+
 
 def filled(field: VoxelField, unseen: NDArray[np.bool_]) -> VoxelField:
     """The field with its vertices `unseen` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
@@ -96,17 +102,49 @@ def _spread(
             share = REACH**2 * (ACROSS if other == axis else 1.0)
             a, b = links[other]
             diagonal += share * np.bincount(a, minlength=count)
-            parts.append((a, b, np.full(len(a), -share)))
+            parts.append((a, b, np.full(len(a), share)))
             a, b = inlets[other]
             diagonal += share * np.bincount(a, minlength=count)
             for channel in range(4):
                 source[:, channel] += share * np.bincount(a, given[b, channel], minlength=count)
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-        matrix = sparse.csr_matrix((values, (rows, columns)), (count, count)) + sparse.diags(diagonal)
-        guide = sparse.diags(1.0 / diagonal)
-        for channel in range(4):
-            total[:, channel] += cg(matrix, source[:, channel], rtol=1e-4, M=guide)[0]
+        total += _solved(sparse.csr_matrix((values, (rows, columns)), (count, count)), diagonal, source)
     return np.asarray(total[:, 1:] / np.maximum(total[:, :1], 1e-12))
+
+
+def _solved(
+    pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """u [T,C] with (diag(diagonal) - pull) u = source [T,C]; pull [T,T] >= 0 with row sums <= diagonal - 1.
+
+    With the diagonal as preconditioner the eigenvalues are in [1 / max(diagonal), 2]: a condition number of
+    300 at most for REACH and ACROSS, for which the bound on the error of conjugate gradients gives TOLERANCE
+    after 111 steps. Where MOST_STEPS of them do not reach it for some column, all get as many sweeps of
+    Jacobi's instead. Those stop short of the solution, but each u of theirs is a sum of sources with the same
+    weights >= 0 in all columns, so that a ratio of columns stays between those of the sources; an unfinished
+    u of conjugate gradients is not.
+
+    Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), sections 6.11 and 4.2.
+    """
+    matrix = sparse.diags(diagonal) - pull
+    guide = sparse.diags(1.0 / diagonal)
+    solved = []
+    for column in source.T:
+        u, unfinished = cg(matrix, column, rtol=TOLERANCE, maxiter=MOST_STEPS, M=guide)
+        if unfinished:
+            return _swept(pull, diagonal, source)
+        solved.append(u)
+    return np.stack(solved, axis=1)
+
+
+def _swept(
+    pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """u [T,C] of `_solved` after MOST_STEPS sweeps of Jacobi's from u = 0."""
+    u = np.zeros_like(source)
+    for _ in range(MOST_STEPS):
+        u = (source + pull @ u) / diagonal[:, None]
+    return u
 
 
 def _links(

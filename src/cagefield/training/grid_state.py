@@ -16,7 +16,7 @@ from scipy import ndimage
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import brick_order, to_device
-from cagefield.training.kernels import HEAD
+from cagefield.training.records import HEAD
 
 
 @dataclass(eq=False)
@@ -26,7 +26,8 @@ class GridState:
     Attributes:
         bounds: [2,3] as VoxelField. resolution: vertices per axis. vertices: [M] linear, in slot order.
         contracted: as VoxelField. degree: SH degree.
-        density, sh, state, weight, accumulator, index, codes: device arrays; see `kernels`.
+        density, sh, state, weight, accumulator, index, codes: device arrays; see
+            `march_kernel`, `update_kernels` and `records`.
         workers: number of accumulators.
     """
 

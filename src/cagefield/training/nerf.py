@@ -85,6 +85,8 @@ class NerfConfig:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise CagefieldError(f"{name} is {value}; it must be from {low} to {high}")
+        if not all(0 <= count <= 16 for count in self.octaves):
+            raise CagefieldError(f"octaves are {self.octaves}; each must be from 0 to 16")
         if self.minutes is not None and not 0 < self.minutes < 1e5:
             raise CagefieldError(f"minutes is {self.minutes}; it must be above 0")
         if not 0 < self.rate < 1:
@@ -145,8 +147,8 @@ def train_nerf(
 ) -> NerfResult:
     """The NerfField trained on a data set's photos.
 
-    With `checkpoint` the state is written there every minute and when Ctrl-C ends the run early (`finished`
-    is then False); `resume` goes on from it.
+    With `checkpoint` the state is written there every minute and at the end of the run, which may be early
+    (Ctrl-C; `finished` is then False); `resume` goes on from it, and takes no step where it was finished.
 
     Raises:
         CagefieldError: NDC that do not suit the capture, or a checkpoint that cannot be read or has other
@@ -223,6 +225,7 @@ class _Run:
             config.samples,
             self.space.lindisp,
             self.space.ndc,
+            bounded=not dataset.unbounded,
         )
         self.torch = TorchNerf(self.start, self.device, trainable=True)
         self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)

@@ -48,7 +48,8 @@ def run_to_end(
 ) -> bool:
     """True when the run was finished, False when Ctrl-C ended it early.
 
-    Its state is written to `checkpoint` every minute and when it ends early; `resume` goes on from there.
+    Its state is written to `checkpoint` every minute and at its end, early or not; `resume` goes on from
+    there: a run that was finished is so at once.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
     Raises:
@@ -58,7 +59,7 @@ def run_to_end(
         if checkpoint is None or not checkpoint.is_file():
             raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start without resume")
         run.restore(checkpoint)
-    saved = run.seconds
+    saved, stored = run.seconds, run.step if resume else None
     with _interruptible() as interrupted:
         while run.done < 1.0 and not interrupted():
             before = run.step, run.seconds
@@ -68,11 +69,10 @@ def run_to_end(
             after_step(before)
             if checkpoint is not None and run.seconds - saved > CHECKPOINT_SECONDS:
                 run.store(checkpoint)
-                saved = run.seconds
-        finished = run.done >= 1.0
-        if checkpoint is not None and not finished:
+                saved, stored = run.seconds, run.step
+        if checkpoint is not None and run.step != stored:
             run.store(checkpoint)
-    return finished
+    return run.done >= 1.0
 
 
 @contextlib.contextmanager

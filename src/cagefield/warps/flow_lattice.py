@@ -2,7 +2,7 @@
 
 The march of `flow_device`, written for `LANES` nodes at a time: the innermost loops run over them, have no
 branches, and keep each number of all of them in one array, so that compilers use vector instructions. The
-table is that of `flow_device`. Two things differ from the march of single samples, by less than the error of
+table is that of `flow_table`. Two things differ from the march of single samples, by less than the error of
 its steps: it goes on in the outer cage's coordinates z, so that only the start of a way is straightened
 there, and the inner cage's xi are followed by two of Newton's steps a stage, with one slope, not to rounding.
 Nodes that these do not suffice for are marked, and marched again one by one.
@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.devices import floats
 from cagefield.loops import Deal, deal_of, dealt, turns
-from cagefield.warps.flow_device import HEADER, MOMENT, flow_point, table
+from cagefield.warps.flow_device import flow_point
 from cagefield.warps.flow_lanes import bend, inverse, newton, newton_twice, times, weight_at
 from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.flow_table import HEADER, MOMENT, table
 
 LANES = 64
 lanes = qd.types.vector(LANES, qd.f32)

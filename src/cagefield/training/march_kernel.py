@@ -1,4 +1,4 @@
-"""Fused kernels of the voxel trainer: forward and backward march, Laplacian, diagonal Gauss-Newton update.
+"""The kernel that marches a batch of photo rays forward and back and adds up their gradients.
 
 Notation, per ray and channel: samples i with density s_i, step h_i, alpha_i = 1 - exp(-s_i h_i),
 transmittance T_i, weight w_i = T_i alpha_i, colour c_i; C = sum_i w_i c_i + T_end * background;
@@ -11,11 +11,7 @@ The loss of a ray is r^2 / 2 summed over channels, plus `distortion` times the d
 
 The march computes C and notes its few samples that carry weight in a scratch area of the worker; the way
 back over them has the gradients from S_i. (Marching twice instead, with nothing noted, took 1.5 times as long
-on a CPU.) b_v are trilinear weights. Each worker adds into its own accumulator, so that no atomics are needed
-on a CPU and the sums do not depend on timing; on a GPU one accumulator is shared, with atomic adds.
-
-Accumulator record of a slot (stride 4 + 3K): density gradient, density curvature sum_c (dC_c/ds)^2,
-colour curvature w^2, largest weight, then the 3K colour gradients (basis-major).
+on a CPU.) b_v are trilinear weights.
 """
 
 import quadrants as qd
@@ -35,14 +31,17 @@ from cagefield.rendering.grid import (
     sh_basis,
     vec3,
 )
-from cagefield.rendering.traverse import empty_run, look_ahead, safe_inverse, slab
+from cagefield.rendering.traverse import look_ahead, safe_inverse, slab
+from cagefield.training.records import HEAD, add
 
-HEAD = 4
 SAMPLE = 8
 """Floats of a noted sample: t, h, w, T after it, and its colour before the clamp."""
+
 MOST_SAMPLES = 512
+"""Samples of a ray that are noted at most."""
+
 LEAST_WEIGHT = 1e-4
-DENSITY_GRADIENT, DENSITY_CURVATURE, COLOUR_CURVATURE, LARGEST_WEIGHT = range(HEAD)
+"""Weight from which on a sample counts."""
 
 
 @qd.func
@@ -52,15 +51,6 @@ def hash01(a: qd.u32, b: qd.u32):
     s = ((s >> ((s >> qd.u32(28)) + qd.u32(4))) ^ s) * qd.u32(277803737)
     s = (s >> qd.u32(22)) ^ s
     return qd.cast(s >> qd.u32(8), qd.f32) * (1.0 / 16777216.0)
-
-
-@qd.func
-def add(target: qd.template(), at: qd.i32, value: qd.f32, gpu: qd.template()):
-    """target[at] += value, atomically on a GPU only."""
-    if qd.static(gpu):
-        qd.atomic_add(target[at], value)
-    else:
-        target[at] = target[at] + value
 
 
 @qd.func
@@ -292,183 +282,3 @@ def march_batch(
                                     y = b[k] * basis[j]
                                     for a in qd.static(range(3)):
                                         add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
-
-
-@qd.kernel(fastcache=True)
-def gauss_newton(
-    density: F32,
-    sh: F32,
-    state: F32,
-    weight: F32,
-    cell: F32,
-    accumulator: F32,
-    record: qd.i32,
-    workers: qd.i32,
-    slots: qd.i32,
-    decay: qd.f32,
-    density_rate: qd.f32,
-    colour_rate: qd.f32,
-    largest_step: qd.f32,
-    damping: qd.f32,
-    plain: qd.f32,
-    K: qd.template(),
-):
-    """One diagonal Gauss-Newton step of every slot the batch touched; empties the accumulators.
-
-    state: [slots, 2] running sums of density and colour curvature, decayed on each touch.
-    weight: [slots] the largest weight seen since the last pruning. cell: [slots] world-space voxel size h.
-    The density moves by at most largest_step / h; `damping` is added to the colour curvature, and times h^2
-    to the density curvature. Coefficients c that make a colour depend on the view get the gradient of
-    plain/2 * c^2 for each unit of colour curvature: where photos from many sides say what they are it does
-    little, where they do not it keeps them small.
-    """
-    qd.loop_config(block_dim=256)
-    for slot in range(1, slots):
-        stride = qd.static(HEAD + 3 * K)
-        h_density = 0.0
-        h_colour = 0.0
-        for worker in range(workers):
-            at = worker * record + slot * stride
-            h_density += accumulator[at + 1]
-            h_colour += accumulator[at + 2]
-        if h_colour > 0.0:
-            s0 = state[2 * slot] * decay + h_density
-            s1 = state[2 * slot + 1] * decay + h_colour
-            state[2 * slot] = s0
-            state[2 * slot + 1] = s1
-            g_density = 0.0
-            w = weight[slot]
-            for worker in range(workers):
-                at = worker * record + slot * stride
-                g_density += accumulator[at]
-                w = qd.max(w, accumulator[at + 3])
-                for a in qd.static(range(HEAD)):
-                    accumulator[at + a] = 0.0
-            weight[slot] = w
-            change = density_rate * g_density / (s0 + damping * cell[slot] * cell[slot])
-            limit = largest_step / cell[slot]
-            density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
-            rate = colour_rate / (s1 + damping)
-            for j in qd.static(range(3 * K)):
-                g = 0.0
-                for worker in range(workers):
-                    at = worker * record + slot * stride + HEAD + j
-                    g += accumulator[at]
-                    accumulator[at] = 0.0
-                c = sh[slot * (3 * K) + j]
-                if qd.static(j >= 3):
-                    g += plain * h_colour * c
-                sh[slot * (3 * K) + j] = c - rate * g
-
-
-@qd.kernel(fastcache=True)
-def touched_patches(
-    touched: I32,
-    patches: I32,
-    n_patches: qd.i32,
-    patch_size: qd.i32,
-    views: I32,
-    poses: F32,
-    directions: F32,
-    codes: I32,
-    brick_dims: ivec3,
-    lower: vec3,
-    scale: vec3,
-    resolution: ivec3,
-    near: qd.f32,
-):
-    """Sets touched[p] to 1 where any ray of patch p meets an occupied block of a bounded grid, else 0."""
-    for patch in range(n_patches):
-        found = 0
-        for r in range(patch_size * patch_size):
-            view = patches[3 * patch]
-            column = patches[3 * patch + 1] + r % patch_size
-            row = patches[3 * patch + 2] + r // patch_size
-            if found == 0 and row < views[4 * view + 3] and column < views[4 * view + 1]:
-                m = 12 * view
-                at = 3 * (views[4 * view + 2] + row * views[4 * view + 1] + column)
-                l = vec3(directions[at], directions[at + 1], directions[at + 2])
-                d = vec3(
-                    poses[m] * l.x + poses[m + 1] * l.y + poses[m + 2] * l.z,
-                    poses[m + 4] * l.x + poses[m + 5] * l.y + poses[m + 6] * l.z,
-                    poses[m + 8] * l.x + poses[m + 9] * l.y + poses[m + 10] * l.z,
-                )
-                go = (vec3(poses[m + 3], poses[m + 7], poses[m + 11]) - lower) * scale
-                gd = d * scale
-                inverse = safe_inverse(gd)
-                hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
-                t = qd.max(hit.x, near)
-                nudge = 0.05 / qd.abs(gd).max()
-                while t < hit.y and found == 0:
-                    run = empty_run(codes, go + t * gd, inverse, ivec3(0, 0, 0), brick_dims)
-                    if run < 0.0:
-                        found = 1
-                    t += run + nudge
-        touched[patch] = found
-
-
-@qd.kernel(fastcache=True)
-def laplacian(
-    density: F32,
-    sh: F32,
-    index: I32,
-    vertex_at: I32,
-    cell: F32,
-    accumulator: F32,
-    slots: qd.i32,
-    resolution: ivec3,
-    density_weight: qd.f32,
-    colour_weight: qd.f32,
-    K: qd.template(),
-):
-    """Adds the gradient and curvature of weight/2 * sum over stored neighbours (x - x_n)^2 to touched slots.
-
-    Touched: the first accumulator has a colour curvature. Neighbours are the 6 along the axes. The density's
-    weight is times the squared voxel size, so that it acts on optical depth per voxel.
-    """
-    qd.loop_config(block_dim=256)
-    for slot in range(1, slots):
-        stride = qd.static(HEAD + 3 * K)
-        to = slot * stride
-        if accumulator[to + 2] > 0.0:
-            at = vertex_at[slot]
-            nyz = resolution.y * resolution.z
-            x = at // nyz
-            rest = at - x * nyz
-            y = rest // resolution.z
-            z = rest - y * resolution.z
-            count = 0.0
-            s = qd.Vector.zero(qd.f32, 3 * K)
-            d = 0.0
-            for n in qd.static(range(6)):
-                other = 0
-                if qd.static(n == 0):
-                    if x > 0:
-                        other = index[at - nyz]
-                if qd.static(n == 1):
-                    if x < resolution.x - 1:
-                        other = index[at + nyz]
-                if qd.static(n == 2):
-                    if y > 0:
-                        other = index[at - resolution.z]
-                if qd.static(n == 3):
-                    if y < resolution.y - 1:
-                        other = index[at + resolution.z]
-                if qd.static(n == 4):
-                    if z > 0:
-                        other = index[at - 1]
-                if qd.static(n == 5):
-                    if z < resolution.z - 1:
-                        other = index[at + 1]
-                if other > 0:
-                    count += 1.0
-                    d += density[other]
-                    for j in qd.static(range(3 * K)):
-                        s[j] += sh[other * (3 * K) + j]
-            scaled = density_weight * cell[slot] * cell[slot]
-            accumulator[to] = accumulator[to] + scaled * (count * density[slot] - d)
-            accumulator[to + 1] = accumulator[to + 1] + scaled * count
-            accumulator[to + 2] = accumulator[to + 2] + colour_weight * count
-            for j in qd.static(range(3 * K)):
-                a = to + HEAD + j
-                accumulator[a] = accumulator[a] + colour_weight * (count * sh[slot * (3 * K) + j] - s[j])

@@ -1,0 +1,142 @@
+"""The folder in which Quadrants keeps compiled kernels.
+
+Where it cannot be used, or fails in the middle, a warning says so, and every process compiles its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import functools
+import hashlib
+import os
+import shutil
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+KEPT_SECONDS = 30 * 86400.0
+"""How long kernels of other versions of the package are kept after they were last used."""
+
+LOCKED_SECONDS = 60.0
+"""How long a process may hold the lock of a folder of kernels: it writes a few megabytes."""
+
+PATIENCE = 1.0
+"""Seconds that a lock is waited for: without it Quadrants neither reads the folder nor writes to it."""
+
+LEAST_BYTES = 16 << 20
+"""Room that is needed to keep kernels: all of them take less than 10 megabytes."""
+
+
+def kernel_cache() -> Path | None:
+    """The folder of the compiled kernels of this state of the package's source; None, with a warning, where
+    none can be used.
+
+    Quadrants finds a kernel again by the source of its functions, without the constants that they name: two
+    states of the packages that hold kernels must not share a folder. Folders that nobody used for long are
+    removed.
+    """
+    place = "~/.cache/cagefield/kernels"
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
+        place = str(base)
+        folder = base / _source_digest()
+        # Quadrants ends the process where it cannot make this folder in its own.
+        lock = folder / "kernel_compilation_manager" / "qdcache.lock"
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        if not all(map(_is_usable, (folder, *folder.rglob("*")))):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except (OSError, RuntimeError) as error:
+        _warn(place, error)
+        return None
+    _tidy(folder, lock)
+    if _is_held(lock):
+        warnings.warn(
+            f"another process holds {lock}, so this one compiles its own kernels; "
+            "remove that file if no other cagefield runs",
+            stacklevel=3,
+        )
+        return None
+    return folder
+
+
+def forgive() -> None:
+    """Has Quadrants go on where the folder can no longer be written while kernels are compiled."""
+    from quadrants.lang._fast_caching.python_side_cache import PythonSideCache
+
+    told: list[OSError] = []
+
+    def forgiven(method: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(method)
+        def quiet(cache: Any, *args: Any) -> Any:
+            try:
+                return method(cache, *args)
+            except OSError as error:
+                if not told:
+                    _warn(str(Path(cache.cache_folder).parent), error)
+                told.append(error)
+                return None
+
+        return quiet
+
+    own_store = PythonSideCache.store
+
+    def store(cache: Any, key: str, value: str) -> None:
+        # The compiled kernel follows after this note of it, and says nothing where there is no room for it.
+        if shutil.disk_usage(cache.cache_folder).free < LEAST_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        own_store(cache, key, value)
+
+    PythonSideCache.store = store
+    for name in ("__init__", "store", "try_load"):
+        setattr(PythonSideCache, name, forgiven(getattr(PythonSideCache, name)))
+
+
+def _is_usable(part: Path) -> bool:
+    """Whether a folder or file of the cache can be read and written, or has just gone."""
+    return os.access(part, os.R_OK | os.W_OK | (os.X_OK if part.is_dir() else 0)) or not part.exists()
+
+
+def _warn(place: str, error: Exception) -> None:
+    reason = getattr(error, "strerror", None) or error
+    warnings.warn(
+        f"compiled kernels cannot be kept in {place} ({reason}), so every process compiles its own; "
+        "make room there, or set XDG_CACHE_HOME to a folder that can be written",
+        stacklevel=3,
+    )
+
+
+def _tidy(folder: Path, lock: Path) -> None:
+    """Removes what nobody needs beside a folder of kernels, and the lock of a process that died with it."""
+    with contextlib.suppress(OSError):
+        for other in list(folder.parent.iterdir()):
+            with contextlib.suppress(OSError):
+                if time.time() - other.stat().st_mtime > KEPT_SECONDS:
+                    shutil.rmtree(other, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
+            lock.unlink()
+
+
+def _is_held(lock: Path) -> bool:
+    """Whether somebody holds a lock for longer than PATIENCE."""
+    ends = time.monotonic() + PATIENCE
+    while lock.exists():
+        if time.monotonic() > ends:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def _source_digest() -> str:
+    """A digest of the source in all folders that hold kernels."""
+    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
+    folders = {path.parent for path, source in sources.items() if b"import quadrants" in source}
+    digest = hashlib.sha256()
+    for path, source in sources.items():
+        if path.parent in folders:
+            digest.update(source)
+    return digest.hexdigest()[:16]

@@ -1,0 +1,61 @@
+"""What of a canonical field lies within reach of a point, inside Quadrants kernels.
+
+Points and reaches r are in grid coordinates; all of the box [point - r, point + r] is looked through.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+from cagefield.rendering.grid import ivec3, vec3
+
+MOST_CELLS = 12.0
+"""Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""
+
+
+@qd.func
+def is_blocked(image: vec3, r: vec3, codes: qd.template(), bricks: ivec3, origin: ivec3):
+    """1 where an occupied block lies within r of an image, grid coordinates, else 0."""
+    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - (origin >> 1), 0)
+    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - (origin >> 1), 2 * bricks - 1)
+    found = 0
+    x = first.x >> 1
+    while x <= last.x >> 1 and found == 0:
+        in_x = between(x, first.x, last.x, 0xF0)
+        for y in range(first.y >> 1, (last.y >> 1) + 1):
+            in_xy = in_x & between(y, first.y, last.y, 0xCC)
+            for z in range(first.z >> 1, (last.z >> 1) + 1):
+                code = codes[(x * bricks.y + y) * bricks.z + z]
+                found |= code & in_xy & between(z, first.z, last.z, 0xAA)
+        x += 1
+    return qd.min(found, 1)
+
+
+@qd.func
+def between(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
+    """Bits of a brick's sub-blocks from the block `first` to `last` along an axis.
+
+    `upper` are the bits of its second sub-blocks.
+    """
+    bits = 0xFF
+    if first > 2 * brick:
+        bits = upper
+    if last <= 2 * brick:
+        bits = bits & ~upper
+    return bits
+
+
+@qd.func
+def is_dense(image: vec3, r: vec3, index: qd.template(), density: qd.template(), resolution: ivec3):
+    """1 where a cell within r of an image, grid coordinates, holds density, else 0."""
+    first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
+    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+    found = 0
+    x = first.x
+    while x <= last.x and found == 0:
+        for y in range(first.y, last.y + 1):
+            for z in range(first.z, last.z + 1):
+                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                    found = 1
+        x += 1
+    return found

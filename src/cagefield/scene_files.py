@@ -1,0 +1,107 @@
+"""What a scene's folder holds, and the reading of its manifest and cameras; `scene` states the layout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from cagefield.cameras import Camera
+from cagefield.errors import CagefieldError, SceneError
+from cagefield.rendering.frame import background_rgb
+
+FORMAT = "cagefield-scene"
+VERSION = 1
+
+FIELD, EDITS, CAMERAS, MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
+ORIGINAL = "original.safetensors"
+FILES = (FIELD, ORIGINAL, EDITS, CAMERAS, MANIFEST)
+
+
+def check_destination(path: Path | str, overwrite: bool) -> Path:
+    """The resolved folder that a scene may be written to: new, empty, or a scene to be replaced.
+
+    Called before a long training, so that its result has a place to go.
+
+    Raises:
+        SceneError: something is there that may not be replaced.
+    """
+    target = Path(path).resolve()
+    if not target.exists():
+        return target
+    if not target.is_dir():
+        raise SceneError(f"{path} is a file; give a new folder for the scene")
+    if not any(target.iterdir()):
+        return target
+    if not is_scene(target):
+        raise SceneError(f"{path} is a folder that holds no scene and is left as it is; give a new folder")
+    if not overwrite:
+        raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
+    return target
+
+
+def is_scene(path: Path | str) -> bool:
+    """True where `path` is a folder with the manifest of a scene, of any version."""
+    try:
+        document = json.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(document, dict) and document.get("format") == FORMAT
+
+
+def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool]:
+    """Background, gains, unchecked, and the opacity choice."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise SceneError(
+            f"folder {folder} holds no {MANIFEST}: it is not a scene; give the folder of a scene"
+        )
+    document = _read_json(path)
+    if document.get("format") != FORMAT:
+        raise SceneError(
+            f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"; give a scene folder'
+        )
+    version = document.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+        raise SceneError(f"{path}: version is {version!r}, expected a whole number from 1 to {VERSION}")
+    if version > VERSION:
+        raise SceneError(
+            f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
+        )
+    opacity = document.get("preserve_opacity", True)
+    if not isinstance(opacity, bool):
+        raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
+    try:
+        return background_rgb(document.get("background")), document.get("gains", ()), opacity
+    except (CagefieldError, TypeError, ValueError) as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
+    cameras: dict[str, tuple[Camera, ...]] = {}
+    for split, members in _read_json(path).items():
+        if not isinstance(members, list):
+            raise SceneError(f'{path}: "{split}" must be a list of cameras; write the scene again')
+        read = []
+        for index, member in enumerate(members):
+            try:
+                read.append(Camera.from_dict(member))
+            except (CagefieldError, KeyError, TypeError, AttributeError) as error:
+                raise SceneError(f"{path}: {split}[{index}] is no camera: {error}") from error
+        cameras[split] = tuple(read)
+    return cameras
+
+
+def write_json(document: Mapping[str, object], path: Path) -> None:
+    path.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
+    if not isinstance(document, dict):
+        raise SceneError(f"{path} must hold a JSON object; copy it back or train again")
+    return document

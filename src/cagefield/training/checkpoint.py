@@ -1,0 +1,46 @@
+"""The state of a VoxelField's training in a file: numbers and arrays by name, and what they belong to."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import CagefieldError
+
+
+def write_checkpoint(
+    path: Path, signature: str, scalars: Mapping[str, Any], arrays: Mapping[str, Any]
+) -> None:
+    """Writes them atomically; `signature` says which training they belong to."""
+    contents: dict[str, Any] = {"scalars": json.dumps(scalars), "config": signature, **arrays}
+    draft = path.with_name(path.name + ".part")
+    with open(draft, "wb") as file:
+        np.savez(file, **contents)
+    os.replace(draft, path)
+
+
+def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """(scalars, arrays) of a file that `write_checkpoint` wrote with the same signature.
+
+    Raises:
+        CagefieldError: no such file, a damaged one, or one of another training.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        scalars, written_for = json.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))
+    except KeyError as error:
+        raise CagefieldError(
+            f"{path}: the checkpoint of another kind of training; give the field that it was started with"
+        ) from error
+    except Exception as error:  # zipfile raises its own classes on damaged archives
+        raise CagefieldError(f"{path}: not a readable checkpoint ({error}); start without resume") from error
+    if written_for != signature:
+        raise CagefieldError(f"{path}: written for other photos or settings; start without resume")
+    return scalars, arrays

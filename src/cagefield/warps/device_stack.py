@@ -1,0 +1,136 @@
+"""An edit stack packed for kernels: its edits' rows, their lattices and flow tables, and their boxes."""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import quadrants as qd
+from numpy.typing import NDArray
+
+from cagefield import devices
+from cagefield.loops import Deal, deal_of, dealt, turns
+from cagefield.warps import flow_table
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.edit_device import Nodes, Params, map_sample
+from cagefield.warps.edit_lattice import nodes_of
+from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.hexahedron_device import read3
+from cagefield.warps.joined import Joined
+from cagefield.warps.kept import kept
+from cagefield.warps.rows import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
+
+_joined = Joined()
+
+
+class PackedStack(Protocol):
+    """What of an edit stack is packed."""
+
+    @property
+    def active(self) -> Sequence[PackedEdit]: ...
+
+
+@dataclass(frozen=True)
+class DeviceStack:
+    """An edit stack packed for kernels.
+
+    params [max(E,1), WIDTH] float32; lattice [M,3] float32, all edits' nodes one after the other (x fastest),
+    displacements in world units, and the tables of exact flow shells (see `flow_table`); n_edits E; boxes
+    [B,2,3] float32 (min, max), one or two for each edit, outside all of which a sample is canonical as it is.
+    """
+
+    params: NDArray[np.float32]
+    lattice: NDArray[np.float32]
+    n_edits: int
+    boxes: NDArray[np.float32]
+
+    @classmethod
+    def from_stack(cls, stack: PackedStack) -> "DeviceStack":
+        """The stack's enabled edits that change something. Raises `EditError` where one cannot be evaluated.
+
+        Lattices are sampled here, by the kernel, and kept for as long as their edit lives.
+        """
+        edits = stack.active
+        params = np.zeros((max(len(edits), 1), WIDTH), dtype=np.float32)
+        lattices: list[NDArray[np.float32]] = []
+        offset = 0
+        for number, edit in enumerate(edits):
+            row = params[number]
+            row[:] = row_of(edit)
+            nodes = nodes_of(edit) if row[RESOLUTION] > 0.0 else _flow_table(edit)
+            if len(nodes):
+                row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
+                offset += len(nodes)
+                lattices.append(nodes)
+        nodes = np.zeros((1, 3), dtype=np.float32)
+        if lattices:
+            nodes = lattices[0] if len(lattices) == 1 else _joined.join(lattices)
+        for number in range(len(edits)):
+            params[number, ALONE] = not _meets(params[:number], params[number])
+        boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))
+        packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
+        for array in (packed.params, packed.lattice, packed.boxes):
+            array.setflags(write=False)
+        return packed
+
+    @property
+    def has_flows(self) -> bool:
+        """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
+        return bool((self.params[:, RESOLUTION] == FLOW).any())
+
+    def to_canonical(
+        self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
+        """(points [N,3], viewdirs [N,3], stretch [N], emptied [N]) of samples, by `map_sample`."""
+        devices.start()
+        n = len(points)
+        out = np.empty((n, 8), dtype=np.float32)
+        samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
+        if n:
+            _map_samples(
+                samples, deal_of(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
+            )
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
+
+
+@kept
+def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
+    """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] for all other edits."""
+    warp = edit.exact_warp
+    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+        return flow_table.table(warp.shell)
+    return np.zeros((0, 3), dtype=np.float32)
+
+
+def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
+    """True where the box of one of the other rows meets that of `row`."""
+    low, high = row[BOX : BOX + 3], row[BOX + 3 : BOX + 6]
+    meets = (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low)
+    return bool(meets.all(axis=1).any())
+
+
+@qd.kernel(fastcache=True)
+def _map_samples(
+    samples: Params,
+    deal: Deal,
+    out: Params,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
+):
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            stretch = 1.0
+            if (v - d).norm() > 0.0:
+                stretch = v.norm()
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
+            out[i, 6] = stretch
+            out[i, 7] = qd.cast(emptied, qd.f32)
