@@ -18,7 +18,7 @@ from typing import IO, Any
 from websockets.sync.client import ClientConnection, connect
 
 PATIENCE = 120.0
-"""Seconds until a message that does not come is given up: the first pictures wait for kernels to compile."""
+"""Seconds until what does not come is given up, messages and ends: both wait for kernels to compile."""
 
 
 @dataclass
@@ -63,7 +63,7 @@ def editor_server(scene: Path, *options: str, errors: IO[str] | None = None) -> 
         yield EditorServer(process, match.group(0))
     finally:
         process.terminate()
-        process.wait(10)
+        process.wait(PATIENCE)
 
 
 @dataclass

@@ -50,6 +50,17 @@ def test_a_process_whose_server_has_gone_before_it_is_ready_ends_quietly(
     assert capfd.readouterr().err == ""
 
 
+def test_a_process_that_has_no_scene_yet_is_not_waited_for(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    ball_scene().save(tmp_path / "ball")
+    worker = Worker(str(tmp_path / "ball"), "cpu", lambda _: None, lambda: None)
+    worker.start()
+    worker.close()
+    assert worker._process.exitcode == -signal.SIGTERM
+    assert capfd.readouterr().err == ""
+
+
 def test_a_process_that_dies_while_it_is_started_is_lost_and_nothing_more(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

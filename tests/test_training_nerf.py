@@ -79,6 +79,15 @@ def test_a_checkpoint_of_other_options_is_refused(photos, tmp_path) -> None:
         train_nerf(dataset, tiny(), checkpoint=tmp_path / "state", resume=True)
 
 
+def test_a_checkpoint_may_be_named_by_text_and_needs_a_folder_before_the_first_step(photos, tmp_path) -> None:
+    dataset, told = load_dataset(photos), []
+    with pytest.raises(CagefieldError, match=r"there is no folder .*none for the checkpoint"):
+        train_nerf(dataset, tiny(), checkpoint=str(tmp_path / "none" / "state"), on_progress=told.append)
+    assert not told
+    train_nerf(dataset, tiny(steps=1), checkpoint=str(tmp_path / "state"))
+    assert train_nerf(dataset, tiny(steps=1), checkpoint=str(tmp_path / "state"), resume=True).steps == 1
+
+
 def test_warm_up_rays_come_from_the_middle(photos) -> None:
     run = training._Run(load_dataset(photos), tiny(batch_rays=400))
 

@@ -119,7 +119,13 @@ class Scene:
 
         Raises:
             FieldError: options outside their range, a field that is empty.
+            SceneError: a field of another class.
         """
+        if not isinstance(original, NerfField):
+            raise SceneError(
+                f"the original must be a NerfField, got {type(original).__name__}; "
+                "of another field make Scene(bake(field))"
+            )
         from cagefield.fields.baking import bake
 
         every = [camera for group in cameras.values() for camera in group]
@@ -236,7 +242,14 @@ class Scene:
         "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
         sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference; where
         the scene has an original field, that one, by its own hierarchical sampling.
+
+        Raises:
+            CagefieldError: no camera, or a background outside [0, 1].
         """
+        if not isinstance(camera, Camera):
+            raise SceneError(
+                f"camera must be a Camera, got {camera!r:.60}; give one such as scene.cameras['test'][0]"
+            )
         colour = self.background if background is None else background_rgb(background)
         if not exact:
             return cast(Frame, self.renderer.render(camera, background=colour, normals=normals))

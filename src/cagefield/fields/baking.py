@@ -93,7 +93,7 @@ def bake(
     report(0.4)
     stored = grown(sigma > least)
     if not stored.any():
-        raise FieldError(f"the field is empty in {box.tolist()}: nothing to bake; give other bounds")
+        raise _empty(box)
     vertices = np.argwhere(stored)
     coefficients = np.zeros((len(vertices), (sh_degree + 1) ** 2, 3), np.float32)
     chance = np.random.default_rng(seed)
@@ -162,6 +162,12 @@ def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
+def _empty(box: Array) -> FieldError:
+    return FieldError(
+        f"the field is empty in {box.tolist()}: nothing to bake; train it further or give other bounds"
+    )
+
+
 def _content(density: _Density, box: Array, opacity: float, report: Callable[[float], None]) -> Array:
     """The part of `box` that holds density, by 96 vertices along its longest axis, widened by one."""
     grid = _Grid.within(box, 96)
@@ -170,7 +176,7 @@ def _content(density: _Density, box: Array, opacity: float, report: Callable[[fl
     ).reshape(grid.shape)
     found = np.argwhere(sigma > -np.log1p(-opacity) / grid.edge)
     if len(found) == 0:
-        raise FieldError(f"the field is empty in {box.tolist()}: nothing to bake; give other bounds")
+        raise _empty(box)
     lower = grid.lower + (found.min(axis=0) - 1) * grid.edge
     upper = grid.lower + (found.max(axis=0) + 1) * grid.edge
     return np.stack([np.maximum(lower, box[0]), np.minimum(upper, box[1])])

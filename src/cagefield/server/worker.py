@@ -18,7 +18,7 @@ from cagefield.errors import CagefieldError, warnings_in_one_line
 from cagefield.server.tasks import Failed, Ready, Result, Task
 
 TO_END = 10.0
-"""Seconds that the process has to end by itself: then it keeps the kernels that it compiled."""
+"""Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
 
 _LOST = (EOFError, OSError)
 """What sending and receiving raise where the other process has gone."""
@@ -90,6 +90,7 @@ class Worker:
         self._generation: ctypes.c_ulong = context.RawValue(ctypes.c_ulong, 0)
         self._process: Any = None
         self._connection: Connection | None = None
+        self._has_scene = False
 
     def start(self) -> None:
         """Starts the process; `Ready` or `Failed` with number 0 comes when it has its scene.
@@ -112,7 +113,7 @@ class Worker:
             return
         finally:
             there.close()
-        self._process, self._connection = process, here
+        self._process, self._connection, self._has_scene = process, here, False
         threading.Thread(target=self._listen, args=(here,), daemon=True).start()
 
     def send(self, task: Task) -> None:
@@ -135,7 +136,7 @@ class Worker:
         if connection is not None:
             self._generation.value = ctypes.c_ulong(-1).value
             _sent(connection, None)
-            if self._process is not None:
+            if self._process is not None and self._has_scene:
                 self._process.join(TO_END)
             connection.close()
         if self._process is not None:
@@ -150,4 +151,5 @@ class Worker:
                 if self._connection is connection:
                     self._on_lost()
                 return
+            self._has_scene = True
             self._on_result(result)

@@ -141,7 +141,7 @@ def train_nerf(
     dataset: Dataset,
     config: NerfConfig | None = None,
     *,
-    checkpoint: Path | None = None,
+    checkpoint: Path | str | None = None,
     resume: bool = False,
     on_progress: Callable[[NerfProgress], None] | None = None,
 ) -> NerfResult:
@@ -151,8 +151,8 @@ def train_nerf(
     (Ctrl-C; `finished` is then False); `resume` goes on from it, and takes no step where it was finished.
 
     Raises:
-        CagefieldError: NDC that do not suit the capture, or a checkpoint that cannot be read or has other
-            options.
+        CagefieldError: NDC that do not suit the capture, or a checkpoint that has no folder, cannot be read
+            or has other options.
     """
     run = _Run(dataset, config or NerfConfig())
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
@@ -328,7 +328,7 @@ class _Run:
         except Exception as error:
             reason = " ".join(str(error).split())[:120]
             raise CagefieldError(
-                f"{path} is no checkpoint of this training ({reason}); start without resume"
+                f"{path} is no checkpoint of this training ({reason}); start anew"
             ) from error
         torch.manual_seed(self.config.seed + self.step)
 

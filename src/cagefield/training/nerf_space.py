@@ -58,7 +58,7 @@ def space_of(dataset: Dataset, ndc: bool | None = None) -> Space:
             moved, ratios = in_ndc_world(dataset)
             return Space(moved, 0.0, 1.0, ndc=ratios)
         if ndc:
-            raise CagefieldError(f"{dataset.path} cannot be trained in NDC: {reason}; leave out ndc")
+            raise CagefieldError(f"{dataset.path} cannot be trained in NDC: {reason}; train it without")
     if not dataset.unbounded:
         return Space(dataset, *_depths_of_box(dataset))
     moved = in_unit_cube(dataset)

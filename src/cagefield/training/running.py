@@ -41,7 +41,7 @@ class Run(Protocol):
 def run_to_end(
     run: Run,
     *,
-    checkpoint: Path | None,
+    checkpoint: Path | str | None,
     resume: bool,
     on_progress: Callable[[Any], None] | None,
     after_step: Callable[[tuple[int, float]], None] = lambda before: None,
@@ -53,12 +53,16 @@ def run_to_end(
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
     Raises:
-        CagefieldError: nothing to resume from, or nothing that `restore` can read.
+        CagefieldError: no folder for the checkpoint, nothing to resume from, or nothing that `restore` can
+            read.
     """
+    checkpoint = None if checkpoint is None else Path(checkpoint)
     if resume:
         if checkpoint is None or not checkpoint.is_file():
-            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start without resume")
+            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
         run.restore(checkpoint)
+    if checkpoint is not None and not checkpoint.parent.is_dir():
+        raise CagefieldError(f"there is no folder {checkpoint.parent} for the checkpoint; make it first")
     saved, stored = run.seconds, run.step if resume else None
     with _interruptible() as interrupted:
         while run.done < 1.0 and not interrupted():

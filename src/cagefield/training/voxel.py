@@ -47,7 +47,7 @@ def train_voxel(
     dataset: Dataset,
     config: VoxelConfig | None = None,
     *,
-    checkpoint: Path | None = None,
+    checkpoint: Path | str | None = None,
     resume: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     snapshots: Snapshots | None = None,
