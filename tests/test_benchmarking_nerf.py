@@ -19,7 +19,7 @@ from commands import refused
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.rendering.nerf import render_nerf  # noqa: E402
-from cagefield.training.nerf import NerfConfig  # noqa: E402
+from cagefield.training.nerf_config import NerfConfig  # noqa: E402
 
 
 @pytest.fixture(autouse=True)

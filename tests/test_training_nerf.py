@@ -15,8 +15,9 @@ from commands import printed, refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.training import nerf as training  # noqa: E402
-from cagefield.training.nerf import NerfConfig, evaluate_nerf, initial_network, train_nerf  # noqa: E402
+from cagefield.training.nerf import evaluate_nerf, train_nerf  # noqa: E402
+from cagefield.training.nerf_config import NerfConfig  # noqa: E402
+from cagefield.training.nerf_run import NerfRun, initial_network  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,8 @@ def test_a_resumed_run_ends_where_an_uninterrupted_one_does(photos, tmp_path) ->
     dataset = load_dataset(photos)
     config = tiny(steps=12)
 
-    whole = training._Run(dataset, config)
-    first = training._Run(dataset, config)
+    whole = NerfRun(dataset, config)
+    first = NerfRun(dataset, config)
     for _ in range(12):
         # torch's chance is that of the step, so that a pause changes nothing
         torch.manual_seed(whole.step)
@@ -56,7 +57,7 @@ def test_a_resumed_run_ends_where_an_uninterrupted_one_does(photos, tmp_path) ->
         torch.manual_seed(first.step)
         first.advance()
     first.store(tmp_path / "state")
-    second = training._Run(dataset, config)
+    second = NerfRun(dataset, config)
     second.restore(tmp_path / "state")
     for _ in range(7):
         torch.manual_seed(second.step)
@@ -69,7 +70,7 @@ def test_a_resumed_run_ends_where_an_uninterrupted_one_does(photos, tmp_path) ->
 
 def test_a_checkpoint_of_other_options_is_refused(photos, tmp_path) -> None:
     dataset = load_dataset(photos)
-    training._Run(dataset, tiny()).store(tmp_path / "state")
+    NerfRun(dataset, tiny()).store(tmp_path / "state")
     with pytest.raises(CagefieldError, match="was written with other options or photos"):
         train_nerf(dataset, tiny(width=20, steps=1), checkpoint=tmp_path / "state", resume=True)
     with pytest.raises(CagefieldError, match=r"no checkpoint at .* to resume from"):
@@ -89,7 +90,7 @@ def test_a_checkpoint_may_be_named_by_text_and_needs_a_folder_before_the_first_s
 
 
 def test_warm_up_rays_come_from_the_middle(photos) -> None:
-    run = training._Run(load_dataset(photos), tiny(batch_rays=400))
+    run = NerfRun(load_dataset(photos), tiny(batch_rays=400))
 
     def edge_cosine() -> float:
         return float(run._batch()[0].cosines.min())
@@ -105,7 +106,7 @@ def test_warm_up_rays_come_from_the_middle(photos) -> None:
 
 def test_targets_are_the_photos_colours_on_white(photos) -> None:
     dataset = load_dataset(photos)
-    run = training._Run(dataset, tiny(batch_rays=50))
+    run = NerfRun(dataset, tiny(batch_rays=50))
     rays, target = run._batch()
     origin = rays.origins[0].numpy()
     (view,) = [v for v in dataset.train if np.allclose(v.camera.origin, origin, atol=1e-5)]
@@ -162,7 +163,7 @@ def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, m
     assert scene.original is not None and scene.original.samples == (12, 12)
     assert len(scene.cameras["train"]) == 8
     assert not (tmp_path / "scene.training").exists()
-    monkeypatch.setitem(__import__("sys").modules, "cagefield.training.nerf", None)
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
     message = refused(capsys, "train", photos, "-o", tmp_path / "other", "--field", "nerf")
     assert "--field nerf needs PyTorch" in message
 
@@ -209,7 +210,7 @@ def test_a_training_whose_baking_failed_is_kept(photos, tmp_path, capsys, monkey
     message = refused(capsys, "train", photos, "-o", tmp_path / "scene", "--steps", 2, "--resume")
     assert "another kind of training; give the field that it was started with" in message
 
-    monkeypatch.setattr(training._Run, "advance", lambda run: pytest.fail("a finished run took a step"))
+    monkeypatch.setattr(NerfRun, "advance", lambda run: pytest.fail("a finished run took a step"))
     fails(KeyboardInterrupt())
     assert main([str(arg) for arg in ("train", *argv, "--resume")]) == 130
     assert capsys.readouterr().out == f"{kept}\n"

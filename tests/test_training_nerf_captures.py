@@ -19,8 +19,9 @@ from posed_photos import room_capture
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.training import nerf as training  # noqa: E402
-from cagefield.training.nerf import NerfConfig, train_nerf  # noqa: E402
+from cagefield.training.nerf import train_nerf  # noqa: E402
+from cagefield.training.nerf_config import NerfConfig  # noqa: E402
+from cagefield.training.nerf_run import PHOTOS, NerfRun  # noqa: E402
 from cagefield.training.nerf_space import space_of  # noqa: E402
 
 SMALL = NerfConfig.small
@@ -155,25 +156,25 @@ def test_it_learns(kind, gain, request) -> None:
 
 def test_captures_are_trained_with_noise_on_the_density(forward, tmp_path) -> None:
     """Without it a network whose density starts below its ReLU stays empty: black is what it shows."""
-    assert training._Run(load_dataset(forward), tiny()).jitter.noise == 1.0
-    assert training._Run(load_dataset(forward), tiny(noise=0.25)).jitter.noise == 0.25
+    assert NerfRun(load_dataset(forward), tiny()).jitter.noise == 1.0
+    assert NerfRun(load_dataset(forward), tiny(noise=0.25)).jitter.noise == 0.25
     bounded = make_scene("plant", tmp_path / "p", views=2, size=16, test_views=1)
-    assert training._Run(load_dataset(bounded), tiny()).jitter.noise == 0.0
+    assert NerfRun(load_dataset(bounded), tiny()).jitter.noise == 0.0
 
 
 def test_a_batch_of_a_capture_holds_rays_of_several_photos(forward) -> None:
-    run = training._Run(load_dataset(forward), tiny(batch_rays=33))
+    run = NerfRun(load_dataset(forward), tiny(batch_rays=33))
     rays, target = run._batch()
     assert len(rays.origins) == len(target) == 33
-    assert 3 <= len(np.unique(rays.origins.numpy(), axis=0)) <= training.PHOTOS
+    assert 3 <= len(np.unique(rays.origins.numpy(), axis=0)) <= PHOTOS
 
 
 @pytest.mark.parametrize("kind", ["forward", "around"])
 def test_a_resumed_run_ends_where_an_uninterrupted_one_does(kind, request, tmp_path) -> None:
     dataset = load_dataset(request.getfixturevalue(kind))
-    runs = [training._Run(dataset, tiny(steps=6)) for _ in range(3)]
+    runs = [NerfRun(dataset, tiny(steps=6)) for _ in range(3)]
 
-    def advance(run: training._Run, steps: int) -> None:
+    def advance(run: NerfRun, steps: int) -> None:
         for _ in range(steps):
             torch.manual_seed(run.step)
             run.advance()
@@ -186,7 +187,7 @@ def test_a_resumed_run_ends_where_an_uninterrupted_one_does(kind, request, tmp_p
     for one, other in zip(runs[2].field().coarse.layers(), runs[0].field().coarse.layers(), strict=True):
         np.testing.assert_allclose(one[1].weight, other[1].weight, atol=1e-6)
     with pytest.raises(CagefieldError, match="was written with other options or photos"):
-        training._Run(dataset, tiny(ndc=False)).restore(tmp_path / "state")
+        NerfRun(dataset, tiny(ndc=False)).restore(tmp_path / "state")
 
 
 def test_the_command_writes_a_scene_that_the_editor_can_show(forward, tmp_path, capsys, monkeypatch) -> None:

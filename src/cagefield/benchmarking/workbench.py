@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,9 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.images import replaced_whole
 from cagefield.rendering.sampled import render_sampled
 from cagefield.scene import Scene
+from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
-
-if TYPE_CHECKING:
-    from cagefield.training.nerf import NerfConfig
 
 UInt8 = NDArray[np.uint8]
 Mask = NDArray[np.bool_]

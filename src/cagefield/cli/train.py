@@ -24,7 +24,7 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
     from cagefield.scene import Scene
-    from cagefield.training.nerf import NerfConfig
+    from cagefield.training.nerf_config import NerfConfig
     from cagefield.training.voxel import TrainResult
     from cagefield.training.voxel_config import VoxelConfig
 
@@ -141,9 +141,10 @@ class Train:
 def nerf_config(training: TrainingOptions, preset: Preset, ndc: Ndc = "auto") -> NerfConfig:
     """The configuration of a NeRF's trainer. Raises CagefieldError where PyTorch is missing."""
     from cagefield import devices
+    from cagefield.training.nerf_config import NerfConfig
 
     try:
-        from cagefield.training.nerf import NerfConfig
+        import torch  # noqa: F401
     except ImportError as error:
         raise CagefieldError(
             "--field nerf needs PyTorch, which is not installed; pip install torch"

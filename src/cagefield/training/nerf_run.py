@@ -1,0 +1,227 @@
+"""The state of one training of a NerfField, from batch to batch."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from cagefield.cameras import Camera
+from cagefield.datasets.views import Dataset, View
+from cagefield.errors import CagefieldError
+from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
+from cagefield.rendering.nerf import Jitter, Rays, march
+from cagefield.training.nerf_config import NerfConfig
+from cagefield.training.nerf_space import space_of
+
+SKIP = 5
+"""The trunk layer that sees the position's encoding again."""
+
+GAIN = 0.1
+"""The learning rate falls to this share over `decay` steps."""
+
+PHOTOS = 8
+"""Photos whose rays a batch of an unbounded capture holds."""
+
+
+@dataclass(frozen=True)
+class NerfProgress:
+    """Where a run stands: `done` in [0,1], step, running PSNR of the fine picture, rays/s, seconds."""
+
+    done: float
+    step: int
+    psnr: float
+    rays_per_second: float
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"step {self.step}, PSNR {self.psnr:.1f} dB, {self.rays_per_second / 1e3:.2f} k rays/s"
+
+
+class NerfRun:
+    """A training run; see `running.Run`."""
+
+    def __init__(self, dataset: Dataset, config: NerfConfig) -> None:
+        self.config, self.space = config, space_of(dataset, config.ndc)
+        self.dataset = dataset = self.space.dataset
+        self.device = torch_device()
+        self.half = config.half
+        if self.half is None:
+            self.half = self.device.type == "cuda" and torch.cuda.is_bf16_supported()
+        torch.manual_seed(config.seed)
+        chance = np.random.default_rng(config.seed)
+        noise = (1.0 if dataset.unbounded else 0.0) if config.noise is None else config.noise
+        self.jitter = Jitter(noise)
+        self.start = NerfField(
+            initial_network(config, chance),
+            initial_network(config, chance) if config.samples[1] else None,
+            dataset.bounds,
+            self.space.near,
+            self.space.far,
+            config.samples,
+            self.space.lindisp,
+            self.space.ndc,
+            bounded=not dataset.unbounded,
+        )
+        self.torch = TorchNerf(self.start, self.device, trainable=True)
+        self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)
+        self.photos = [torch.from_numpy(composited(view)).to(self.device) for view in dataset.train]
+        self.white = dataset.train[0].load().shape[2] == 4
+        self.step, self.seconds, self.loss = 0, 0.0, float("nan")
+
+    @property
+    def done(self) -> float:
+        """Progress of the run, 0 to 1."""
+        if self.config.minutes is not None:
+            return min(1.0, self.seconds / (60.0 * self.config.minutes))
+        return min(1.0, self.step / self.config.steps)
+
+    def advance(self) -> None:
+        """One step."""
+        began = time.perf_counter()
+        config = self.config
+        passed = self.done if config.decay is None else self.step / config.decay
+        for group in self.optimizer.param_groups:
+            group["lr"] = config.rate * GAIN**passed
+        rays, target = self._batch()
+        with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.half):
+            coarse, fine = march(self.torch, rays, jitter=self.jitter)
+        behind = 1.0 if self.white else 0.0
+        errors = [
+            ((sums.premultiplied + behind * (1.0 - sums.opacity[:, None]) - target) ** 2).mean()
+            for sums in (coarse, fine)
+        ]
+        self.optimizer.zero_grad(set_to_none=True)
+        (errors[0] + errors[1]).backward()
+        self.optimizer.step()
+        self.step += 1
+        if self.step % 10 == 1 or self.loss != self.loss:
+            now = float(errors[1].detach())
+            self.loss = now if self.loss != self.loss else 0.8 * self.loss + 0.2 * now
+        self.seconds += time.perf_counter() - began
+
+    def _batch(self) -> tuple[Rays, Tensor]:
+        """Random rays of one photo or a few, and the photos' colours [N,3] there."""
+        chance = np.random.default_rng((self.config.seed, self.step))
+        count, unbounded = self.config.batch_rays, self.dataset.unbounded
+        photos = min(PHOTOS, count) if unbounded else 1
+        middle = not unbounded and self.step < self.config.precrop
+        parts = [self._rays(chance, len(rows), middle) for rows in np.array_split(np.arange(count), photos)]
+        rays, targets = zip(*parts, strict=True)
+        return Rays(*(torch.cat(column) for column in zip(*rays, strict=True))), torch.cat(targets)
+
+    def _rays(self, chance: np.random.Generator, count: int, middle: bool) -> tuple[Rays, Tensor]:
+        """`count` rays of a random photo, or of its middle half, and the photo's colours there."""
+        number = int(chance.integers(len(self.photos)))
+        camera: Camera = self.dataset.train[number].camera
+        columns, rows = camera.width, camera.height
+        low_i, low_j = (columns // 4, rows // 4) if middle else (0, 0)
+        i = chance.integers(low_i, columns - low_i, count)
+        j = chance.integers(low_j, rows - low_j, count)
+        target = self.photos[number][torch.from_numpy(j).to(self.device), torch.from_numpy(i).to(self.device)]
+        return Rays.of(camera, self.device, np.stack([i, j], axis=1)), target
+
+    def progress(self) -> NerfProgress:
+        """Where the run stands."""
+        psnr = -10.0 * np.log10(max(self.loss, 1e-10)) if self.loss == self.loss else float("nan")
+        rate = self.step * self.config.batch_rays / max(self.seconds, 1e-9)
+        return NerfProgress(self.done, self.step, float(psnr), rate, self.seconds)
+
+    def field(self) -> NerfField:
+        """The field as it is now."""
+        fine = None if self.torch.fine is None else _as_mlp(self.torch.fine)
+        return dataclasses.replace(self.start, coarse=_as_mlp(self.torch.coarse), fine=fine)
+
+    def store(self, path: Path) -> None:
+        """Writes the state of the run to `path`, whole or not at all."""
+        state = {
+            "config": repr(self._options()),
+            "step": self.step,
+            "seconds": self.seconds,
+            "loss": self.loss,
+            "parameters": [values.detach().cpu() for values in self.torch.parameters],
+            "optimizer": self.optimizer.state_dict(),
+        }
+        draft = path.with_name(path.name + ".new")
+        torch.save(state, draft)
+        draft.replace(path)
+
+    def restore(self, path: Path) -> None:
+        """Goes on from the state in `path`."""
+        try:
+            state = torch.load(path, map_location=self.device, weights_only=True)
+            if state["config"] != repr(self._options()):
+                raise CagefieldError(
+                    f"{path} was written with other options or photos; give the same ones, or start anew"
+                )
+            with torch.no_grad():
+                for own, values in zip(self.torch.parameters, state["parameters"], strict=True):
+                    own.copy_(values)
+            self.optimizer.load_state_dict(state["optimizer"])
+            self.step, self.seconds, self.loss = state["step"], state["seconds"], state["loss"]
+        except CagefieldError:
+            raise
+        except Exception as error:
+            reason = " ".join(str(error).split())[:120]
+            raise CagefieldError(
+                f"{path} is no checkpoint of this training ({reason}); start anew"
+            ) from error
+        torch.manual_seed(self.config.seed + self.step)
+
+    def _options(self) -> dict[str, Any]:
+        """What a resumed run must have in common with the one it goes on from."""
+        options = dataclasses.asdict(self.config)
+        for name in ("steps", "minutes", "decay"):
+            del options[name]
+        return {**options, "views": [view.name for view in self.dataset.train]}
+
+
+def initial_network(config: NerfConfig, chance: np.random.Generator) -> Mlp:
+    """An untrained network: uniform weights and biases within 1/sqrt(inputs), as PyTorch's layers start."""
+    encoded, seen = 3 + 6 * config.octaves[0], 3 + 6 * config.octaves[1]
+
+    def linear(outputs: int, inputs: int) -> Linear:
+        limit = inputs**-0.5
+        weight = chance.uniform(-limit, limit, (outputs, inputs))
+        return Linear(weight.astype(np.float32), chance.uniform(-limit, limit, outputs).astype(np.float32))
+
+    width = config.width
+    trunk = [linear(width, encoded)]
+    for index in range(1, config.depth):
+        trunk.append(linear(width, width + (encoded if index == SKIP else 0)))
+    return Mlp(
+        trunk=tuple(trunk),
+        density=linear(1, width),
+        rgb=linear(3, width // 2),
+        feature=linear(width, width),
+        view=(linear(width // 2, width + seen),),
+    )
+
+
+def composited(view: View) -> NDArray[np.float32]:
+    """The photo [H,W,3] in [0,1], alpha composited on white."""
+    photo = view.load().astype(np.float32) / 255.0
+    if photo.shape[2] == 4:
+        return np.asarray(photo[..., :3] * photo[..., 3:] + (1.0 - photo[..., 3:]), np.float32)
+    return photo
+
+
+def _as_mlp(network: TorchMlp) -> Mlp:
+    layers = {name: Linear(*pair, name) for name, pair in network.arrays().items()}
+    old = network.mlp
+    return dataclasses.replace(
+        old,
+        trunk=tuple(layers[f"trunk.{index}"] for index in range(len(old.trunk))),
+        view=tuple(layers[f"view.{index}"] for index in range(len(old.view))),
+        density=layers["density"],
+        rgb=layers["rgb"],
+        feature=layers.get("feature"),
+    )
