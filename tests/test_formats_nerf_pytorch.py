@@ -236,3 +236,4 @@ def test_published_networks_have_the_shapes_of_their_weights(name, octaves) -> N
     found = read_checkpoint(file)
     # 4 layers of 128 whatever config.yml says; the first two are one affine layer
     assert str(found.coarse) == str(found.fine) == f"3 x 128, {octaves} + 4 octaves"
+    assert str(found).endswith("(layer1 is folded into layers_xyz.0)")

@@ -61,7 +61,6 @@ class ImportNerf:
             unbounded=imported.field.ndc is not None,
         )
         scene.save(self.out, overwrite=self.overwrite)
-        step = "" if found.step is None else f", step {found.step}"
-        print(f"{found.project}{step}: coarse {found.coarse}; fine {found.fine or 'none'}")
+        print(found)
         print(f"sampling: {config if config else 'no config found, as for Blender scenes'}")
         print(f"{figures}\nscene written to {self.out}")

@@ -28,6 +28,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.nerf import Linear, Mlp
 
 YENCHENLIN = ("network_fn_state_dict", "network_fine_state_dict")
+_KRRISH94 = "krrish94/nerf-pytorch"
 KRRISH94 = ("model_coarse_state_dict", "model_fine_state_dict")
 
 _NAMED = 6  # tensors named in a message, at most
@@ -42,6 +43,11 @@ class Checkpoint:
     project: str
     step: int | None
 
+    def __str__(self) -> str:
+        step = "" if self.step is None else f", step {self.step}"
+        folded = " (layer1 is folded into layers_xyz.0)" if self.project == _KRRISH94 else ""
+        return f"{self.project}{step}: coarse {self.coarse}; fine {self.fine or 'none'}{folded}"
+
 
 def read_checkpoint(path: Path | str) -> Checkpoint:
     """The networks in a checkpoint of either nerf-pytorch.
@@ -54,7 +60,7 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
     content = _unpickled(path)
     for project, names, read in (
         ("yenchenlin/nerf-pytorch", YENCHENLIN, _yenchenlin),
-        ("krrish94/nerf-pytorch", KRRISH94, _krrish94),
+        (_KRRISH94, KRRISH94, _krrish94),
     ):
         if names[0] not in content:
             continue
