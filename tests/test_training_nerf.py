@@ -11,6 +11,7 @@ from cagefield import Scene, load_dataset
 from cagefield.cli import bake, main
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError, FieldError
+from cagefield.fields.nerf import NerfField
 from commands import printed, refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
@@ -118,10 +119,37 @@ def test_targets_are_the_photos_colours_on_white(photos) -> None:
 
 def test_presets_have_the_papers_networks_and_small_ones() -> None:
     chance = np.random.default_rng(0)
-    paper = initial_network(NerfConfig(), chance)
+    box = np.array([[-1.0] * 3, [1.0] * 3])
+    paper = initial_network(NerfConfig(), chance, box)
     assert str(paper) == "8 x 256, 10 + 4 octaves" and paper.skips.index(True) == 5
     assert sum(layer.weight.size + layer.bias.size for _, layer in paper.layers()) == 595_844
-    assert str(initial_network(NerfConfig.small(), chance)) == "4 x 128, 8 + 3 octaves"
+    assert str(initial_network(NerfConfig.small(), chance, box)) == "4 x 128, 8 + 3 octaves"
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("config", [NerfConfig(), SMALL(), tiny()], ids=str)
+def test_an_untrained_network_is_thin_fog_so_that_it_can_learn(config, seed) -> None:
+    box = np.array([[-3.0, 0.0, 1.0], [1.0, 1.0, 2.0]])
+    chance = np.random.default_rng(seed)
+    field = NerfField(initial_network(config, chance, box), None, box, 1.0, 2.0)
+    points = chance.uniform(*box, (2000, 3))
+    sigma, _ = field(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
+    # as PyTorch draws biases, two networks of five are empty everywhere and have no gradient at all
+    assert np.median(sigma) == pytest.approx(0.5 / 2.0, rel=0.1)
+    assert (sigma > 0.0).mean() > 0.6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_both_networks_learn(photos, seed) -> None:
+    run = NerfRun(load_dataset(photos), tiny(steps=60, seed=seed))
+    while run.done < 1.0:
+        run.advance()
+    after = run.field()
+    for name in ("coarse", "fine"):
+        for (layer, old), (_, new) in zip(
+            getattr(run.start, name).layers(), getattr(after, name).layers(), strict=True
+        ):
+            assert np.abs(new.weight - old.weight).max() > 1e-3, (name, layer)
 
 
 def test_a_field_without_fine_samples_has_one_network(photos) -> None:

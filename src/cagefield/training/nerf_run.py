@@ -28,6 +28,12 @@ SKIP = 5
 GAIN = 0.1
 """The learning rate falls to this share over `decay` steps."""
 
+FOG = 0.5
+"""Optical depth of an untrained field across its box: where its density is 0 nothing can be learnt."""
+
+FOG_POINTS = 4096
+"""Points at which its density is asked for."""
+
 PHOTOS = 8
 """Photos whose rays a batch of an unbounded capture holds."""
 
@@ -60,9 +66,10 @@ class NerfRun:
         chance = np.random.default_rng(config.seed)
         noise = (1.0 if dataset.unbounded else 0.0) if config.noise is None else config.noise
         self.jitter = Jitter(noise)
+        own_box = dataset.bounds if self.space.ndc is None else np.array([[-1.0] * 3, [1.0] * 3])
         self.start = NerfField(
-            initial_network(config, chance),
-            initial_network(config, chance) if config.samples[1] else None,
+            initial_network(config, chance, own_box),
+            initial_network(config, chance, own_box) if config.samples[1] else None,
             dataset.bounds,
             self.space.near,
             self.space.far,
@@ -184,8 +191,12 @@ class NerfRun:
         return {**options, "views": [view.name for view in self.dataset.train]}
 
 
-def initial_network(config: NerfConfig, chance: np.random.Generator) -> Mlp:
-    """An untrained network: uniform weights and biases within 1/sqrt(inputs), as PyTorch's layers start."""
+def initial_network(config: NerfConfig, chance: np.random.Generator, box: NDArray[Any]) -> Mlp:
+    """An untrained network: uniform weights and biases within 1/sqrt(inputs), as PyTorch's layers start.
+
+    The density's bias is then moved so that the network's box [2,3], in its own space, is filled with thin
+    fog. As drawn, two networks of five are empty everywhere, and have no gradient that could change that.
+    """
     encoded, seen = 3 + 6 * config.octaves[0], 3 + 6 * config.octaves[1]
 
     def linear(outputs: int, inputs: int) -> Linear:
@@ -197,13 +208,19 @@ def initial_network(config: NerfConfig, chance: np.random.Generator) -> Mlp:
     trunk = [linear(width, encoded)]
     for index in range(1, config.depth):
         trunk.append(linear(width, width + (encoded if index == SKIP else 0)))
-    return Mlp(
+    drawn = Mlp(
         trunk=tuple(trunk),
         density=linear(1, width),
         rgb=linear(3, width // 2),
         feature=linear(width, width),
         view=(linear(width // 2, width + seen),),
     )
+    positions = torch.from_numpy(chance.uniform(*box, (FOG_POINTS, 3)).astype(np.float32))
+    with torch.no_grad():
+        median = TorchMlp(drawn, positions.device).trunk(positions)[0].median()
+    fog = FOG / float(np.mean(box[1] - box[0]))
+    weight, bias = drawn.density.weight, drawn.density.bias
+    return dataclasses.replace(drawn, density=Linear(weight, bias + np.float32(fog - float(median))))
 
 
 def composited(view: View) -> NDArray[np.float32]:
