@@ -215,7 +215,7 @@ def initial_network(config: NerfConfig, chance: np.random.Generator, box: NDArra
         feature=linear(width, width),
         view=(linear(width // 2, width + seen),),
     )
-    positions = torch.from_numpy(chance.uniform(*box, (FOG_POINTS, 3)).astype(np.float32))
+    positions = torch.from_numpy(chance.uniform(box[0], box[1], (FOG_POINTS, 3)).astype(np.float32))
     with torch.no_grad():
         median = TorchMlp(drawn, positions.device).trunk(positions)[0].median()
     fog = FOG / float(np.mean(box[1] - box[0]))
