@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cagefield.server.opening import open_hub
 from cagefield.server.sockets import attend
-from editor_server import EditorServer, editor_server, page
+from editor_server import PATIENCE, EditorServer, editor_server, page
 from scenes import ball_scene
 
 
@@ -154,7 +154,7 @@ def test_a_page_that_is_gone_is_no_error(
 ) -> None:
     ball_scene().save(tmp_path / "ball")
     hub, hello = open_hub(tmp_path / "ball")
-    asyncio.run(asyncio.wait_for(attend(played_socket(receiving, sending), hub, hello), 10))
+    asyncio.run(asyncio.wait_for(attend(played_socket(receiving, sending), hub, hello), PATIENCE))
     assert hub.pages == {} and caplog.text == ""
 
 
@@ -165,5 +165,5 @@ def test_an_error_that_no_lost_page_explains_is_logged_and_the_page_leaves(
     ball_scene().save(tmp_path / "ball")
     hub, hello = open_hub(tmp_path / "ball")
     with caplog.at_level(logging.ERROR):
-        asyncio.run(asyncio.wait_for(attend(played_socket(None, error), hub, hello), 10))
+        asyncio.run(asyncio.wait_for(attend(played_socket(None, error), hub, hello), PATIENCE))
     assert hub.pages == {} and "a page's socket failed" in caplog.text and "broken" in caplog.text
