@@ -31,7 +31,7 @@ SMALL = NerfConfig.small
 
 def tiny(**options) -> NerfConfig:
     small = {"width": 24, "depth": 3, "samples": (12, 12), "batch_rays": 64, "octaves": (4, 2), "precrop": 3}
-    return SMALL(**{**small, **options})
+    return SMALL(**{**small, "shown_samples": None, **options})
 
 
 def test_it_learns(photos) -> None:
@@ -150,6 +150,16 @@ def test_both_networks_learn(photos, seed) -> None:
             getattr(run.start, name).layers(), getattr(after, name).layers(), strict=True
         ):
             assert np.abs(new.weight - old.weight).max() > 1e-3, (name, layer)
+
+
+def test_pictures_may_have_more_samples_than_the_training(photos, tmp_path) -> None:
+    dataset = load_dataset(photos)
+    run = NerfRun(dataset, tiny(steps=1, shown_samples=(20, 10)))
+    assert run.torch.field.samples == (12, 12) and run.field().samples == (20, 10)
+    run.store(tmp_path / "state")
+    other = NerfRun(dataset, tiny(steps=1))
+    other.restore(tmp_path / "state")
+    assert other.field().samples == (12, 12)
 
 
 def test_a_field_without_fine_samples_has_one_network(photos) -> None:

@@ -23,6 +23,7 @@ from cagefield.datasets.procedural import procedural_scene
 from cagefield.datasets.procedural.writer import FOV_X
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
+from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.voxel_config import VoxelConfig
 
 _TIMED_VIEWS, _ROUNDS = 2, 3
@@ -153,7 +154,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
             f" at {config.resolution} voxels along the longest axis."
             if isinstance(config, VoxelConfig)
             else f": the original NeRF, networks of {config.depth} x {config.width}, "
-            f"{config.samples[0]} + {config.samples[1]} samples a ray, rendered exactly."
+            f"{config.samples[0]} + {config.samples[1]} samples a ray{_shown(config)}, rendered exactly."
         ),
         "PSNR (dB) and SSIM: mean over test views, never trained on; unedited: the trained field against "
         "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
@@ -183,6 +184,12 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         names=4,
         shown=_SHOWN,
     )
+
+
+def _shown(config: NerfConfig) -> str:
+    """How many samples the pictures have, if others than the training."""
+    shown = config.shown_samples
+    return "" if shown is None else f" ({shown[0]} + {shown[1]} in pictures)"
 
 
 def _means(scores: Sequence[Score]) -> Iterator[str]:

@@ -17,7 +17,9 @@ class NerfConfig:
         minutes: train for this long instead of `steps`.
         depth, width: layers of the trunk and their width, of both networks.
         octaves: (position, direction) frequencies.
-        samples: (coarse, fine) on each ray.
+        samples: (coarse, fine) on each ray of the training.
+        shown_samples: those of the trained field's pictures, where even samples show what random ones average
+            out; None takes as many.
         batch_rays: rays a step.
         rate: learning rate at the start.
         decay: steps over which it falls to a tenth; left out, `steps`, or as far as `minutes` got.
@@ -35,6 +37,7 @@ class NerfConfig:
     width: int = 256
     octaves: tuple[int, int] = (10, 4)
     samples: tuple[int, int] = (64, 128)
+    shown_samples: tuple[int, int] | None = None
     batch_rays: int = 1024
     rate: float = 5e-4
     decay: int | None = None
@@ -59,11 +62,15 @@ class NerfConfig:
 
     @classmethod
     def small(cls, **options: Any) -> NerfConfig:
-        """The preset for a CPU: 4 layers of 128, 24 + 24 samples a ray, small batches at a high rate."""
+        """The preset for a CPU: 4 layers of 128, small batches at a high rate.
+
+        24 + 24 samples a ray, 64 + 32 in pictures.
+        """
         small = {
             "depth": 4,
             "width": 128,
             "samples": (24, 24),
+            "shown_samples": (64, 32),
             "batch_rays": 64,
             "rate": 4e-3,
             "precrop": 100,

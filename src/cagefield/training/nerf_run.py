@@ -145,7 +145,12 @@ class NerfRun:
     def field(self) -> NerfField:
         """The field as it is now."""
         fine = None if self.torch.fine is None else _as_mlp(self.torch.fine)
-        return dataclasses.replace(self.start, coarse=_as_mlp(self.torch.coarse), fine=fine)
+        return dataclasses.replace(
+            self.start,
+            coarse=_as_mlp(self.torch.coarse),
+            fine=fine,
+            samples=self.config.shown_samples or self.config.samples,
+        )
 
     def store(self, path: Path) -> None:
         """Writes the state of the run to `path`, whole or not at all."""
@@ -186,7 +191,7 @@ class NerfRun:
     def _options(self) -> dict[str, Any]:
         """What a resumed run must have in common with the one it goes on from."""
         options = dataclasses.asdict(self.config)
-        for name in ("steps", "minutes", "decay"):
+        for name in ("steps", "minutes", "decay", "shown_samples"):
             del options[name]
         return {**options, "views": [view.name for view in self.dataset.train]}
 
