@@ -40,10 +40,23 @@ export function editsList(app: App, actions: Actions): HTMLElement {
     h("span", { class: "space" }),
     button(Trash2, "Remove (Delete)", () => actions.remove(), "remove"),
   );
+  // Rows that show the same stay where they are: a double click on one that was made anew in between is lost.
+  let rows = new Map<string, HTMLElement>();
   app.store.watch(["state"], ({ state }) => {
     const edits = state?.edits ?? [];
     if (!(document.activeElement instanceof HTMLInputElement && list.contains(document.activeElement))) {
-      list.replaceChildren(...edits.map((edit, index) => row(app, edit, index, edit.id === state?.selected)));
+      const kept = rows;
+      rows = new Map(
+        edits.map((edit, index) => {
+          const key = shown(edit, index);
+          return [key, kept.get(key) ?? row(app, edit, index)];
+        }),
+      );
+      const made = [...rows.values()];
+      if (made.length !== list.children.length || made.some((item, index) => item !== list.children[index])) {
+        list.replaceChildren(...made);
+      }
+      made.forEach((item, index) => item.classList.toggle("chosen", edits[index].id === state?.selected));
     }
     empty.hidden = edits.length > 0;
     const none = selected(app.store.now) === null;
@@ -52,7 +65,12 @@ export function editsList(app: App, actions: Actions): HTMLElement {
   return section("Edits", list, empty, bar);
 }
 
-function row(app: App, edit: EditState, index: number, chosen: boolean): HTMLElement {
+/** All that a row shows, but for whether it is the selected one's. */
+function shown(edit: EditState, index: number): string {
+  return JSON.stringify([index, edit.id, edit.name, edit.colour, edit.kind, edit.enabled, edit.locked, edit.problem]);
+}
+
+function row(app: App, edit: EditState, index: number): HTMLElement {
   const change = (what: { enabled: boolean } | { locked: boolean } | { name: string }): void => {
     app.send({ type: "change", edit: edit.id, ...what });
   };
@@ -63,7 +81,7 @@ function row(app: App, edit: EditState, index: number, chosen: boolean): HTMLEle
   const problem = edit.problem === null ? null : h("span", { class: "problem", title: edit.problem }, icon(TriangleAlert, 15));
   const item = h(
     "li",
-    { class: `edit${chosen ? " chosen" : ""}${edit.enabled ? "" : " off"}`, draggable: true, data: { edit: String(edit.id) } },
+    { class: `edit${edit.enabled ? "" : " off"}`, draggable: true, data: { edit: String(edit.id) } },
     swatch,
     name,
     problem,
