@@ -1,9 +1,11 @@
-"""Real spherical harmonics of degree 0 to 2, in the order and with the signs of 3DGS and Plenoxels.
+"""Real spherical harmonics of degree 0 to 3, in the order and with the signs of 3DGS and Plenoxels.
 
 With d = (x, y, z) a unit direction, the (L+1)^2 values are
   l=0   C0
   l=1   -C1 y, C1 z, -C1 x
   l=2   C2[0] xy, C2[1] yz, C2[2] (2 z^2 - x^2 - y^2), C2[3] xz, C2[4] (x^2 - y^2)
+  l=3   C3[0] y (3 x^2 - y^2), C3[1] xyz, C3[2] y (4 z^2 - x^2 - y^2), C3[3] z (2 z^2 - 3 x^2 - 3 y^2),
+        C3[4] x (4 z^2 - x^2 - y^2), C3[5] z (x^2 - y^2), C3[6] x (x^2 - 3 y^2)
 They are orthonormal over the sphere: the integral of Y_i Y_j is 1 for i = j, else 0. The order is
 m = -l..l; the Condon-Shortley phase is kept, so odd m have the opposite sign of tables without it.
 
@@ -19,7 +21,7 @@ import numpy.typing as npt
 
 from cagefield.errors import FieldError
 
-MAX_DEGREE: Final = 2
+MAX_DEGREE: Final = 3
 C0: Final = 0.28209479177387814
 C1: Final = 0.4886025119029199
 C2: Final = (
@@ -29,6 +31,15 @@ C2: Final = (
     -1.0925484305920792,
     0.5462742152960396,
 )
+C3: Final = (
+    -0.5900435899266435,
+    2.890611442640554,
+    -0.4570457994644658,
+    0.3731763325901154,
+    -0.4570457994644658,
+    1.445305721320277,
+    -0.5900435899266435,
+)
 
 
 def basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
@@ -36,7 +47,7 @@ def basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]
 
     float32 in, float32 out; anything else gives float64. Directions are not normalised here.
 
-    Raises FieldError for a degree outside 0..2 or directions of another shape.
+    Raises FieldError for a degree outside 0..3 or directions of another shape.
     """
     if degree not in range(MAX_DEGREE + 1):
         raise FieldError(f"degree of the spherical harmonics must be 0 to {MAX_DEGREE}, got {degree}")
@@ -58,4 +69,12 @@ def basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]
         values[:, 6] = C2[2] * (2 * z * z - x * x - y * y)
         values[:, 7] = C2[3] * x * z
         values[:, 8] = C2[4] * (x * x - y * y)
+    if degree >= 3:
+        values[:, 9] = C3[0] * y * (3 * x * x - y * y)
+        values[:, 10] = C3[1] * x * y * z
+        values[:, 11] = C3[2] * y * (4 * z * z - x * x - y * y)
+        values[:, 12] = C3[3] * z * (2 * z * z - 3 * x * x - 3 * y * y)
+        values[:, 13] = C3[4] * x * (4 * z * z - x * x - y * y)
+        values[:, 14] = C3[5] * z * (x * x - y * y)
+        values[:, 15] = C3[6] * x * (x * x - 3 * y * y)
     return values

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +53,48 @@ def _identity() -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
+class SparsePoints:
+    """Points of a reconstruction, in the data set's world, and the photos that see each of them.
+
+    Attributes:
+        positions: [M,3] float64, world units.
+        rgb: [M,3] uint8.
+        seen_by: for each point the names of the views (`View.name`) that see it; empty where nobody says so.
+        errors: [M] float32, mean reprojection error in pixels of the full-size photos; NaN where unknown.
+    """
+
+    positions: FloatArray
+    rgb: npt.NDArray[np.uint8]
+    seen_by: tuple[frozenset[str], ...] = ()
+    errors: npt.NDArray[np.float32] | None = None
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __post_init__(self) -> None:
+        positions, rgb = np.array(self.positions, np.float64), np.array(self.rgb, np.uint8)
+        if positions.ndim != 2 or positions.shape[1:] != (3,) or not np.isfinite(positions).all():
+            raise DatasetError(f"points must be [M,3] finite positions, got {list(positions.shape)}")
+        if rgb.shape != positions.shape:
+            raise DatasetError(f"points' rgb must be {list(positions.shape)}, got {list(rgb.shape)}")
+        if self.seen_by and len(self.seen_by) != len(positions):
+            raise DatasetError(f"seen_by names {len(self.seen_by)} points of {len(positions)}")
+        for name, array in (("positions", positions), ("rgb", rgb)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def take(self, rows: npt.NDArray[Any]) -> SparsePoints:
+        """The points of these rows, or where a mask is True."""
+        index = np.arange(len(self))[rows]
+        return SparsePoints(
+            self.positions[index],
+            self.rgb[index],
+            tuple(self.seen_by[i] for i in index) if self.seen_by else (),
+            None if self.errors is None else self.errors[index],
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Dataset:
     """A capture: posed photos for training, testing and validation, and the region of space worth modelling.
 
@@ -61,6 +104,7 @@ class Dataset:
     reconstruction that the files came from to this data set's world: the levelling rotation for LLFF and
     COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity. `depths`
     are the nearest and the farthest depth of content along the cameras' axes, where the reconstruction knows.
+    `points` are the reconstruction's, None where it has none.
     """
 
     name: str
@@ -73,6 +117,7 @@ class Dataset:
     white_background: bool
     source_to_world: FloatArray = field(default_factory=_identity)
     depths: tuple[float, float] | None = None
+    points: SparsePoints | None = None
 
     def __post_init__(self) -> None:
         for name, shape in (("bounds", (2, 3)), ("source_to_world", (4, 4))):

@@ -113,6 +113,16 @@ class VoxelField:
         return size * self.half_size if self.contracted else size
 
     @property
+    def sample_spacing(self) -> float:
+        """World length between two samples that miss no detail: the smallest edge of a voxel."""
+        return float(min(self.voxel_size))
+
+    @property
+    def unbounded(self) -> bool:
+        """True where the field goes on beyond `bounds`, which then is the box of interest."""
+        return self.contracted
+
+    @property
     def center(self) -> NDArray[np.float64]:
         """Centre [3] of `bounds`."""
         return np.asarray(self.bounds.mean(axis=0))

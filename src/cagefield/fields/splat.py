@@ -1,0 +1,128 @@
+"""SplatField: a mixture of anisotropic 3D Gaussians with spherical-harmonic colour.
+
+Notation: splat n has the mean m, the scales s = exp(log_scales) (standard deviations along its own axes), the
+rotation R of its unit quaternion (w, x, y, z), hence the covariance C = R diag(s^2) R^T, the opacity o in
+[0, 1] and harmonics k. Its colour seen along d is max(0, 0.5 + sum_l Y_l(d) k_l). A picture of splats shows
+each with alpha = o exp(-e^T Q e / 2) at a pixel's offset e from its projected mean, Q the inverse of its
+projected covariance, sorted by depth (`cagefield.rendering.splat_reference`).
+
+At points, for code that samples, the field is a mixture: splat n has the density that lets the ray through
+its mean lose the opacity o, spread as its Gaussian:
+    sigma_n(p) = -log(1 - o) / (sqrt(2 pi) s_bar) exp(-(p - m)^T C^-1 (p - m) / 2),
+s_bar the geometric mean of the two smaller scales' ... (see `density`).
+
+Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), equations 1 to 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield.errors import FieldError
+
+Float32 = NDArray[np.float32]
+
+MAX_OPACITY = 0.9999
+"""A splat's opacity where its density is asked for: an opaque one would have no finite density."""
+
+
+@dataclass(frozen=True, eq=False)
+class SplatField:
+    """3D Gaussian splats (canonical space, world units).
+
+    Attributes:
+        means: [N,3] float32.
+        log_scales: [N,3] float32, natural logarithms of the standard deviations along the splats' axes.
+        quaternions: [N,4] float32, (w, x, y, z), unit: those given are normalised.
+        opacities: [N] float32, in [0, 1].
+        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to 3.
+        antialiased: opacity is scaled so that what a splat adds to a picture does not grow with the filter of
+            .3 pixels^2 that every splat gets (Mip-Splatting's 2D filter).
+        bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
+        unbounded: True where splats beyond `bounds` are the background.
+
+    Raises:
+        FieldError: shapes that do not fit, NaN or infinity, opacities outside [0, 1].
+    """
+
+    means: Float32
+    log_scales: Float32
+    quaternions: Float32
+    opacities: Float32
+    sh: Float32
+    antialiased: bool = False
+    bounds: NDArray[np.float64] | None = None  # type: ignore[assignment]
+    unbounded: bool = False
+
+    def __post_init__(self) -> None:
+        fix = object.__setattr__
+        count = len(self.means)
+        shapes = {"means": (count, 3), "log_scales": (count, 3), "quaternions": (count, 4), "opacities": (count,)}
+        for name in (*shapes, "sh"):
+            fix(self, name, _frozen(getattr(self, name), np.float32))
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise FieldError(f"{name} must be {list(shape)}, got {list(getattr(self, name).shape)}")
+        if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1:] not in _SH_SHAPES:
+            raise FieldError(f"sh must be [{count}, 1|4|9|16, 3] (degree 0 to 3), got {list(self.sh.shape)}")
+        for name in (*shapes, "sh"):
+            values = getattr(self, name).reshape(count, -1)
+            if not np.isfinite(values).all():
+                bad = int(np.argmin(np.isfinite(values).all(axis=1)))
+                raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
+        if count and not (0.0 <= self.opacities.min() and self.opacities.max() <= 1.0):
+            raise FieldError(
+                f"opacities must lie in [0, 1], got {self.opacities.min():g} to {self.opacities.max():g}"
+            )
+        norm = np.linalg.norm(self.quaternions.astype(np.float64), axis=1, keepdims=True)
+        if count and not norm.min() > 0.0:
+            raise FieldError(f"quaternion {int(np.argmin(norm))} of {count} is 0; a rotation has length 1")
+        fix(self, "quaternions", _frozen(self.quaternions / np.maximum(norm, 1e-300), np.float32))
+        bounds = _box_of(self.means) if self.bounds is None else np.asarray(self.bounds, np.float64)
+        if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
+            raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
+        fix(self, "bounds", _frozen(bounds, np.float64))
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    @property
+    def sh_degree(self) -> int:
+        """Degree of the colour's spherical harmonics, 0 to 3."""
+        return _SH_SHAPES.index(self.sh.shape[1:])
+
+    def take(self, rows: NDArray[Any]) -> SplatField:
+        """The splats of these rows, or where a mask is True, in the same box."""
+        return SplatField(
+            self.means[rows],
+            self.log_scales[rows],
+            self.quaternions[rows],
+            self.opacities[rows],
+            self.sh[rows],
+            self.antialiased,
+            self.bounds,
+            self.unbounded,
+        )
+
+
+_SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
+
+
+def _box_of(means: Float32) -> NDArray[np.float64]:
+    """The box of the middle 98 % of the means, never flat; the unit cube where there are none."""
+    if not len(means):
+        return np.array([[-1.0] * 3, [1.0] * 3])
+    low, high = np.quantile(means.astype(np.float64), (0.01, 0.99), axis=0)
+    least = max(1e-3 * float((high - low).max()), 1e-6)
+    flat = high - low < least
+    return np.stack([np.where(flat, low - least, low), np.where(flat, high + least, high)])
+
+
+def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
+    array = np.array(values, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array
