@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.colmap_files import check_whole
+from cagefield.datasets.nerf_worlds import in_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 
@@ -125,6 +126,52 @@ def test_missing_photos_are_named_and_none_left_is_an_error(tmp_path):
         photo.unlink()
     with pytest.raises(DatasetError, match="none of the photos of its 4 frames is there"):
         load_dataset(tmp_path)
+
+
+def test_points_are_in_the_levelled_world_with_colours_errors_and_the_views_that_see_them(tmp_path):
+    _write(tmp_path, n=4)
+    model = pycolmap.Reconstruction(tmp_path / "sparse/0")
+    for image_id in (1, 2, 3, 4):  # the marked point's image in each, so that it has a track
+        model.image(image_id).points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([48.0, 32.0]))])
+    track = pycolmap.Track()
+    for image_id in (2, 3, 4):
+        track.add_element(image_id, 0)
+    marked = model.add_point3D(TILT @ POINT, track, np.array([200, 100, 50], dtype=np.uint8))
+    model.point3D(marked).error = 0.75
+    model.write_binary(tmp_path / "sparse/0")
+    (tmp_path / "images/cam/02.png").unlink()
+    with pytest.warns(UserWarning, match="cam/02.png"):
+        data = load_dataset(tmp_path)
+    points = data.points
+    assert points is not None and len(points) == 301
+    last = points.take(np.array([300]))
+    np.testing.assert_allclose(last.positions[0], data.source_to_world[:3, :3] @ TILT @ POINT, atol=1e-9)
+    assert last.rgb.tolist() == [[200, 100, 50]]
+    assert last.seen_by == (frozenset({"cam/01.png", "cam/03.png"}),)  # the view without a photo is not named
+    assert points.seen_by[0] == frozenset()
+    assert last.errors is not None and last.errors[0] == pytest.approx(0.75)
+    for view in (*data.train, *data.test):  # and the cameras see the point where the photo shows it
+        assert_spot_is_where_the_camera_says(view, last.positions[0])
+
+
+def test_points_follow_the_data_set_into_another_world(tmp_path):
+    _write(tmp_path, n=5)
+    data = load_dataset(tmp_path)
+    moved = in_unit_cube(data)
+    for before, after in zip(data.train, moved.train, strict=True):
+        old, _ = before.camera.project(data.points.positions)
+        new, _ = after.camera.project(moved.points.positions)
+        np.testing.assert_allclose(new, old, atol=1e-6)
+    np.testing.assert_array_equal(moved.points.rgb, data.points.rgb)
+
+
+def test_a_model_without_points_has_none(tmp_path):
+    _write(tmp_path, n=3)
+    model = pycolmap.Reconstruction(tmp_path / "sparse/0")
+    for point in list(model.points3D):
+        model.delete_point3D(point)
+    model.write_binary(tmp_path / "sparse/0")
+    assert load_dataset(tmp_path).points is None
 
 
 def test_other_camera_models_are_refused(tmp_path):

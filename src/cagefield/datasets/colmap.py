@@ -6,7 +6,7 @@ flipped, intrinsics are taken as they are.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,11 @@ from cagefield.datasets.colmap_files import check_whole
 from cagefield.datasets.llff import stored_camera, unbounded_capture
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
 from cagefield.datasets.region import cube_of_interest, depths_of_points, levelling_rotation
-from cagefield.datasets.views import Dataset, View, report_missing
+from cagefield.datasets.views import Dataset, SparsePoints, View, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
+
+FloatArray = npt.NDArray[np.float64]
 
 MODEL_FILES = ("cameras.bin", "cameras.txt")
 
@@ -40,7 +42,8 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
 
     Every `holdout`-th view tests. Photos are looked for in `images`, `images_2`, ... of the nearest folder
     upwards from the model that has them, by their names in the model. Lens distortion is kept. The world is
-    rotated so that up is +z (see `levelling_rotation`); the sparse points bound the cube of interest.
+    rotated so that up is +z (see `levelling_rotation`); the sparse points bound the cube of interest and
+    become `Dataset.points`.
     """
     model_folder = find_model(path)
     if model_folder is None:
@@ -75,12 +78,35 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         view = View(image.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
     report_missing(root, sorted(missing), len(images))
-    points = np.array([point.xyz for point in model.points3D.values()]).reshape(-1, 3) @ levelling[:3, :3].T
-    seen_by = [view.camera for view in views]
-    bounds = cube_of_interest(seen_by, points=points)
-    found = depths_of_points(seen_by, points)
+    points = sparse_points(model, {view.name for view in views}, levelling)
+    positions = np.empty((0, 3)) if points is None else points.positions
+    view_cameras = [view.camera for view in views]
+    bounds = cube_of_interest(view_cameras, points=positions)
+    found = depths_of_points(view_cameras, positions)
     depths = None if found is None else (float(found[:, 0].min()), float(found[:, 1].max()))
-    return unbounded_capture(root, views, holdout, bounds, levelling, depths)
+    return unbounded_capture(root, views, holdout, bounds, levelling, depths, points)
+
+
+def sparse_points(model: Any, names: Collection[str], source_to_world: FloatArray) -> SparsePoints | None:
+    """The points of a pycolmap reconstruction, moved by the rigid `source_to_world` [4,4]; None without any.
+
+    Of the images that see a point those are named that are in `names`.
+    """
+    kept = {image_id: image.name for image_id, image in model.images.items() if image.name in names}
+    found = [point for _, point in sorted(model.points3D.items()) if np.isfinite(point.xyz).all()]
+    if not found:
+        return None
+    errors = np.array([point.error for point in found], dtype=np.float32)
+    seen_by = tuple(
+        frozenset(kept[e.image_id] for e in point.track.elements if e.image_id in kept) for point in found
+    )
+    return SparsePoints(
+        positions=np.array([point.xyz for point in found]) @ source_to_world[:3, :3].T
+        + source_to_world[:3, 3],
+        rgb=np.array([point.color for point in found], dtype=np.uint8),
+        seen_by=seen_by if any(seen_by) else (),
+        errors=np.where(errors >= 0, errors, np.float32(np.nan)),
+    )
 
 
 def _read_model(folder: Path) -> tuple[Any, list[Any]]:
@@ -115,7 +141,7 @@ def _photo(folders: dict[int, Path], factors: Sequence[int], name: str) -> tuple
     return 1, None
 
 
-def _pose(image: Any) -> npt.NDArray[np.float64]:
+def _pose(image: Any) -> FloatArray:
     """OpenGL camera-to-world matrix [4,4]."""
     rigid = image.cam_from_world
     matrix = np.asarray((rigid() if callable(rigid) else rigid).matrix(), dtype=np.float64)

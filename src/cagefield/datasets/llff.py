@@ -17,7 +17,7 @@ import numpy.typing as npt
 from cagefield.cameras import Camera
 from cagefield.datasets.photos import EXTENSIONS, choose_downscale, photo_folders, read_header
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
-from cagefield.datasets.views import Dataset, View, hold_out
+from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
 from cagefield.errors import CameraError, DatasetError
 
 POSES_FILE = "poses_bounds.npy"
@@ -76,6 +76,7 @@ def unbounded_capture(
     bounds: npt.NDArray[np.float64],
     levelling: npt.NDArray[np.float64],
     depths: tuple[float, float] | None,
+    points: SparsePoints | None = None,
 ) -> Dataset:
     """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
     train, test = hold_out(views, holdout)
@@ -90,6 +91,7 @@ def unbounded_capture(
         white_background=False,
         source_to_world=levelling,
         depths=depths,
+        points=points,
     )
 
 

@@ -55,7 +55,7 @@ class Similarity:
         def moved(views: tuple[View, ...]) -> tuple[View, ...]:
             return tuple(dataclasses.replace(view, camera=self.camera(view.camera)) for view in views)
 
-        depths = dataset.depths
+        depths, points = dataset.depths, dataset.points
         return dataclasses.replace(
             dataset,
             train=moved(dataset.train),
@@ -64,6 +64,9 @@ class Similarity:
             bounds=bounds,
             source_to_world=matrix @ dataset.source_to_world,
             depths=None if depths is None else (self.scale * depths[0], self.scale * depths[1]),
+            points=None
+            if points is None
+            else dataclasses.replace(points, positions=self.points(points.positions)),
         )
 
 

@@ -79,7 +79,14 @@ class SparsePoints:
             raise DatasetError(f"points' rgb must be {list(positions.shape)}, got {list(rgb.shape)}")
         if self.seen_by and len(self.seen_by) != len(positions):
             raise DatasetError(f"seen_by names {len(self.seen_by)} points of {len(positions)}")
-        for name, array in (("positions", positions), ("rgb", rgb)):
+        arrays: dict[str, npt.NDArray[Any]] = {"positions": positions, "rgb": rgb}
+        if self.errors is not None:
+            arrays["errors"] = np.array(self.errors, np.float32)
+            if arrays["errors"].shape != (len(positions),):
+                raise DatasetError(
+                    f"points' errors must be [{len(positions)}], got {list(arrays['errors'].shape)}"
+                )
+        for name, array in arrays.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
 
