@@ -6,28 +6,24 @@ rotation R of its unit quaternion (w, x, y, z), hence the covariance C = R diag(
 each with alpha = o exp(-e^T Q e / 2) at a pixel's offset e from its projected mean, Q the inverse of its
 projected covariance, sorted by depth (`cagefield.rendering.splat_reference`).
 
-At points, for code that samples, the field is a mixture: splat n has the density that lets the ray through
-its mean lose the opacity o, spread as its Gaussian:
-    sigma_n(p) = -log(1 - o) / (sqrt(2 pi) s_bar) exp(-(p - m)^T C^-1 (p - m) / 2),
-s_bar the geometric mean of the two smaller scales' ... (see `density`).
-
 Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), equations 1 to 6.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
+from cagefield.fields.files import read_tensors, write_tensors
 
 Float32 = NDArray[np.float32]
 
-MAX_OPACITY = 0.9999
-"""A splat's opacity where its density is asked for: an opaque one would have no finite density."""
+FORMAT_VERSION = "1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +51,18 @@ class SplatField:
     opacities: Float32
     sh: Float32
     antialiased: bool = False
-    bounds: NDArray[np.float64] | None = None  # type: ignore[assignment]
+    bounds: NDArray[np.float64] = None  # type: ignore[assignment]
     unbounded: bool = False
 
     def __post_init__(self) -> None:
         fix = object.__setattr__
-        count = len(self.means)
-        shapes = {"means": (count, 3), "log_scales": (count, 3), "quaternions": (count, 4), "opacities": (count,)}
+        count = np.shape(self.means)[0] if np.ndim(self.means) else 0
+        shapes = {
+            "means": (count, 3),
+            "log_scales": (count, 3),
+            "quaternions": (count, 4),
+            "opacities": (count,),
+        }
         for name in (*shapes, "sh"):
             fix(self, name, _frozen(getattr(self, name), np.float32))
         for name, shape in shapes.items():
@@ -70,11 +71,12 @@ class SplatField:
         if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1:] not in _SH_SHAPES:
             raise FieldError(f"sh must be [{count}, 1|4|9|16, 3] (degree 0 to 3), got {list(self.sh.shape)}")
         for name in (*shapes, "sh"):
-            values = getattr(self, name).reshape(count, -1)
-            if not np.isfinite(values).all():
-                bad = int(np.argmin(np.isfinite(values).all(axis=1)))
+            values = getattr(self, name)
+            finite = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
+            if not finite.all():
+                bad = int(np.argmin(finite))
                 raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
-        if count and not (0.0 <= self.opacities.min() and self.opacities.max() <= 1.0):
+        if count and not (self.opacities.min() >= 0.0 and self.opacities.max() <= 1.0):
             raise FieldError(
                 f"opacities must lie in [0, 1], got {self.opacities.min():g} to {self.opacities.max():g}"
             )
@@ -95,6 +97,33 @@ class SplatField:
         """Degree of the colour's spherical harmonics, 0 to 3."""
         return _SH_SHAPES.index(self.sh.shape[1:])
 
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Centre [3] of `bounds`."""
+        return np.asarray(self.bounds.mean(axis=0))
+
+    @property
+    def half_size(self) -> NDArray[np.float64]:
+        """Half of the edge lengths [3] of `bounds`."""
+        return np.asarray((self.bounds[1] - self.bounds[0]) / 2)
+
+    @property
+    def sample_spacing(self) -> float:
+        """World length between two samples that miss no detail: what most splats are wide.
+
+        The median of the middle one of the three scales, weighted by opacity, of the splats in `bounds`: the
+        smallest says how thin surfaces are, which is no detail that a picture shows. A thousandth of the
+        largest edge of `bounds` where there are no splats.
+        """
+        inside = ((self.means >= self.bounds[0]) & (self.means <= self.bounds[1])).all(axis=1)
+        weights = np.where(inside, self.opacities, 0.0).astype(np.float64)
+        if not weights.sum() > 0.0:
+            return float(2e-3 * self.half_size.max())
+        middle = np.median(self.log_scales, axis=1)
+        order = np.argsort(middle)
+        half = np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())
+        return float(np.exp(np.float64(middle[order[half]])))
+
     def take(self, rows: NDArray[Any]) -> SplatField:
         """The splats of these rows, or where a mask is True, in the same box."""
         return SplatField(
@@ -108,7 +137,41 @@ class SplatField:
             self.unbounded,
         )
 
+    def save(self, path: str | Path) -> None:
+        """Writes the field to a safetensors file (float32); the folder must exist."""
+        tensors = {name: getattr(self, name) for name in (*_TENSORS, "bounds")}
+        header = {
+            "kind": "SplatField",
+            "version": FORMAT_VERSION,
+            "antialiased": str(int(self.antialiased)),
+            "unbounded": str(int(self.unbounded)),
+        }
+        write_tensors(path, tensors, header)
 
+    @classmethod
+    def load(cls, path: str | Path) -> SplatField:
+        """The field in a safetensors file.
+
+        Raises:
+            FieldError: the file is missing, truncated, of another kind or newer than this version.
+        """
+        cure = "train one with `cagefield train DATA -o SCENE --field splat`"
+        metadata, tensors = read_tensors(path, "SplatField", FORMAT_VERSION, cure)
+        missing = {*_TENSORS, "bounds"} - tensors.keys()
+        if missing:
+            raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")
+        try:
+            return cls(
+                **{name: tensors[name] for name in _TENSORS},
+                antialiased=metadata.get("antialiased") == "1",
+                bounds=tensors["bounds"],
+                unbounded=metadata.get("unbounded") == "1",
+            )
+        except FieldError as error:
+            raise FieldError(f"{path}: {error}") from error
+
+
+_TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
 _SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
 
 

@@ -1,0 +1,123 @@
+"""PLY files: elements of named columns, ASCII or binary of either byte order.
+
+Elements with list properties (a mesh's faces) are not read; they may only follow those that are.
+
+Source: Turk, "The PLY Polygon File Format" (1994).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import FieldError
+
+Columns = dict[str, NDArray[Any]]
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+_HEADER = 1 << 20  # bytes that a header may take
+
+
+@dataclass(frozen=True)
+class Ply:
+    """The comments of a PLY file, and its elements: name -> column -> array [count]."""
+
+    comments: tuple[str, ...]
+    elements: Mapping[str, Columns]
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[tuple[str, str]]
+    has_list: bool = False
+
+
+def read_ply(path: str | Path) -> Ply:
+    """The elements of a PLY file up to the first with a list property.
+
+    Raises:
+        FieldError: no such file, no PLY, a header that makes no sense, less data than it says.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FieldError(f"{path}: no such file; give a .ply of splats")
+    with path.open("rb") as file:
+        kind, comments, declared = _header(path, file)
+        elements: dict[str, Columns] = {}
+        for element in declared:
+            if element.has_list:
+                break
+            row = np.dtype([(name, _ORDERS[kind] + code) for name, code in element.properties])
+            elements[element.name] = _rows(path, file, kind, element, row)
+    return Ply(tuple(comments), elements)
+
+
+def _header(path: Path, file: BinaryIO) -> tuple[str, list[str], list[_Element]]:
+    """(format, comments, elements) as the header says, with the file at the first byte after it."""
+    kind, comments, elements = "", list[str](), list[_Element]()
+    if file.readline(16).strip() != b"ply":
+        raise FieldError(f"{path}: not a PLY file; give a .ply of splats")
+    while file.tell() < _HEADER:
+        line = file.readline(_HEADER)
+        if not line.endswith(b"\n"):
+            break
+        words = line.decode("latin-1").split()
+        if words == ["end_header"]:
+            if kind not in _ORDERS:
+                raise FieldError(f"{path}: its header names no format that PLY has; export the file again")
+            return kind, comments, elements
+        try:
+            match words:
+                case ["format", name, "1.0"]:
+                    kind = name
+                case ["comment" | "obj_info", *rest]:
+                    comments.append(" ".join(rest))
+                case ["element", name, count] if int(count) >= 0:
+                    elements.append(_Element(name, int(count), []))
+                case ["property", "list", _, _, _]:
+                    elements[-1].has_list = True
+                case ["property", code, name] if name not in dict(elements[-1].properties):
+                    elements[-1].properties.append((name, _TYPES[code]))
+                case []:
+                    pass
+                case _:
+                    raise ValueError
+        except (ValueError, KeyError, IndexError):
+            text = " ".join(words)[:60]
+            raise FieldError(f"{path}: its header has the line {text!r}; export the file again") from None
+    raise FieldError(f"{path}: its header has no end; the file may be truncated, copy it again")
+
+
+def _rows(path: Path, file: BinaryIO, kind: str, element: _Element, row: np.dtype[Any]) -> Columns:
+    """The columns of an element, read from where the file stands."""
+    names = [name for name, _ in element.properties]
+    if kind == "ascii":
+        lines = [file.readline().split() for _ in range(min(element.count, path.stat().st_size))]
+        try:
+            values = np.array(lines, np.float64).reshape(element.count, len(names))
+        except ValueError:
+            raise FieldError(
+                f"{path}: its {element.count} rows of {element.name} are not {len(names)} numbers each; the "
+                "file may be truncated, copy it again"
+            ) from None
+        return {name: values[:, column] for column, name in enumerate(names)}
+    left = path.stat().st_size - file.tell()
+    if element.count * row.itemsize > left:
+        raise FieldError(
+            f"{path}: it says {element.count} of {element.name}, and holds {left // max(1, row.itemsize)}; "
+            "it is truncated, copy it again"
+        )
+    table = np.frombuffer(file.read(element.count * row.itemsize), row)
+    return {name: table[name] for name in names}
