@@ -98,6 +98,15 @@ def _curve_slope(r: Array, k: Array) -> Array:
     return np.asarray(1.0 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3]))))
 
 
+def fold_radius(model: Lens, coefficients: Sequence[float] = ()) -> float:
+    """The largest |(X/Z, Y/Z)| that has an image: where the distortion folds, or a lens's own limit."""
+    if model == "pinhole":
+        return float("inf")
+    if model == "opencv_fisheye":
+        return float(np.tan(min(_fold(_radial(model, coefficients), np.pi), np.arctan(_FLAT_LIMIT))))
+    return _fold(_radial(model, coefficients), _FLAT_LIMIT)
+
+
 def _fold(k: Array, limit: float) -> float:
     """The radius up to which `_curve` grows: its first stationary point, at most `limit`."""
     slope = np.array([1.0, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])  # in powers of r^2

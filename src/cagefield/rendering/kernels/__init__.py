@@ -1,0 +1,1 @@
+"""Kernels of the renderers; their host code lies one folder up."""

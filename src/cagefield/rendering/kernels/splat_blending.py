@@ -1,0 +1,260 @@
+"""Sorted splats blended in tiles of 16 x 16 pixels, and the gradients of it by hand (Numba).
+
+Notation: at a pixel, splat k (near to far) has alpha a_k = o exp(-d^T Q d / 2), d the pixel minus the
+projected mean, Q the conic (A, B; B, C). With T_k the product of (1 - a_j) over the nearer ones and
+w_k = a_k T_k, the pixel's colour is sum_k w_k c_k + T b, b the background.
+
+One flat loop over the pixels of the rows that a splat reaches is what vectorises: state lies in one buffer at
+constant offsets, exp is a polynomial, and there are selections in place of branches. A tile is left once all
+its pixels let less than T_MIN through. Gradients go front to back too: what is behind splat k is the pixel's
+colour less what has been passed. Each (tile, splat) pair writes its own sums; no two write to one place.
+
+The oracle is `cagefield.rendering.splat_reference.blend`.
+
+Source: Kerbl et al. (2023), equations 2 and 3; Zwicker et al. (2002).
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+from numba import njit, prange
+
+from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, ALPHA_MIN, AREA, FAST, TILE
+
+F, U = np.float32, np.uint64
+LEAST, MOST = F(ALPHA_MIN), F(ALPHA_MAX)
+ZERO, ONE, HALF, EIGHTH = F(0), F(1), F(0.5), F(1 / 8)
+T_MIN = F(1e-3)
+P_MIN = F(-8)
+"""Exponents below this are this: alpha is then below ALPHA_MIN whatever the opacity."""
+E2, E3, E4, E5 = F(1 / 2), F(1 / 6), F(1 / 24), F(1 / 120)
+ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8 = (U(AREA * k) for k in range(1, 9))
+ROWS = 9
+X, Y = ROW7, ROW8
+"""Where the pixels' own coordinates lie in a tile's state."""
+
+SUMS = 20
+"""Floats a pair's sums have. With v = alpha dL/dalpha, e = Q d, g = dL/dC, h = |alpha dC/dalpha|^2:
+0 v, 1-2 v e, 3-5 v e e^T, 6-8 w g, 9 w, 10 h, 11-13 h e e^T, 14-18 h e e e e (xxxx xxxy xxyy xyyy yyyy),
+19 w |g|^2."""
+
+
+@njit(inline="always", **FAST)
+def exp_negative(p):
+    """exp(p) for p in [P_MIN, 0], to 4e-6: a polynomial of p/8, squared three times."""
+    x = max(p, P_MIN) * EIGHTH
+    y = ONE + x * (ONE + x * (E2 + x * (E3 + x * (E4 + x * E5))))
+    y = y * y
+    y = y * y
+    return y * y
+
+
+@njit(inline="always", **FAST)
+def rows_of(p, y0):
+    """The pixels of a tile, first and end, in the rows that a packed splat reaches."""
+    low = int(np.ceil(p[1] - p[9])) - y0
+    high = int(np.floor(p[1] + p[9])) + 1 - y0
+    return U(max(0, low) * TILE), U(max(0, min(TILE, high)) * TILE)
+
+
+@njit(inline="always", **FAST)
+def coordinates(state):
+    """Writes the pixels' coordinates into a tile's state."""
+    for i in range(AREA):
+        state[X + U(i)] = F(i % TILE)
+        state[Y + U(i)] = F(i // TILE)
+
+
+@njit(**FAST)
+def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
+    """Rows of the state: 0 T, 1-3 colour, 4 depth times weight. Returns where the tile was left."""
+    for i in range(AREA):
+        state[i] = ONE
+    for i in range(AREA, 5 * AREA):
+        state[i] = ZERO
+    for e in range(begin, end):
+        p = packed[ids[e]]
+        mx, my = p[0] - F(x0), p[1] - F(y0)
+        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        low, high = rows_of(p, y0)
+        if with_depth:
+            t, tx, ty = p[10], p[11], p[12]
+            for i in range(low, high):
+                dx = state[X + i] - mx
+                dy = state[Y + i] - my
+                q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+                a = min(o * exp_negative(-HALF * q), MOST)
+                a = a if a >= LEAST else ZERO
+                w = a * state[i]
+                state[ROW1 + i] += w * r
+                state[ROW2 + i] += w * g
+                state[ROW3 + i] += w * b
+                state[ROW4 + i] += w * (t + tx * dx + ty * dy)
+                state[i] -= w
+        else:
+            for i in range(low, high):
+                dx = state[X + i] - mx
+                dy = state[Y + i] - my
+                q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+                a = min(o * exp_negative(-HALF * q), MOST)
+                a = a if a >= LEAST else ZERO
+                w = a * state[i]
+                state[ROW1 + i] += w * r
+                state[ROW2 + i] += w * g
+                state[ROW3 + i] += w * b
+                state[i] -= w
+        if (e - begin) & 7 == 7:
+            most = ZERO
+            for i in range(AREA):
+                most = max(most, state[i])
+            if most < T_MIN:
+                return e + 1
+    return end
+
+
+@njit(**FAST)
+def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
+    """Rows of the state: 0 T, 1-3 normals times weight."""
+    for i in range(AREA):
+        state[i] = ONE
+    for i in range(AREA, 4 * AREA):
+        state[i] = ZERO
+    for e in range(begin, end):
+        p = packed[ids[e]]
+        mx, my = p[0] - F(x0), p[1] - F(y0)
+        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[13], p[14], p[15]
+        low, high = rows_of(p, y0)
+        for i in range(low, high):
+            dx = state[X + i] - mx
+            dy = state[Y + i] - my
+            q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+            a = min(o * exp_negative(-HALF * q), MOST)
+            a = a if a >= LEAST else ZERO
+            w = a * state[i]
+            state[ROW1 + i] += w * r
+            state[ROW2 + i] += w * g
+            state[ROW3 + i] += w * b
+            state[i] -= w
+
+
+@njit(parallel=True, **FAST)
+def blend(packed, ids, starts, across, channels, stops, out):
+    """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), and depth (5 channels), normals (8)."""
+    for t in prange(starts.size - 1):
+        state = np.empty(ROWS * AREA, nb.float32)
+        coordinates(state)
+        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        stop = blend_tile(state, packed, ids, starts[t], starts[t + 1], x0, y0, channels > 4)
+        stops[t] = stop
+        for ch in range(min(channels, 5)):
+            for i in range(AREA):
+                out[t, ch, i] = state[ch * AREA + i]
+        if channels > 5:
+            blend_normals_tile(state, packed, ids, starts[t], stop, x0, y0)
+            for ch in range(3):
+                for i in range(AREA):
+                    out[t, 5 + ch, i] = state[(ch + 1) * AREA + i]
+
+
+@njit(**FAST)
+def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
+    """Sums of the pairs of a tile. Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour still to come, background too."""
+    for e in range(begin, end):
+        p = packed[ids[e]]
+        mx, my = p[0] - F(x0), p[1] - F(y0)
+        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        low, high = rows_of(p, y0)
+        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s19 = ZERO
+        h0 = h1 = h2 = h3 = h4 = h5 = h6 = h7 = h8 = ZERO
+        for i in range(low, high):
+            dx = state[X + i] - mx
+            dy = state[Y + i] - my
+            ex = A * dx + B * dy
+            ey = B * dx + C * dy
+            full = o * exp_negative(-HALF * (dx * ex + dy * ey))
+            a = min(full, MOST)
+            a = a if a >= LEAST else ZERO
+            T = state[i]
+            w = a * T
+            gr, gg, gb = state[ROW1 + i], state[ROW2 + i], state[ROW3 + i]
+            rr = state[ROW4 + i] - w * r
+            rg = state[ROW5 + i] - w * g
+            rb = state[ROW6 + i] - w * b
+            state[ROW4 + i] = rr
+            state[ROW5 + i] = rg
+            state[ROW6 + i] = rb
+            state[i] = T - w
+            q = a / (ONE - a)
+            free = ONE if full <= MOST else ZERO
+            jr = free * (w * r - q * rr)
+            jg = free * (w * g - q * rg)
+            jb = free * (w * b - q * rb)
+            v = jr * gr + jg * gg + jb * gb
+            h = jr * jr + jg * jg + jb * jb
+            vx = v * ex
+            vy = v * ey
+            s0 += v
+            s1 += vx
+            s2 += vy
+            s3 += vx * ex
+            s4 += vx * ey
+            s5 += vy * ey
+            s6 += w * gr
+            s7 += w * gg
+            s8 += w * gb
+            s9 += w
+            s19 += w * (gr * gr + gg * gg + gb * gb)
+            xx, xy, yy = ex * ex, ex * ey, ey * ey
+            hx, hy = h * xx, h * yy
+            h0 += h
+            h1 += hx
+            h2 += h * xy
+            h3 += hy
+            h4 += hx * xx
+            h5 += hx * xy
+            h6 += hx * yy
+            h7 += hy * xy
+            h8 += hy * yy
+        m = sums[e]
+        m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9] = s0, s1, s2, s3, s4, s5, s6, s7, s8, s9
+        m[10], m[11], m[12], m[13], m[14], m[15], m[16], m[17], m[18] = h0, h1, h2, h3, h4, h5, h6, h7, h8
+        m[19] = s19
+
+
+@njit(parallel=True, **FAST)
+def gradients(packed, ids, starts, stops, width, height, colour, slopes, sums):
+    """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture)."""
+    across = (width + TILE - 1) // TILE
+    for t in prange(starts.size - 1):
+        state = np.empty(ROWS * AREA, nb.float32)
+        coordinates(state)
+        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        for i in range(AREA):
+            # Pixels outside the picture let nothing through, so that nothing there counts.
+            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
+            state[i] = inside
+            for ch in range(3):
+                state[(1 + ch) * AREA + i] = inside * slopes[t, ch, i]
+                state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
+        gradient_tile(state, packed, ids, starts[t], stops[t], x0, y0, sums)
+        for e in range(stops[t], starts[t + 1]):
+            for j in range(SUMS):
+                sums[e, j] = ZERO
+
+
+@njit(parallel=True, **FAST)
+def opacity_before(packed, ids, starts, across, pixels, distances, out):
+    """Opacity [K] that rays through pixels [K,2] (x, y, centres at .5) have gathered before distances [K]."""
+    for n in prange(pixels.shape[0]):
+        x, y = pixels[n, 0] - HALF, pixels[n, 1] - HALF
+        t = int(pixels[n, 1]) // TILE * across + int(pixels[n, 0]) // TILE
+        through = ONE
+        for e in range(starts[t], starts[t + 1]):
+            p = packed[ids[e]]
+            dx, dy = x - p[0], y - p[1]
+            if p[10] + p[11] * dx + p[12] * dy < distances[n]:
+                a = p[5] * np.exp(-HALF * (dx * (p[2] * dx + p[3] * dy) + dy * (p[3] * dx + p[4] * dy)))
+                if a >= LEAST:
+                    through *= ONE - min(a, MOST)
+        out[n] = ONE - through

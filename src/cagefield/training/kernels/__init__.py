@@ -1,0 +1,1 @@
+"""Kernels of the trainers; their host code lies one folder up."""

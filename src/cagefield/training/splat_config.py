@@ -1,0 +1,54 @@
+"""What a person may choose of a SplatField's training."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cagefield.errors import CagefieldError
+
+
+@dataclass(frozen=True)
+class SplatConfig:
+    """How a SplatField is trained.
+
+    Attributes:
+        steps: number of steps; each is one photo.
+        minutes: train for this long instead of `steps`; the result then depends on the machine's speed.
+        splats: most splats at the end; None takes what the photos' pixels and the time allow.
+        sh_degree: degree of the colour's spherical harmonics at the end, 0 to 3.
+        seed: of the photos' order, of splits and of random splats.
+        antialiased: as SplatField.
+        exposure: fit a colour gain to each photo; None does so for captures without alpha.
+        background: splats of the far background, in shares of those that a run begins with; None takes them
+            for unbounded captures.
+        rate: (first, last) rate of the steps.
+        damping: (relative, absolute) damping of the blocks.
+        cap: largest step of log scales and turns, and of means in sigmas.
+        memory: decay of the running gradients and curvatures.
+        prune: splats whose opacity falls below this are taken out.
+        refine_poses: correct the training cameras' poses while training.
+    """
+
+    steps: int = 6000
+    minutes: float | None = None
+    splats: int | None = None
+    sh_degree: int = 2
+    seed: int = 0
+    antialiased: bool = True
+    exposure: bool | None = None
+    background: float | None = None
+    rate: tuple[float, float] = (0.1, 0.003)
+    damping: tuple[float, float] = (0.1, 0.01)
+    cap: float = 0.03
+    memory: tuple[float, float] = (0.5, 0.98)
+    prune: float = 0.01
+    refine_poses: bool = False
+
+    def __post_init__(self) -> None:
+        limits = {"steps": (1, 10**8), "sh_degree": (0, 3), "splats": (100, 10**8)}
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise CagefieldError(f"{name} is {value}; it must be from {low} to {high}")
+        if self.minutes is not None and not 0 < self.minutes < 1e5:
+            raise CagefieldError(f"minutes is {self.minutes}; it must be above 0")

@@ -1,0 +1,187 @@
+"""The state of one training of a SplatField, from photo to photo."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.datasets.views import Dataset
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.kernels.splat_blending import SUMS
+from cagefield.rendering.kernels.splat_projection import AREA
+from cagefield.rendering.splat_rasterizer import (
+    COLOUR,
+    Buffers,
+    intrinsics,
+    kernels,
+    near_depth,
+    project,
+    world_to_camera,
+)
+from cagefield.training.kernels.splat_chain import chain, shapes
+from cagefield.training.kernels.splat_step import gauss_newton, residuals
+from cagefield.training.splat_config import SplatConfig
+from cagefield.training.splat_growth import fading, split
+from cagefield.training.splat_seeds import (
+    FIRST_OPACITY,
+    background_seeds,
+    camera_scale,
+    neighbour_distance,
+)
+from cagefield.training.splat_state import SplatState
+from cagefield.training.splat_views import TrainingView, load_views
+
+LEVEL_UNTIL = ((2, 0.04), (1, 0.15))
+"""(level of the photos, progress until which it is used); then whole photos."""
+
+DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
+"""Progress from which harmonics of each degree are used."""
+
+GROWTH = (0.02, 0.6)
+"""Progress between which splats become more."""
+
+GROWTH_EVERY = 60
+"""Steps between two growths."""
+
+
+class SplatRun:
+    """A training run; see `running.Run`."""
+
+    def __init__(self, dataset: Dataset, config: SplatConfig) -> None:
+        self._config, self._dataset = config, dataset
+        self.views = load_views(dataset.train)
+        self._rng = np.random.default_rng(config.seed)
+        self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
+        self._near = near_depth(dataset.bounds)
+        self.state = self._seeds()
+        alpha = self.views[0].has_alpha
+        self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
+        self._fitted = (not alpha) if config.exposure is None else config.exposure
+        self.gains = np.ones((len(self.views), 3), np.float32)
+        self._gain_sums = np.zeros((len(self.views), 6))
+        self._buffers = Buffers()
+        self._queue: list[int] = []
+        self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
+        self._most = self._most_splats()
+        self._cold = True
+
+    def _seeds(self) -> SplatState:
+        dataset, config = self._dataset, self._config
+        points = dataset.points
+        assert points is not None
+        positions = points.positions
+        sigma = neighbour_distance(positions)
+        state = SplatState.new(
+            positions, sigma, points.rgb.astype(np.float32) / 255.0, FIRST_OPACITY, config.sh_degree
+        )
+        if dataset.unbounded and config.background != 0.0:
+            share = 0.3 if config.background is None else config.background
+            far = background_seeds(
+                self.views, dataset.bounds.mean(axis=0), self._scale, max(200, int(share * len(positions)))
+            )
+            state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
+        return state
+
+    def _most_splats(self) -> int:
+        return self._config.splats or 20_000
+
+    @property
+    def done(self) -> float:
+        """Progress of the run, 0 to 1."""
+        if self._config.minutes is not None:
+            return min(1.0, self.seconds / (60.0 * self._config.minutes))
+        return min(1.0, self.step / self._config.steps)
+
+    def advance(self) -> None:
+        """One photo: a step of all splats that it shows; before it, a growth where one is due."""
+        began = time.perf_counter()
+        done = self.done
+        if self.step % GROWTH_EVERY == GROWTH_EVERY - 1 and GROWTH[0] <= done < GROWTH[1]:
+            self._grow(done)
+        if not self._queue:
+            self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
+        self._photo(self._queue.pop(), done)
+        self.step += 1
+        self.seconds += 0.0 if self._cold else time.perf_counter() - began
+        self._cold = False
+
+    def _photo(self, index: int, done: float) -> None:
+        config, state = self._config, self.state
+        level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
+        camera, target = self.views[index].level(level)
+        count = len(state)
+        covariances = self._buffers.take("covariances", (count, 6), np.float32)
+        opacities = self._buffers.take("opacities", (count,), np.float32)
+        with kernels():
+            shapes(state.log_scales, state.quaternions, state.logits, covariances, opacities)
+        splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
+        seen = project(splats, camera, near=self._near, buffers=self._buffers)
+        out, stops = seen.blend(COLOUR)
+        colour = self._buffers.take("colour", (seen.tiles, 3, AREA), np.float32)
+        slopes = self._buffers.take("slopes", (seen.tiles, 3, AREA), np.float32)
+        tile_sums = np.empty((seen.tiles, 7), np.float32)
+        background = self._behind()
+        gain = self.gains[index]
+        lens = intrinsics(camera)
+        rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
+        degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
+        with kernels():
+            residuals(out, target, seen.width, seen.height, gain, background, colour, slopes, tile_sums)
+            sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
+            seen.gradients(colour, slopes, stops, sums)
+            chain(
+                seen.order, seen.firsts, seen.slots, sums, seen.packed, state.means, state.log_scales,
+                state.quaternions, opacities, state.sh, world_to_camera(camera), camera.origin, lens.focal,
+                lens.limits, lens.model, lens.coefficients, config.antialiased, state.gradients,
+                state.curvatures,
+            )  # fmt: skip
+            gauss_newton(
+                seen.order, state.gradients, state.curvatures, state.means, state.log_scales,
+                state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
+                state.ticks, np.array(config.memory), np.array([rate, rate, rate, rate, 0.5 * rate]),
+                np.array(config.damping), np.array([config.cap, config.cap]), (degree + 1) ** 2,
+                np.array([1e-5, 1e3]) * self._scale, 0.0,
+            )  # fmt: skip
+        state.error[seen.order] += state.gradients[seen.order, 15]
+        state.hits[seen.order] += 1
+        self._expose(index, tile_sums)
+        loss = float(tile_sums[:, 0].sum()) / (3 * seen.width * seen.height)
+        self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
+
+    def _behind(self) -> NDArray[np.float32]:
+        """The background of the next picture: behind cut-outs a random one, so that they become opaque."""
+        if self.views[0].has_alpha:
+            return self._rng.uniform(size=3).astype(np.float32)
+        return self.background
+
+    def _expose(self, index: int, tile_sums: NDArray[np.float32]) -> None:
+        """Takes the photo's sums into its gain."""
+        if not self._fitted:
+            return
+        sums = tile_sums[:, 1:].sum(axis=0, dtype=np.float64)
+        self._gain_sums[index] = sums
+        if self.done > 0.05:
+            fit = (sums[:3] + 0.02 * sums[3:].mean()) / (sums[3:] + 0.02 * sums[3:].mean())
+            self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
+            self.gains /= self.gains.mean(axis=0)
+
+    def _grow(self, done: float) -> None:
+        """Takes out what shows nothing, and splits what has the most error."""
+        state, config = self.state, self._config
+        state.take(np.flatnonzero(~fading(state, config.prune, 20.0 * self._scale)))
+        rounds = max(1.0, (GROWTH[1] - done) / max(done / max(self.step, 1), 1e-9) / GROWTH_EVERY)
+        if len(state) < self._most:
+            want = int(len(state) * ((self._most / len(state)) ** (1.0 / rounds) - 1.0))
+            want = min(want, len(state) // 2, self._most - len(state))
+            rows = np.argsort(-state.error)[:want]
+            split(state, rows[state.error[rows] > 0])
+        state.error[:] = 0.0
+        state.hits[:] = 0
+
+    def field(self) -> SplatField:
+        """The field as it is now."""
+        return self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)

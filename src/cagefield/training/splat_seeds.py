@@ -1,0 +1,87 @@
+"""The splats that a training begins with: round ones at sparse points, and a far background.
+
+Their size is the root mean square distance to the three nearest neighbours; background splats lie on a sphere
+far around the cameras and have the colour that the photos show in their direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera
+from cagefield.training.splat_views import TrainingView
+
+Array = NDArray[np.float64]
+
+FAR = 10.0
+"""Radius of the background's sphere, in median distances of the cameras from the centre of interest."""
+
+FIRST_OPACITY = 0.3
+
+
+def neighbour_distance(positions: Array) -> Array:
+    """Root mean square distance [N] to the three nearest other positions, extremes held back."""
+    from scipy.spatial import cKDTree
+
+    count = min(4, len(positions))
+    if count < 2:
+        return np.full(len(positions), 1.0)
+    distances = cKDTree(positions).query(positions, count)[0][:, 1:]
+    rms = np.sqrt((distances**2).mean(axis=1))
+    high = float(np.quantile(distances, 0.99))
+    return np.asarray(np.clip(rms, 1e-4 * max(high, 1e-30), high))
+
+
+def seen_colours(views: Sequence[TrainingView], positions: Array) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """(rgb [N,3] in [0,1], number of photos [N]) in which positions [N,3] are pictured: means over the photos."""
+    sums, counts = np.zeros((len(positions), 3)), np.zeros(len(positions), np.int32)
+    for view in views:
+        camera, tiles = view.level(len(view.cameras) - 1)
+        across = -(-camera.width // 16)
+        pixels, depth = camera.project(positions)
+        with np.errstate(invalid="ignore"):
+            inside = (
+                (pixels >= 0).all(axis=1)
+                & (pixels[:, 0] < camera.width)
+                & (pixels[:, 1] < camera.height)
+                & (depth > 0)
+            )
+        at = pixels[inside].astype(np.int64)
+        tile = at[:, 1] // 16 * across + at[:, 0] // 16
+        sums[inside] += tiles[tile, :3, at[:, 1] % 16 * 16 + at[:, 0] % 16] / 255.0
+        counts[inside] += 1
+    return (sums / np.maximum(counts, 1)[:, None]).astype(np.float32), counts
+
+
+def sphere(count: int) -> Array:
+    """Unit directions [N,3], even over the sphere. Source: the Fibonacci lattice (Gonzalez, 2010)."""
+    k = np.arange(count) + 0.5
+    height = 1.0 - 2.0 * k / count
+    angle = np.pi * (1.0 + 5.0**0.5) * k
+    ring = np.sqrt(1.0 - height**2)
+    return np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
+
+
+def background_seeds(
+    views: Sequence[TrainingView], centre: Array, distance: float, count: int
+) -> tuple[Array, Array, NDArray[np.float32]]:
+    """(positions, sigmas, rgb) of splats on the sphere of FAR distances, those that some photo shows."""
+    # Photos show a part of the sphere: enough directions that about `count` are left.
+    trial = sphere(2000)
+    share = max(0.02, float((seen_colours(views, centre + FAR * distance * trial)[1] > 0).mean()))
+    directions = sphere(max(8, int(count / share)))
+    positions = centre + FAR * distance * directions
+    rgb, seen = seen_colours(views, positions)
+    sigma = 0.5 * FAR * distance * np.sqrt(4.0 * np.pi / len(directions))
+    kept = seen > 0
+    return positions[kept], np.full(int(kept.sum()), sigma), rgb[kept]
+
+
+def camera_scale(cameras: Sequence[Camera], bounds: Array) -> float:
+    """The median distance of the cameras from the middle of the bounds: the scene's own unit of length."""
+    origins = np.stack([camera.origin for camera in cameras])
+    median = float(np.median(np.linalg.norm(origins - bounds.mean(axis=0), axis=1)))
+    return max(median, 0.1 * float(np.linalg.norm(bounds[1] - bounds[0])))

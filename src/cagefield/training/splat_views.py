@@ -1,0 +1,63 @@
+"""The photos of a SplatField's training: tiles of pixels at several sizes, with their cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera
+from cagefield.datasets.views import View
+from cagefield.rendering.splat_rasterizer import tiled
+
+LEVELS = 3
+"""Sizes of each photo: whole, 1/2, 1/4."""
+
+SMALLEST = 48
+"""Pixels that the shorter side of a photo keeps at the least."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingView:
+    """One photo: its camera and its pixels [tiles, 3 or 4, AREA] uint8 by level, 0 the whole size."""
+
+    name: str
+    cameras: tuple[Camera, ...]
+    tiles: tuple[NDArray[np.uint8], ...]
+    has_alpha: bool
+
+    @classmethod
+    def of(cls, view: View) -> TrainingView:
+        """The photo read and shrunk by box filters; straight alpha is weighed in."""
+        pixels = view.load()
+        cameras, tiles = [view.camera], [tiled(pixels)]
+        for level in range(1, LEVELS):
+            factor = 2**level
+            if min(view.camera.width, view.camera.height) // factor < SMALLEST:
+                break
+            cameras.append(view.camera.downscaled(factor))
+            tiles.append(tiled(_boxed(pixels, factor)))
+        return cls(view.name, tuple(cameras), tuple(tiles), pixels.shape[2] == 4)
+
+    def level(self, level: int) -> tuple[Camera, NDArray[np.uint8]]:
+        """(camera, tiles) of a level, or of the smallest that there is."""
+        at = min(level, len(self.cameras) - 1)
+        return self.cameras[at], self.tiles[at]
+
+
+def load_views(views: Sequence[View]) -> list[TrainingView]:
+    """All photos. Raises DatasetError where one cannot be read."""
+    return [TrainingView.of(view) for view in views]
+
+
+def _boxed(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    height, width = pixels.shape[0] // factor, pixels.shape[1] // factor
+    blocks = pixels[: height * factor, : width * factor].astype(np.float32)
+    blocks = blocks.reshape(height, factor, width, factor, -1)
+    if pixels.shape[2] == 3:
+        return (blocks.mean(axis=(1, 3)) + 0.5).astype(np.uint8)
+    alpha = blocks[..., 3:]
+    rgb = (blocks[..., :3] * alpha).sum(axis=(1, 3)) / np.maximum(alpha.sum(axis=(1, 3)), 1e-6)
+    return (np.concatenate([rgb, alpha.mean(axis=(1, 3))], axis=-1) + 0.5).astype(np.uint8)
