@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 
 Float32 = NDArray[np.float32]
@@ -62,6 +64,35 @@ def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]
 
 def covariances_of(quaternions: Float32, log_scales: Float32) -> Float32:
     """R diag(s^2) R^T as [N,6] float32 (xx, xy, xz, yy, yz, zz)."""
-    axes = rotation_matrices(quaternions.astype(np.float64)) * np.exp(log_scales.astype(np.float64))[:, None, :]
+    axes = (
+        rotation_matrices(quaternions.astype(np.float64)) * np.exp(log_scales.astype(np.float64))[:, None, :]
+    )
     full = axes @ axes.transpose(0, 2, 1)
     return np.ascontiguousarray(full.reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]], np.float32)
+
+
+def deformed_splats(
+    field: SplatField,
+    edits: EditStack,
+    *,
+    coarse: bool = False,
+    proceed: Callable[[], None] | None = None,
+) -> DeformedSplats:
+    """The field's splats under an edit stack: mean' = to_deformed(mean), covariance' = J C J^T."""
+    plain = DeformedSplats.of_field(field)
+    if not edits.active:
+        return plain
+    moved = edits.to_deformed(field.means)
+    kept = ~moved.hidden
+    J = moved.jacobian[kept]
+    full = plain.covariances[kept][:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    covariances = (J @ full @ J.transpose(0, 2, 1)).reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]]
+    U, _, V = np.linalg.svd(J)
+    return DeformedSplats(
+        moved.points[kept].astype(np.float32),
+        np.ascontiguousarray(covariances, np.float32),
+        field.opacities[kept],
+        field.sh[kept],
+        np.ascontiguousarray(U @ V, np.float32),
+        field.antialiased,
+    )

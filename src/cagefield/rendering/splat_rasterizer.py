@@ -82,7 +82,7 @@ class Projection:
         return len(self.starts) - 1
 
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
-        """The picture [tiles, channels, AREA] (T, colour, depth x weight, normals), and where each tile was left."""
+        """The picture [tiles,channels,AREA] (T, colour, depth x weight, normals), and where tiles were left."""
         out = np.empty((self.tiles, channels, AREA), np.float32)
         stops = np.empty(self.tiles, np.int64)
         with kernels():
@@ -217,7 +217,14 @@ def intrinsics(camera: Camera) -> Intrinsics:
 
 @lru_cache(maxsize=512)
 def _intrinsics(
-    width: int, height: int, fx: float, fy: float, cx: float, cy: float, model: Any, distortion: tuple[float, ...]
+    width: int,
+    height: int,
+    fx: float,
+    fy: float,
+    cx: float,
+    cy: float,
+    model: Any,
+    distortion: tuple[float, ...],
 ) -> Intrinsics:
     coefficients = np.zeros(6)
     coefficients[: len(distortion)] = distortion

@@ -1,7 +1,7 @@
 """Pictures of splats in float64, one splat after the other over the whole picture: the oracle of the kernels.
 
-Notation as in `kernels.splat_projection` and `kernels.splat_blending`: n = (x/z, y/z), D the lens's derivative,
-M = J W, the projected covariance M C M^T + BLUR I, alpha = o exp(-d^T Q d / 2).
+Notation as in `kernels.splat_projection` and `kernels.splat_blending`: n = (x/z, y/z), D the lens's
+derivative, M = J W, the projected covariance M C M^T + BLUR I, alpha = o exp(-d^T Q d / 2).
 
 Source: Zwicker et al., "EWA splatting" (2002), equations 24 to 34; Kerbl et al. (2023), equations 2 to 5.
 """
@@ -9,6 +9,7 @@ Source: Zwicker et al., "EWA splatting" (2002), equations 24 to 34; Kerbl et al.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.frame import Background, Frame
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 BLUR, ALPHA_MIN, ALPHA_MAX = 0.3, 1.0 / 255.0, 0.99
 LEAST_COMPENSATION = 0.005
@@ -28,8 +29,8 @@ LEAST_COMPENSATION = 0.005
 class ProjectedSplats:
     """The splats in front of a camera, near to far.
 
-    rows [N] which they are; means [N,2] in pixels; conics [N,2,2]; opacities [N]; colours [N,3]; distances [N]
-    along the ray at the mean, and their slopes [N,2] per pixel.
+    rows [N] which they are; means [N,2] in pixels; conics [N,2,2]; opacities [N]; colours [N,3]; distances
+    [N] along the ray at the mean, and their slopes [N,2] per pixel.
     """
 
     rows: NDArray[np.int64]
@@ -41,12 +42,16 @@ class ProjectedSplats:
     slopes: Array
 
 
-def project(splats: DeformedSplats, camera: Camera, near: float, limits: Array | None = None) -> ProjectedSplats:
+def project(
+    splats: DeformedSplats, camera: Camera, near: float, limits: Array | None = None
+) -> ProjectedSplats:
     """The splats as the camera sees them; `limits` [4] bound n where shapes are taken (None: no bounds)."""
     W = np.diag([1.0, -1.0, -1.0]) @ camera.c2w[:3, :3].T
     offset = splats.means.astype(np.float64) - camera.origin
     p = offset @ W.T
-    rows = np.flatnonzero((p[:, 2] >= near) & ~np.isnan(lenses.project(p, camera.model, camera.distortion)[:, 0]))
+    rows = np.flatnonzero(
+        (p[:, 2] >= near) & ~np.isnan(lenses.project(p, camera.model, camera.distortion)[:, 0])
+    )
     rows = rows[np.argsort(p[rows, 2], kind="stable")]
     p, offset = p[rows], offset[rows]
     focal = np.array([camera.fx, camera.fy])
@@ -101,7 +106,7 @@ def render(
 
 
 def _jacobians(p: Array, camera: Camera, limits: Array | None) -> Array:
-    """d(pixel)/d(p) [N,2,3] at camera points [N,3], n held within the limits; by central differences of the lens."""
+    """d(pixel)/d(p) [N,2,3] at camera points [N,3], n within the limits; central differences of the lens."""
     n = p[:, :2] / p[:, 2:]
     if limits is not None:
         n = np.clip(n, limits[[0, 2]], limits[[1, 3]])

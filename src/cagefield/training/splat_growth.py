@@ -22,7 +22,7 @@ def fading(state: SplatState, prune: float, largest: float) -> NDArray[np.bool_]
 
 
 def split(state: SplatState, rows: NDArray[np.int64]) -> None:
-    """Splits the splats of these rows in two along their longest axes; opacity so that the pair shows as much."""
+    """Splits splats in two along their longest axes, with opacities that let the pair show as much."""
     if not len(rows):
         return
     count = len(state)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ from cagefield.training.splat_seeds import (
     neighbour_distance,
 )
 from cagefield.training.splat_state import SplatState
-from cagefield.training.splat_views import TrainingView, load_views
+from cagefield.training.splat_views import load_views
 
 LEVEL_UNTIL = ((2, 0.04), (1, 0.15))
 """(level of the photos, progress until which it is used); then whole photos."""

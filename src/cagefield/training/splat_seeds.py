@@ -35,8 +35,10 @@ def neighbour_distance(positions: Array) -> Array:
     return np.asarray(np.clip(rms, 1e-4 * max(high, 1e-30), high))
 
 
-def seen_colours(views: Sequence[TrainingView], positions: Array) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """(rgb [N,3] in [0,1], number of photos [N]) in which positions [N,3] are pictured: means over the photos."""
+def seen_colours(
+    views: Sequence[TrainingView], positions: Array
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """(mean rgb [N,3] in [0,1], number of photos [N]) of the photos that picture positions [N,3]."""
     sums, counts = np.zeros((len(positions), 3)), np.zeros(len(positions), np.int32)
     for view in views:
         camera, tiles = view.level(len(view.cameras) - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ Float32 = NDArray[np.float32]
 class SplatState:
     """N splats in training; arrays by row.
 
-    means [N,3], log_scales [N,3], quaternions [N,4], logits [N], sh [N,K,3]: as SplatField, the opacity's logit.
+    means [N,3], log_scales [N,3], quaternions [N,4], logits [N] of the opacities, sh [N,K,3]: as SplatField.
     momentum, running, ticks: of `gauss_newton`. error [N], hits [N]: what `growth` weighs.
     gradients, curvatures: of the last step, valid for the splats that it saw.
     """
@@ -38,7 +39,7 @@ class SplatState:
 
     @classmethod
     def new(
-        cls, means: Float32, scales: Float32, rgb: Float32, opacity: float, sh_degree: int
+        cls, means: NDArray[Any], scales: NDArray[Any], rgb: Float32, opacity: float, sh_degree: int
     ) -> SplatState:
         """Round splats: means [N,3], standard deviations [N], rgb [N,3]."""
         n = len(means)
@@ -84,7 +85,7 @@ class SplatState:
         )
 
 
-def _memory(n: int) -> tuple[NDArray[np.float32] | NDArray[np.int32], ...]:
+def _memory(n: int) -> tuple[Any, ...]:
     """Empty optimiser rows of n splats, in the order of SplatState's fields."""
     return (
         np.zeros((n, MOMENTS), np.float32),

@@ -159,7 +159,7 @@ def blend(packed, ids, starts, across, channels, stops, out):
 
 @njit(**FAST)
 def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
-    """Sums of the pairs of a tile. Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour still to come, background too."""
+    """Sums of a tile's pairs. Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour to come, background too."""
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)

@@ -1,9 +1,12 @@
 """Splats onto a picture: projected means, covariances, colours, and the tiles that each one touches (Numba).
 
 Notation: a splat's mean is p in camera axes (x right, y down, z forward), C its covariance in the world, W
-the world-to-camera rotation. The lens maps n = (x/z, y/z) to d(n), and the pixel is (fx d_x + cx, fy d_y + cy).
-J = diag(f) D(n) [1/z, 0, -x/z^2; 0, 1/z, -y/z^2], D = dd/dn, is the derivative of the pixel by p, taken where n
-is at most a little outside the picture. The projected covariance is M C M^T + BLUR I with M = J W (local affine
+the world-to-camera rotation. The lens maps n = (x/z, y/z) to d(n), and the pixel is (fx d_x + cx, fy d_y +
+cy).
+J = diag(f) D(n) [1/z, 0, -x/z^2; 0, 1/z, -y/z^2], D = dd/dn, is the derivative of the pixel by p, taken
+where n
+is at most a little outside the picture. The projected covariance is M C M^T + BLUR I with M = J W (local
+affine
 approximation). An antialiased splat's opacity is multiplied by sqrt(det(M C M^T) / det(M C M^T + BLUR I)).
 
 The oracle is `cagefield.rendering.splat_reference.project`.
@@ -14,7 +17,8 @@ Real-Time Radiance Field Rendering" (2023), equation 5; Yu et al., "Mip-Splattin
 
 from __future__ import annotations
 
-import numba as nb
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 
@@ -34,11 +38,12 @@ LEAST_COMPENSATION = 0.005
 PINHOLE, OPENCV, FISHEYE = 0, 1, 2
 
 PACKED = 16
-"""Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, B, C, 5 opacity,
+"""Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, B, C,
+5 opacity,
 6-8 colour, 9 half-height of what is above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its slope
 per pixel, 13-15 normal."""
 
-FAST = {"fastmath": True, "error_model": "numpy", "cache": True}
+FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
 """Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
 
 C0, C1 = harmonics.C0, harmonics.C1

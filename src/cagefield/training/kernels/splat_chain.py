@@ -1,11 +1,15 @@
 """From sums over a picture's pixels to gradients and curvatures of each splat's own parameters (Numba).
 
-Notation as in `rendering.kernels.splat_projection` and `splat_blending`. A splat's parameters are its mean, log
-scales, a turn about its own axes (so that R <- R exp([turn]x)), the logit of its opacity, and its colour before the
+Notation as in `rendering.kernels.splat_projection` and `splat_blending`. A splat's parameters are its mean,
+log
+scales, a turn about its own axes (so that R <- R exp([turn]x)), the logit of its opacity, and its colour
+before the
 clamp at 0. k_j = M R_j is the screen vector of its unit axis j. With G = dL/dS, S the projected covariance:
-    log scale j:  dS = 2 s_j^2 k_j k_j^T                  turn about j: dS = (s_m^2 - s_n^2) (k_m k_n^T + k_n k_m^T)
+    log scale j:  dS = 2 s_j^2 k_j k_j^T                  turn about j: dS = (s_m^2 - s_n^2) (k_m k_n^T +
+    k_n k_m^T)
 and (m, n) the other two axes. G = sum v e e^T / 2; an antialiased splat's opacity adds v K / 2,
-K = (M C M^T)^-1 - S^-1, to it. Curvatures are Gauss-Newton's, sum over pixels and channels of (dC/dparameter)^2.
+K = (M C M^T)^-1 - S^-1, to it. Curvatures are Gauss-Newton's, sum over pixels and channels of
+(dC/dparameter)^2.
 
 The oracle is finite differences of `cagefield.rendering.splat_reference`.
 
@@ -173,7 +177,7 @@ def chain(
             j11 += D1 * W[1, n]
             j12 += D1 * W[2, n]
         # J / diag(f) = D [iz, 0, -nx iz; 0, iz, -ny iz]: through D, and through the matrix on its right.
-        p00, p01 = d00 * j00 + d10 * j10, d00 * j01 + d10 * j11
+        p00 = d00 * j00 + d10 * j10
         p02 = d00 * j02 + d10 * j12
         p11, p12 = d01 * j01 + d11 * j11, d01 * j02 + d11 * j12
         gz = -iz * iz * (p00 + p11 - nx * p02 - ny * p12)
@@ -186,10 +190,14 @@ def chain(
             e11 = iz * (j11 - ny * j12)
             _, _, a00, a01, a10, a11 = distort(nx + STEP, ny, model, coefficients)
             _, _, b00, b01, b10, b11 = distort(nx - STEP, ny, model, coefficients)
-            gx += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (2.0 * STEP)
+            gx += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (
+                2.0 * STEP
+            )
             _, _, a00, a01, a10, a11 = distort(nx, ny + STEP, model, coefficients)
             _, _, b00, b01, b10, b11 = distort(nx, ny - STEP, model, coefficients)
-            gy += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (2.0 * STEP)
+            gy += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (
+                2.0 * STEP
+            )
         free_x = limits[0] < x * iz < limits[1]
         free_y = limits[2] < y * iz < limits[3]
         cx = cy = 0.0

@@ -1,9 +1,11 @@
 """Damped Gauss-Newton steps of splats, each by its own blocks, and what becomes of a picture's error (Numba).
 
-A splat's blocks are 3 x 3 for its mean and for its log scales, diagonal for its turn and its logit; its colour's
-curvature is majorised by the sum of its weights, for those of a pixel add up to at most 1. Gradients and curvatures
-are running means over the views that see the splat. No step is longer than a cap: overlapping splats break the
-block-diagonal model.
+A splat's blocks are 3 x 3 for its mean and for its log scales, diagonal for its turn and its logit; its
+colour's
+curvature is majorised by the sum of its weights, for those of a pixel add up to at most 1. Gradients and
+curvatures
+are running means over the views that see the splat. No step is longer than a cap: overlapping splats break
+the block-diagonal model.
 
 Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping as in Levenberg-Marquardt.
 """
@@ -65,7 +67,12 @@ def turn(quaternions, i, wx, wy, wz):
     n2 = b + w * y + c * x - a * z
     n3 = c + w * z + a * y - b * x
     r = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + n3 * n3)
-    quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3] = n0 * r, n1 * r, n2 * r, n3 * r
+    quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3] = (
+        n0 * r,
+        n1 * r,
+        n2 * r,
+        n3 * r,
+    )
 
 
 @njit(inline="always", **FAST)
@@ -120,8 +127,8 @@ def gauss_newton(
 
     memory: decay of the running gradient and of the running curvature. rates: mean, log scales, turn, logit,
     colour. damping: relative to the block, and absolute. caps: log scales and turns; mean, in largest sigmas.
-    terms: harmonics in use. scale_range: (least, largest) sigma. shrink: pull on the logit and log scales that
-    lets splats nobody needs fade.
+    terms: harmonics in use. scale_range: (least, largest) sigma. shrink: pull on the logit and log scales
+    that lets splats nobody needs fade.
     """
     for q in prange(order.size):
         i = order[q]

@@ -1,0 +1,151 @@
+"""SplatRenderer: pictures of a SplatField seen through its edits, by the rasteriser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.deformed_splats import DeformedSplats, deformed_splats
+from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.splat_rasterizer import (
+    DEPTH,
+    NORMALS,
+    Buffers,
+    Float32,
+    Projection,
+    Region,
+    near_depth,
+    project,
+)
+
+
+class SplatRenderer:
+    """Renders one SplatField under one edit stack, with the same methods as `Renderer`.
+
+    The splats are deformed once, when the renderer is made; frames cost the same with edits and without.
+    Pictures are within 50 dB and better of `splat_reference`. A fisheye lens shows what is less than 87
+    degrees off its axis.
+    """
+
+    step = 1.0
+    """Splats have no samples; there for what a Renderer has."""
+
+    def __init__(
+        self,
+        field: SplatField,
+        edits: EditStack | None = None,
+        *,
+        preserve_opacity: bool = True,
+    ) -> None:
+        """Raises EditError where an edit cannot be evaluated."""
+        self.field = field
+        self.edits = edits if edits is not None else EditStack([])
+        self.preserve_opacity = preserve_opacity
+        self.splats: DeformedSplats = deformed_splats(field, self.edits)
+        self._buffers = Buffers()
+        self._normals: Float32 | None = None
+
+    def with_edits(
+        self,
+        edits: EditStack,
+        *,
+        preserve_opacity: bool | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
+    ) -> SplatRenderer:
+        """A renderer of the same field under other edits.
+
+        `coarse` evaluates shells from coarse lattices: ready sooner, slightly off. `proceed` is called now
+        and then, and gives the renderer up by raising.
+        """
+        other = object.__new__(SplatRenderer)
+        other.__dict__.update(self.__dict__)
+        other.edits = edits
+        if preserve_opacity is not None:
+            other.preserve_opacity = preserve_opacity
+        other.splats = deformed_splats(self.field, edits, coarse=coarse, proceed=proceed)
+        other._normals = None
+        return other
+
+    def render(
+        self,
+        camera: Camera,
+        *,
+        background: Background = "white",
+        normals: bool = False,
+        near: float = 0.0,
+        region: Region | None = None,
+        should_stop: Callable[[], bool] | None = None,
+        step: float | None = None,
+    ) -> Frame | None:
+        """The frame seen by `camera`, or None where `should_stop` said so before or after it was projected.
+
+        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; nothing
+        nearer than `near` is drawn; `step` changes nothing here.
+        """
+        if region is not None:
+            x, y, width, height = region
+            inside = x + width <= camera.width and y + height <= camera.height
+            if min(x, y) < 0 or min(width, height) < 1 or not inside:
+                raise CagefieldError(
+                    f"region {region} (x, y, width, height) is not inside the picture of"
+                    f" {camera.width}x{camera.height} pixels; make it smaller"
+                )
+        if should_stop is not None and should_stop():
+            return None
+        seen = self.project(camera, near=near, region=region, normals=normals)
+        if should_stop is not None and should_stop():
+            return None
+        return _frame(seen.picture(NORMALS if normals else DEPTH), background, normals)
+
+    def project(
+        self, camera: Camera, *, near: float = 0.0, region: Region | None = None, normals: bool = False
+    ) -> Projection:
+        """The splats as the camera sees them; valid until this renderer projects again."""
+        if normals and self._normals is None:
+            self._normals = flattest_axes(self.splats.covariances)
+        return project(
+            self.splats,
+            camera,
+            near=max(near, near_depth(self.field.bounds)),
+            region=region,
+            normals=self._normals if normals else None,
+            buffers=self._buffers,
+        )
+
+    def opacity_before(self, camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
+        """Opacity [K] gathered before distances [K] along the rays of pixel positions [K,2] of a camera.
+
+        Raises CagefieldError for positions outside the picture.
+        """
+        pixels = np.asarray(pixels, np.float64)
+        if len(pixels) and not ((pixels >= 0) & (pixels < (camera.width, camera.height))).all():
+            raise CagefieldError(f"pixels must lie inside the picture of {camera.width}x{camera.height}")
+        return self.project(camera).opacity_before(pixels, np.asarray(distances))
+
+
+def flattest_axes(covariances: Float32) -> Float32:
+    """Unit axes [N,3] of the least variance of covariances [N,6]: the normals of flat splats."""
+    full = covariances[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3).astype(np.float64)
+    return np.ascontiguousarray(np.linalg.eigh(full)[1][:, :, 0], np.float32)
+
+
+def _frame(picture: Float32, background: Background, with_normals: bool) -> Frame:
+    opacity = 1.0 - picture[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(opacity > 1e-6, picture[..., 4] / opacity, np.inf)
+    normals = None
+    if with_normals:
+        normals = picture[..., 5:8]
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), 0.0)
+    return Frame.from_premultiplied(
+        picture[..., 1:4], opacity, depth.astype(np.float32), normals=normals, background=background
+    )
