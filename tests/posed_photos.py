@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from PIL import Image
 
 from cagefield.cameras import Camera
 from cagefield.datasets import View
+from cagefield.datasets.procedural.textures import noise
 
 POINT = np.array([0.15, -0.1, 0.2])
 WIDTH, HEIGHT = 96, 64
@@ -118,4 +120,67 @@ def room_capture(folder: Path, forward_facing: bool = True) -> Path:
         Camera.look_at(place, target, up=(0, 1, 0), width=24, height=18, fov_x=1.0) for place in places
     ]
     save_llff(folder, cameras, [photo_of_a_room(camera) for camera in cameras], (3.5, 14.0))
+    return folder
+
+
+def photo_of_textures(camera: Camera, cut_out: bool = False) -> np.ndarray:
+    """uint8 [H,W,3] of a ball of radius 1 at the origin on a floor z = -1, both mottled.
+
+    As a cut-out ([H,W,4]) it shows the ball alone.
+    """
+    origins, toward = (values.astype(np.float64) for values in camera.rays())
+    b = (origins * toward).sum(axis=1)
+    root = b**2 - (origins**2).sum(axis=1) + 1.0
+    ball = (root > 0) & (b < 0)
+    down = toward[:, 2] < -1e-3
+    t = np.where(
+        ball, -b - np.sqrt(np.maximum(root, 0)), -(1.0 + origins[:, 2]) / np.where(down, toward[:, 2], -1)
+    )
+    points = (origins + t[:, None] * toward).astype(np.float32)
+    points[~(ball | down)] = 0.0
+    mottle = np.stack(
+        [noise(points + shift, 0.12) + noise(points - shift, 0.03) for shift in (0.0, 1.3, 2.6)], axis=1
+    )
+    rgb = np.where((ball | down)[:, None], 0.5 + 0.15 * mottle, 0.6)
+    if cut_out:
+        rgb = np.where(ball[:, None], rgb, 0.0)
+        rgb = np.concatenate([rgb, ball[:, None].astype(float)], axis=1)
+    return np.rint(255 * rgb.clip(0, 1)).astype(np.uint8).reshape(camera.height, camera.width, -1)
+
+
+def distance_to_textures(points: np.ndarray) -> np.ndarray:
+    """How far points [N,3] lie from the ball and the floor of `photo_of_textures`, whichever is nearer."""
+    return np.minimum(np.abs(np.linalg.norm(points, axis=1) - 1.0), np.abs(points[:, 2] + 1.0))
+
+
+def textured_capture(
+    folder: Path,
+    n: int = 10,
+    sweep: float = 1.6,
+    cut_out: bool = False,
+    lens: str = "opencv",
+    size=(320, 240),
+) -> Path:
+    """An Instant-NGP capture of `photo_of_textures` in two folders whose photos have the same names."""
+    width, height = size
+    frames = []
+    lenses = {
+        "opencv": {"k1": 0.08, "k2": -0.03, "p1": 0.002, "p2": -0.001},
+        "opencv_fisheye": {"k1": 0.03, "k2": -0.01, "k3": 0.0, "k4": 0.0},
+    }
+    for index, pose in enumerate(ring(n, sweep=sweep)):
+        camera = Camera(
+            pose, width, height, width * 1.1, width * 1.12, 0.49 * width, 0.52 * height, lens,
+            tuple(lenses[lens].values()),
+        )  # fmt: skip
+        name = f"{'left' if index % 2 else 'right'}/{index // 2:03}.png"
+        save(folder / name, photo_of_textures(camera, cut_out))
+        frames.append(
+            {"file_path": name, "transform_matrix": pose.tolist(), "fl_x": camera.fx, "fl_y": camera.fy}
+        )  # fmt: skip
+    values = {"cx": 0.49 * width, "cy": 0.52 * height, "frames": frames, **lenses[lens]}
+    if lens == "opencv_fisheye":
+        values["camera_model"] = "OPENCV_FISHEYE"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "transforms.json").write_text(json.dumps(values))
     return folder

@@ -112,6 +112,9 @@ def _nerfstudio(folder: Path, n: int = 6, fisheye: bool = False, **changes) -> P
         "applied_transform": [[0, 1, 0, 0.5], [1, 0, 0, 0], [0, 0, -1, 0]],
         "ply_file_path": "sparse_pc.ply",
     }
+    header = "ply\nformat ascii 1.0\nelement vertex 1\n"
+    header += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+    (folder / "sparse_pc.ply").write_text(header + "{} {} {}\n".format(*POINT))
     return _write(folder / "transforms.json", {**values, **changes})
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.formats.ply import read_ply
 from cagefield.formats.splat_ply import read_splat_ply, write_splat_ply
+from cagefield.ply import read_ply
 from scenes import SH_C0
 from splat_scenes import assert_same_splats, random_splats
 

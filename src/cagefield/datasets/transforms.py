@@ -8,6 +8,7 @@ read alike; a key in a frame wins over the same key of the file:
   lens        camera_model (PINHOLE, SIMPLE_PINHOLE, OPENCV, OPENCV_FISHEYE), is_fisheye, k1..k4, p1, p2
   photo       file_path, relative to the file, with or without extension
   scene       aabb_scale, scale, offset (Instant-NGP), applied_transform (nerfstudio)
+  points      ply_file_path (nerfstudio): a PLY file of sparse points in the file's world
   splits      transforms_train/val/test.json, or train_filenames, val_filenames, test_filenames in one file
 `applied_transform` [3,4] is what nerfstudio did to the reconstruction's coordinates before it wrote the
 poses: the file's world = applied_transform x the reconstruction's. It becomes `Dataset.source_to_world` and
@@ -18,6 +19,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -27,8 +29,9 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets.photos import Header, choose_downscale, find_photo, is_cut_out, read_header
-from cagefield.datasets.region import cube_of_interest
-from cagefield.datasets.views import Dataset, View, hold_out, report_missing
+from cagefield.datasets.point_files import read_points
+from cagefield.datasets.region import cube_of_interest, depths_of_points
+from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
 
@@ -79,7 +82,9 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
     if not test:
         train, test = hold_out(train, holdout)
     cut_out = _are_cut_out(views["train"])
-    unbounded, bounds = _extent(main, [view.camera for view in views["train"]], cut_out, synthetic)
+    points = main.points()
+    unbounded, bounds = _extent(main, [view.camera for view in views["train"]], cut_out, synthetic, points)
+    found = None if points is None else depths_of_points([v.camera for v in everything], points.positions)
     return Dataset(
         name=folder.resolve().name,
         path=folder,
@@ -90,6 +95,8 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
         bounds=bounds,
         white_background=cut_out,
         source_to_world=main.applied_transform(),
+        depths=None if found is None else (float(found[:, 0].min()), float(found[:, 1].max())),
+        points=points,
     )
 
 
@@ -136,6 +143,20 @@ class _TransformsFile:
         held_out = listed.get("test", set()) | listed.get("val", set())
         listed.setdefault("train", {view.name for view in self.views} - held_out)
         return {split: [v for v in self.views if v.name in listed.get(split, ())] for split in SPLITS}
+
+    def points(self) -> SparsePoints | None:
+        """The points of `ply_file_path`; None, with a warning, where the file cannot be read."""
+        name = self.values.get("ply_file_path")
+        if name is None:
+            return None
+        if not isinstance(name, str) or not name:
+            raise DatasetError(f"{self.path}: key 'ply_file_path' must name a PLY file, got {name!r}")
+        try:
+            found = read_points(self.path.parent / _view_name(name))
+        except DatasetError as error:
+            warnings.warn(f"{error}; {self.path} is used without its points", stacklevel=4)
+            return None
+        return found if len(found) else None
 
     def applied_transform(self) -> npt.NDArray[np.float64]:
         """nerfstudio's `applied_transform` as [4,4]; the identity where the file has none."""
@@ -273,7 +294,11 @@ def _are_cut_out(views: list[View]) -> bool:
 
 
 def _extent(
-    file: _TransformsFile, cameras: list[Camera], cut_out: bool, synthetic: bool
+    file: _TransformsFile,
+    cameras: list[Camera],
+    cut_out: bool,
+    synthetic: bool,
+    points: SparsePoints | None,
 ) -> tuple[bool, npt.NDArray[np.float64]]:
     """Whether the scene is unbounded, and its bounds [2,3]."""
     where = str(file.path)
@@ -288,7 +313,8 @@ def _extent(
         return False, _box(where, file.values["aabb"])
     if synthetic and cut_out and aabb_scale is None:
         return False, np.array([[-_SYNTHETIC_HALF_SIZE] * 3, [_SYNTHETIC_HALF_SIZE] * 3])
-    return aabb_scale is not None or not cut_out, cube_of_interest(cameras)
+    positions = None if points is None else points.positions
+    return aabb_scale is not None or not cut_out, cube_of_interest(cameras, points=positions)
 
 
 def _box(where: str, value: object) -> npt.NDArray[np.float64]:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
-from cagefield.formats.ply import Columns, read_ply
+from cagefield.ply import Columns, read_ply
 from cagefield.rendering.images import replaced_whole
 
 Array = NDArray[Any]

@@ -1,0 +1,273 @@
+"""SIFT features of photos and matches between them, by pycolmap, in a database file of COLMAP's.
+
+COLMAP measures pixels as cagefield does: the first pixel has its centre at (.5, .5).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.errors import DatasetError
+
+FloatArray = npt.NDArray[np.float64]
+Pairs = Sequence[tuple[int, int]]
+
+OnProgress = Callable[[float, str], None]
+"""Called with (share done from 0 to 1, a few words)."""
+
+INSTALL = "pip install 'cagefield[colmap]'"
+
+_FATAL = 3  # glog's level that only ends the process
+
+
+@dataclass(frozen=True)
+class Photo:
+    """One photo of the database: its file's name, and the number of its camera."""
+
+    name: str
+    camera: int
+
+
+def engine() -> Any:
+    """The module pycolmap. Raises DatasetError where it is missing, or older than 4.2."""
+    try:
+        import pycolmap
+    except ImportError:
+        raise DatasetError(f"this needs pycolmap, which is not installed; {INSTALL}") from None
+    if not hasattr(pycolmap, "CancellationToken"):
+        raise DatasetError(f"this needs pycolmap 4.2 or newer, not {pycolmap.__version__}; {INSTALL} -U")
+    return pycolmap
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """pycolmap writes no log while this lasts."""
+    logging = engine().logging
+    level = logging.minloglevel
+    logging.minloglevel = _FATAL
+    try:
+        yield
+    finally:
+        logging.minloglevel = level
+
+
+def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | None = None, **kw: Any) -> Any:
+    """`function(*args, **kw)` of pycolmap's in a thread; Ctrl-C ends it at its next pause.
+
+    `poll` is called several times a second meanwhile.
+
+    Raises DatasetError with the reason where COLMAP fails.
+    """
+    token = engine().CancellationToken()
+    result: list[Any] = []
+    failure: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            result.append(function(*args, **kw, cancellation_token=token))
+        except BaseException as error:
+            failure.append(error)
+
+    thread = threading.Thread(target=work, name="colmap", daemon=True)
+    with quiet():
+        thread.start()
+        try:
+            while thread.is_alive():
+                thread.join(0.2)
+                if poll is not None:
+                    poll()
+        except BaseException:
+            token.cancel()
+            thread.join()
+            raise
+    if failure:
+        reason = " ".join(str(failure[0]).split())
+        raise DatasetError(f"COLMAP stopped at {function.__name__}: {reason}") from failure[0]
+    return result[0]
+
+
+def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo]) -> None:
+    """Writes a database with these pycolmap cameras and photos; photo i becomes image i + 1, frame i + 1.
+
+    Camera and rig numbers count from 1 too.
+    """
+    pycolmap = engine()
+    path.unlink(missing_ok=True)
+    with quiet(), contextlib.closing(pycolmap.Database.open(path)) as database:
+        for index, camera in enumerate(cameras, start=1):
+            camera.camera_id = index
+            database.write_camera(camera, use_camera_id=True)
+            rig = pycolmap.Rig(rig_id=index)
+            rig.add_ref_sensor(camera.sensor_id)
+            database.write_rig(rig, use_rig_id=True)
+        for index, photo in enumerate(photos, start=1):
+            image = pycolmap.Image(name=photo.name, camera_id=photo.camera + 1, image_id=index)
+            database.write_image(image, use_image_id=True)
+            frame = pycolmap.Frame(frame_id=index, rig_id=photo.camera + 1)
+            frame.add_data_id(image.data_id)
+            database.write_frame(frame, use_frame_id=True)
+
+
+def extract(
+    database: Path,
+    images: Path,
+    names: Sequence[str],
+    *,
+    features: int,
+    longer_side: int,
+    masks: Path | None = None,
+    on_progress: OnProgress | None = None,
+) -> None:
+    """Finds the features of the photos `names` in the folder `images`; those that have theirs are left.
+
+    At most `features` a photo, in photos shrunk to `longer_side` pixels (positions are of the whole photo).
+    `masks` holds an 8-bit image NAME.png for photos where only features on white count.
+    """
+    pycolmap = engine()
+    options = pycolmap.FeatureExtractionOptions(use_gpu=False, max_image_size=longer_side)
+    options.sift.max_num_features = features
+    reader = pycolmap.ImageReaderOptions()
+    if masks is not None:
+        reader.mask_path = str(masks)
+
+    def poll() -> None:
+        if on_progress is not None:
+            done = _rows(database, "descriptors")
+            on_progress(min(1.0, done / len(names)), f"features of {done} of {len(names)} photos")
+
+    call(
+        pycolmap.extract_features,
+        database,
+        images,
+        image_names=list(names),
+        reader_options=reader,
+        extraction_options=options,
+        device=pycolmap.Device.cpu,
+        poll=poll,
+    )
+
+
+def match(
+    database: Path,
+    names: Sequence[str],
+    pairs: Pairs,
+    *,
+    verify: bool,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+) -> None:
+    """Matches the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
+
+    Those that are matched already are left. `verify` fits epipolar geometry to each pair.
+    """
+    pycolmap = engine()
+    options = pycolmap.FeatureMatchingOptions(use_gpu=False, skip_geometric_verification=not verify)
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = seed
+    listing = database.with_name(database.name + ".pairs.txt")
+    listing.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in pairs), encoding="utf-8")
+    table = "two_view_geometries" if verify else "matches"
+
+    def poll() -> None:
+        if on_progress is not None:
+            done = min(_rows(database, table), len(pairs))
+            on_progress(done / max(1, len(pairs)), f"matches of {done} of {len(pairs)} pairs")
+
+    pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing), block_size=64)
+    call(
+        pycolmap.match_image_pairs,
+        database,
+        matching_options=options,
+        pairing_options=pairing,
+        verification_options=verification,
+        device=pycolmap.Device.cpu,
+        poll=poll,
+    )
+    listing.unlink(missing_ok=True)
+
+
+def all_pairs(count: int) -> list[tuple[int, int]]:
+    """Every pair of `count` photos."""
+    return [(i, j) for i in range(count) for j in range(i + 1, count)]
+
+
+def likely_pairs(
+    database: Path, count: int, *, neighbours: int = 8, alike: int = 16
+) -> list[tuple[int, int]]:
+    """Pairs (i, j) of `count` photos that may show the same: near in order, or alike in their features.
+
+    Each photo is paired with the next `neighbours`, those 16, 32, 64 further on, and the `alike` photos whose
+    aggregated features (VLAD: residuals of the descriptors to 32 words, summed, roots, unit length) are most
+    like its own.
+
+    Source: Jégou et al., "Aggregating local descriptors into a compact image representation" (2010).
+    """
+    from scipy.cluster.vq import kmeans2
+
+    steps = [*range(1, neighbours + 1), 16, 32, 64]
+    pairs = {(i, i + step) for i in range(count) for step in steps if i + step < count}
+    with quiet(), contextlib.closing(engine().Database.open(database)) as source:
+        descriptors = [_descriptors(source, index + 1) for index in range(count)]
+    sample = np.concatenate([d[:: max(1, len(d) * count // 20000)] for d in descriptors])
+    if len(sample) >= 64:
+        words, _ = kmeans2(sample, 32, iter=12, minit="points", seed=0)
+        summed = np.stack([_vlad(d, words) for d in descriptors])
+        likeness = summed @ summed.T
+        np.fill_diagonal(likeness, -np.inf)
+        for i in range(count):
+            nearest = np.argsort(-likeness[i], kind="stable")[:alike]
+            pairs |= {(min(i, j), max(i, j)) for j in nearest.tolist()}
+    return sorted(pairs)
+
+
+def _descriptors(database: Any, image_id: int) -> npt.NDArray[np.float32]:
+    if not database.exists_descriptors(image_id):
+        return np.zeros((0, 128), dtype=np.float32)
+    found = database.read_descriptors(image_id)
+    return np.asarray(getattr(found, "data", found), dtype=np.float32)[:2048]
+
+
+def _vlad(descriptors: npt.NDArray[np.float32], words: npt.NDArray[np.float32]) -> FloatArray:
+    """Unit vector [words x 128]; zeros without descriptors."""
+    nearest = (descriptors @ words.T - 0.5 * (words**2).sum(axis=1)).argmax(axis=1)
+    summed = np.zeros(words.shape)
+    np.add.at(summed, nearest, descriptors - words[nearest])
+    rooted = np.sign(summed.ravel()) * np.sqrt(np.abs(summed.ravel()))
+    return np.asarray(rooted / max(np.linalg.norm(rooted), 1e-12), np.float64)
+
+
+def _rows(database: Path, table: str) -> int:
+    """How many rows a table has, 0 while it cannot be read."""
+    try:
+        with contextlib.closing(
+            sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=0.05)
+        ) as source:
+            return int(source.execute(f"SELECT COUNT(*) FROM {table}").fetchone()[0])
+    except sqlite3.Error:
+        return 0
+
+
+def share(on_progress: OnProgress | None, start: float, end: float) -> OnProgress:
+    """Progress of a stage that goes from `start` to `end` of the whole."""
+
+    def move(done: float, note: str) -> None:
+        if on_progress is not None:
+            on_progress(start + (end - start) * done, note)
+
+    return move
+
+
+def consecutive(groups: Iterable[Any]) -> tuple[list[Any], list[int]]:
+    """The different values in order of appearance, and for each item the number of its own."""
+    known: dict[Any, int] = {}
+    numbers = [known.setdefault(group, len(known)) for group in groups]
+    return list(known), numbers
