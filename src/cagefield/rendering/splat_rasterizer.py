@@ -46,7 +46,7 @@ COLOUR, DEPTH, NORMALS = 4, 5, 8
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """A camera's intrinsics for the kernels; `limits` are (x low, x high, y low, y high) of n = (x/z, y/z)."""
+    """A camera's intrinsics for the kernels; `limits` are x low, x high, y low, y high of n = (x/z, y/z)."""
 
     focal: NDArray[np.float64]
     centre: NDArray[np.float64]
@@ -82,7 +82,7 @@ class Projection:
         return len(self.starts) - 1
 
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
-        """The picture [tiles,channels,AREA] (T, colour, depth x weight, normals), and where tiles were left."""
+        """The picture [tiles,channels,AREA] (T, colour, depth x weight, normals), and where tiles end."""
         out = np.empty((self.tiles, channels, AREA), np.float32)
         stops = np.empty(self.tiles, np.int64)
         with kernels():
@@ -125,7 +125,7 @@ class Projection:
 
 
 class Buffers:
-    """Memory that the projections of one owner share; a projection is valid until its owner makes the next."""
+    """Memory that one owner's projections share; a projection is valid until its owner makes the next."""
 
     def __init__(self) -> None:
         self._arrays: dict[str, NDArray[Any]] = {}

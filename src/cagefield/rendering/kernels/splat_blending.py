@@ -28,7 +28,8 @@ ZERO, ONE, HALF, EIGHTH = F(0), F(1), F(0.5), F(1 / 8)
 T_MIN = F(1e-3)
 P_MIN = F(-8)
 """Exponents below this are this: alpha is then below ALPHA_MIN whatever the opacity."""
-E2, E3, E4, E5 = F(1 / 2), F(1 / 6), F(1 / 24), F(1 / 120)
+E1, E2, E3, E4, E5 = F(0.99997018), F(0.49960978), F(0.16494888), F(0.03824679), F(0.00505834)
+"""Of the polynomial 1 + E1 x + ... that has the least largest relative error to exp(x) on [-1, 0]: 8e-7."""
 ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8 = (U(AREA * k) for k in range(1, 9))
 ROWS = 9
 X, Y = ROW7, ROW8
@@ -42,9 +43,9 @@ SUMS = 20
 
 @njit(inline="always", **FAST)
 def exp_negative(p):
-    """exp(p) for p in [P_MIN, 0], to 4e-6: a polynomial of p/8, squared three times."""
+    """exp(p) for p in [P_MIN, 0], to 1e-5 of it: a polynomial of p/8, squared three times."""
     x = max(p, P_MIN) * EIGHTH
-    y = ONE + x * (ONE + x * (E2 + x * (E3 + x * (E4 + x * E5))))
+    y = ONE + x * (E1 + x * (E2 + x * (E3 + x * (E4 + x * E5))))
     y = y * y
     y = y * y
     return y * y
@@ -140,7 +141,7 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
 
 @njit(parallel=True, **FAST)
 def blend(packed, ids, starts, across, channels, stops, out):
-    """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), and depth (5 channels), normals (8)."""
+    """Blends all tiles into out [tiles, channels, AREA]: T, colour (3), depth (of 5), normals (of 8)."""
     for t in prange(starts.size - 1):
         state = np.empty(ROWS * AREA, nb.float32)
         coordinates(state)

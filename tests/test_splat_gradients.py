@@ -1,0 +1,258 @@
+"""Gradients and curvatures of all parameters of splats against finite differences of the float64 oracle.
+
+The loss is L = |picture over a background - target|^2 / 2, summed over pixels and channels. A splat's opacity
+changes what the background shows, so the background is in the colour that the kernels get.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cagefield import sh as harmonics
+from cagefield.cameras import Camera
+from cagefield.rendering import splat_reference as reference
+from cagefield.rendering.deformed_splats import rotation_matrices
+from cagefield.rendering.splat_rasterizer import (
+    COLOUR,
+    intrinsics,
+    kernels,
+    project,
+    tiled,
+    world_to_camera,
+)
+from cagefield.training.kernels.splat_chain import CURVATURES, GRADIENTS, chain, shapes
+from splat_views import LENSES, NEAR, camera, covariances, parameters, single, splats_of, unit
+
+Values = dict[str, NDArray]
+
+PARTS = {"means": (0, 3), "log_scales": (3, 3), "quaternions": (6, 3), "logits": (9, 1), "colour": (10, 3)}
+"""Where each parameter's gradient lies, and how many numbers it has."""
+
+
+def rounded(values: Values) -> Values:
+    """Parameters that float32 holds exactly, so that kernels and oracle see the same ones."""
+    return {name: part.astype(np.float32).astype(np.float64) for name, part in values.items()}
+
+
+def analytic(
+    values: Values, view: Camera, target: NDArray, background: NDArray, antialiased: bool
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Gradients [N,GRADIENTS], curvatures [N,CURVATURES], and the splats drawn."""
+    splats = single(splats_of(values, antialiased))
+    seen = project(splats, view, near=NEAR)
+    tiles, stops = seen.blend(COLOUR)
+    colour = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
+    slopes = colour - tiled(target.astype(np.float32))
+    lens = intrinsics(view)
+    gradients = np.zeros((len(splats), GRADIENTS), np.float32)
+    curvatures = np.zeros((len(splats), CURVATURES), np.float32)
+    sums = seen.gradients(colour, slopes, stops)
+    with kernels():
+        chain(
+            seen.order,
+            seen.firsts,
+            seen.slots,
+            sums,
+            seen.packed,
+            splats.means,
+            values["log_scales"].astype(np.float32),
+            values["quaternions"].astype(np.float32),
+            splats.opacities,
+            splats.sh,
+            world_to_camera(view),
+            view.origin,
+            lens.focal,
+            lens.limits,
+            lens.model,
+            lens.coefficients,
+            antialiased,
+            gradients,
+            curvatures,
+        )
+    return gradients, curvatures, seen.order
+
+
+def pictures(view: Camera, background: NDArray, antialiased: bool) -> Callable[[Values], NDArray]:
+    """The oracle's picture [H,W,3] of parameters."""
+    limits = intrinsics(view).limits
+
+    def picture(values: Values) -> NDArray:
+        seen = reference.project(splats_of(values, antialiased), view, NEAR, limits)
+        colour, through, _ = reference.blend(seen, view.width, view.height)
+        return colour + through[..., None] * background
+
+    return picture
+
+
+def moved(values: Values, name: str, splat: int, axis: int, step: float) -> Values:
+    """The parameters with one of them changed; "quaternions" by a turn, "colour" by its constant harmonic."""
+    values = {key: part.copy() for key, part in values.items()}
+    if name == "quaternions":
+        w, v = values[name][splat, 0], values[name][splat, 1:]
+        half = 0.5 * step * np.eye(3)[axis]
+        # q (1, half): a turn about the splat's own axis.
+        turned = np.concatenate([[w - v @ half], v + w * half + np.cross(v, half)])
+        values[name][splat] = unit(turned)
+    elif name == "colour":
+        values["sh"][splat, 0, axis] += step / harmonics.C0
+    elif name == "logits":
+        values[name][splat] += step
+    else:
+        values[name][splat, axis] += step
+    return values
+
+
+def differences(
+    picture: Callable[[Values], NDArray], values: Values, name: str, splat: int, axis: int, step: float = 1e-6
+) -> NDArray:
+    """d(picture)/d(parameter) [H,W,3] by central differences; rounding is some 1e-8 of it."""
+    ahead = picture(moved(values, name, splat, axis, step))
+    behind = picture(moved(values, name, splat, axis, -step))
+    return (ahead - behind) / (2.0 * step)
+
+
+def settled(values: Values, view: Camera, antialiased: bool) -> Values:
+    """Parameters at which no pixel lies where alpha's limits make the loss jump or bend.
+
+    Gradients are those between the jumps; each splat's opacity is changed a little until none is near one.
+    """
+    limits = intrinsics(view).limits
+    x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
+    chance = np.random.default_rng(9)
+    for _ in range(200):
+        seen = reference.project(splats_of(values, antialiased), view, NEAR, limits)
+        d = np.stack([x, y], axis=-1) - seen.means[:, None, None]
+        alpha = np.exp(-0.5 * np.einsum("nhwi,nij,nhwj->nhw", d, seen.conics, d))
+        alpha *= seen.opacities[:, None, None]
+        near = np.minimum(
+            np.abs(alpha / reference.ALPHA_MIN - 1.0), np.abs(alpha / reference.ALPHA_MAX - 1.0)
+        ).min(axis=(1, 2))
+        # Kernels know alpha to some 1e-5 of it; a difference moves it by 1e-4 at most.
+        bad = seen.rows[near < 1.5e-4]
+        if len(bad) == 0:
+            return values
+        values["logits"][bad] += chance.uniform(-0.05, 0.05, len(bad))
+        values = rounded(values)
+    raise AssertionError("no such parameters found")
+
+
+def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Values, NDArray, NDArray]:
+    """Random parameters, a target [H,W,3] and a background [3]."""
+    chance = np.random.default_rng(seed)
+    values = parameters(14, degree, seed)
+    # One opaque enough for ALPHA_MAX to hold, one beyond the edge whose shape no longer follows, one colour
+    # that is clamped at 0, one far smaller than a pixel.
+    values["logits"][0] = 6.0
+    right = view.c2w[:3, 0]
+    values["means"][1] = 2.6 * right
+    values["log_scales"][1] = np.log((0.9, 0.5, 0.4))
+    values["logits"][1] = 1.0
+    values["sh"][2, 0] = (-3.0, 0.2, 0.1)
+    values["log_scales"][3] = np.log(0.004)
+    values["logits"][3] = 2.0
+    target = chance.uniform(size=(view.height, view.width, 3))
+    return settled(rounded(values), view, antialiased), target, chance.uniform(size=3)
+
+
+@pytest.mark.parametrize("antialiased", [False, True])
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("degree", [0, 2])
+def test_gradients_are_those_of_the_oracle(lens: str, antialiased: bool, degree: int) -> None:
+    view = camera(lens, 40, 27)
+    values, target, background = scene(view, antialiased, degree, seed=degree + 5)
+    gradients, _, drawn = analytic(values, view, target, background, antialiased)
+    picture = pictures(view, background, antialiased)
+    residual = picture(values) - target
+    assert {0, 1, 2, 3} <= set(drawn.tolist())
+    for name, (first, count) in PARTS.items():
+        want = np.array(
+            [
+                [np.sum(residual * differences(picture, values, name, n, axis)) for axis in range(count)]
+                for n in drawn
+            ]
+        )
+        got = gradients[drawn, first : first + count].copy()
+        if name == "colour":
+            # Before the clamp at 0, as `chain` says: where it holds, the oracle's is 0.
+            held = np.abs(want) < 1e-12
+            assert held.any()
+            got[held] = 0.0
+        # Kernels blend in float32.
+        error = np.linalg.norm(got - want, axis=1)
+        size = np.linalg.norm(want, axis=1)
+        assert (error < 1e-4 * size + 1e-4 * np.median(size)).all(), (name, got, want)
+
+
+@pytest.mark.parametrize("antialiased", [False, True])
+@pytest.mark.parametrize("lens", LENSES)
+def test_curvatures_are_sums_of_squared_slopes(lens: str, antialiased: bool) -> None:
+    """Gauss-Newton's blocks of one splat alone: means (through its projection alone), scales, turn, logit."""
+    view = camera(lens, 40, 27)
+    values, target, background = scene(view, antialiased, 0, seed=2)
+    for n in (4, 5, 6, 7):
+        alone = {name: part[n : n + 1] for name, part in values.items()}
+        _, curvatures, drawn = analytic(alone, view, target, background, antialiased)
+        assert drawn.tolist() == [0]
+        picture = pictures(view, background, antialiased)
+
+        def slopes(name: str, alone: Values = alone, picture=picture) -> NDArray:
+            count = PARTS[name][1]
+            return np.stack([differences(picture, alone, name, 0, axis).ravel() for axis in range(count)])
+
+        def block(J: NDArray) -> NDArray:
+            full = J @ J.T
+            return full[np.triu_indices(len(full))]
+
+        H = curvatures[0].astype(np.float64)
+        want = block(slopes("log_scales"))
+        np.testing.assert_allclose(H[6:12], want, atol=1e-4 * np.abs(want).max())
+        want = (slopes("quaternions") ** 2).sum(axis=1)
+        np.testing.assert_allclose(H[12:15], want, atol=1e-4 * np.abs(want).max())
+        np.testing.assert_allclose(H[15], (slopes("logits") ** 2).sum(), rtol=1e-4)
+        want = block(slopes("means"))
+        # The mean's block leaves out that the shape changes with the mean.
+        np.testing.assert_allclose(H[:6], want, atol=0.1 * np.abs(want).max())
+
+
+def test_weights_and_errors_of_splats() -> None:
+    """Gradient entries 13 to 15: the screen gradient's length, the sum of weights, and of weighted errors."""
+    view = camera("pinhole", 40, 27)
+    values, target, background = scene(view, False, 0, seed=4)
+    gradients = analytic(values, view, target, background, False)[0]
+    limits = intrinsics(view).limits
+    seen = reference.project(splats_of(values), view, NEAR, limits)
+    colour, through, _ = reference.blend(seen, view.width, view.height)
+    residual = colour + through[..., None] * background - target
+    x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
+    left = np.ones_like(through)
+    for k, n in enumerate(seen.rows):
+        d = np.stack([x, y], axis=-1) - seen.means[k]
+        alpha = seen.opacities[k] * np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, seen.conics[k], d))
+        alpha = np.where(alpha < reference.ALPHA_MIN, 0.0, np.minimum(alpha, reference.ALPHA_MAX))
+        weight = alpha * left
+        left = left * (1.0 - alpha)
+        np.testing.assert_allclose(gradients[n, 14], weight.sum(), rtol=1e-4, atol=1e-4)
+        error = (weight * np.square(residual).sum(axis=-1)).sum()
+        np.testing.assert_allclose(gradients[n, 15], error, rtol=1e-4, atol=1e-4)
+
+
+def test_shapes_of_parameters() -> None:
+    values = parameters(50)
+    six, opacities = np.empty((50, 6), np.float32), np.empty(50, np.float32)
+    single_values = {name: part.astype(np.float32) for name, part in values.items()}
+    with kernels():
+        shapes(
+            single_values["log_scales"], single_values["quaternions"], single_values["logits"], six, opacities
+        )
+    want = covariances(values["quaternions"], values["log_scales"])
+    np.testing.assert_allclose(six, want, atol=1e-6)
+    np.testing.assert_allclose(opacities, 1.0 / (1.0 + np.exp(-values["logits"])), atol=1e-6)
+    # A turn of `moved` is one about the splat's own axis: R <- R exp([turn]x).
+    turned = moved(values, "quaternions", 3, 2, 1e-6)["quaternions"]
+    R = rotation_matrices(values["quaternions"])[3]
+    change = R.T @ rotation_matrices(turned)[3]
+    np.testing.assert_allclose(change, [[1, -1e-6, 0], [1e-6, 1, 0], [0, 0, 1]], atol=1e-11)

@@ -1,0 +1,266 @@
+"""The splat rasteriser against its float64 oracle, closed forms, and itself."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cagefield import sh as harmonics
+from cagefield.rendering import splat_reference as reference
+from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.kernels.splat_blending import T_MIN
+from cagefield.rendering.splat_rasterizer import (
+    COLOUR,
+    DEPTH,
+    NORMALS,
+    intrinsics,
+    project,
+    tiled,
+    untiled,
+)
+from splat_views import LENSES, NEAR, all_kinds, camera, parameters, single, splats_of, unit
+
+
+def db(error: NDArray) -> float:
+    """Peak signal-to-noise ratio of an error, for a peak of 1."""
+    return float(-10.0 * np.log10(max(np.mean(np.square(error)), 1e-30)))
+
+
+def expected(splats: DeformedSplats, view) -> NDArray:
+    """The oracle's picture [H,W,5]: T, colour, depth times weight."""
+    seen = reference.project(splats, view, NEAR, intrinsics(view).limits)
+    colour, through, depth = reference.blend(seen, view.width, view.height)
+    return np.concatenate([through[..., None], colour, depth[..., None]], axis=-1)
+
+
+def assert_agrees(splats: DeformedSplats, view) -> NDArray:
+    """Fails unless a picture and its distances (in units of the camera's) are within 50 dB of the oracle."""
+    got = project(splats, view, near=NEAR).picture(DEPTH)
+    want = expected(splats, view)
+    far = np.linalg.norm(view.origin)
+    assert np.ptp(want[..., 0]) > 0.3, "the picture shows nothing"
+    assert db(got[..., :4] - want[..., :4]) > 50.0
+    assert db((got[..., 4] - want[..., 4]) / far) > 50.0
+    return got
+
+
+@pytest.mark.parametrize("antialiased", [False, True])
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("size", [(75, 50), (16, 16), (33, 7)])
+def test_pictures_of_all_kinds_of_splats(lens: str, antialiased: bool, size: tuple[int, int]) -> None:
+    view = camera(lens, *size)
+    assert_agrees(all_kinds(view.origin, antialiased=antialiased), view)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+def test_colours_of_each_degree_and_of_turned_splats(degree: int, turned: bool) -> None:
+    view = camera()
+    splats = all_kinds(view.origin, degree, turned=turned)
+    got = assert_agrees(splats, view)
+    if degree:
+        flat = replace(splats, sh=np.ascontiguousarray(splats.sh[:, :1]))
+        assert db(got[..., 1:4] - project(flat, view, near=NEAR).picture(COLOUR)[..., 1:4]) < 30.0
+    if degree and turned:
+        unturned = project(replace(splats, rotations=None), view, near=NEAR).picture(COLOUR)
+        assert db(got[..., 1:4] - unturned[..., 1:4]) < 30.0
+
+
+@pytest.mark.parametrize("kind", [(10, 15), (15, 20), (20, 25)], ids=["huge", "tiny", "edge-on"])
+def test_extreme_shapes_alone(kind: tuple[int, int]) -> None:
+    """One kind at a time, the worst pixel too: 2e-3 is half a step of the smallest alpha that counts."""
+    view = camera()
+    rows = slice(*kind)
+    whole = all_kinds(view.origin)
+    splats = DeformedSplats(whole.means[rows], whole.covariances[rows], whole.opacities[rows], whole.sh[rows])
+    got = project(splats, view, near=NEAR).picture(COLOUR)
+    want = expected(splats, view)[..., :4]
+    assert want[..., 0].min() < 0.99
+    error = np.abs(got - want).max(axis=-1)
+    # A rounded alpha may fall on the other side of ALPHA_MIN now and then.
+    assert np.sort(error.ravel())[-3] < 2e-3 and error.max() < 1.1 / 255
+
+
+@pytest.mark.parametrize("length", [3.0, 10.0])
+def test_long_thin_splats_with_their_means_far_outside(length: float) -> None:
+    """Lines half a pixel wide, their means up to 500 pixels away: rounding must not fray them."""
+    view = camera(width=160, height=120)
+    right, up = view.c2w[:3, 0], view.c2w[:3, 1]
+    along = unit(np.array([[1.0, 0.3], [0.2, 1.0], [1.0, -0.8]]))
+    axes = along @ np.stack([right, up])
+    square = np.stack([-along[:, 1], along[:, 0]], axis=1) @ np.stack([right, up])
+    full = length**2 * np.einsum("ni,nj->nij", axes, axes) + 1e-8 * np.einsum("ni,nj->nij", square, square)
+    splats = DeformedSplats(
+        length * axes + 0.01 * np.arange(3)[:, None] * view.c2w[:3, 2],
+        full.reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]],
+        np.full(3, 0.9),
+        0.5 * np.eye(3)[:, None] / harmonics.C0,
+    )
+    got = project(single(splats), view, near=NEAR).picture(COLOUR)
+    want = expected(single(splats), view)[..., :4]
+    assert np.ptp(want[..., 0]) > 0.3
+    assert db(got - want) > 50.0
+
+
+def test_no_splats_and_none_in_sight() -> None:
+    view = camera()
+    splats = single(splats_of(parameters(8)))
+    nothing = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
+    behind = replace(splats, means=(splats.means + np.float32(2.0) * view.origin.astype(np.float32)))
+    for empty in (nothing, behind):
+        seen = project(empty, view, near=NEAR, normals=np.zeros((len(empty), 3), np.float32))
+        picture = seen.picture(NORMALS)
+        assert seen.pairs == 0
+        assert (picture[..., 0] == 1.0).all() and (picture[..., 1:] == 0.0).all()
+        assert seen.opacity_before(np.array([[3.5, 4.5]]), np.array([9.0])) == 0.0
+
+
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("region", [(16, 32, 40, 18), (5, 3, 50, 41), (70, 40, 5, 10)])
+def test_a_region_is_that_part_of_the_picture(lens: str, region: tuple[int, int, int, int]) -> None:
+    view = camera(lens)
+    # Nothing opaque: tiles that are left early would be others in the region.
+    splats = all_kinds(view.origin)
+    splats = replace(splats, opacities=np.minimum(splats.opacities, np.float32(0.3)))
+    whole = project(splats, view, near=NEAR).picture(DEPTH)
+    part = project(splats, view, near=NEAR, region=region).picture(DEPTH)
+    x, y, width, height = region
+    error = np.abs(part - whole[y : y + height, x : x + width])
+    assert error.max() < 1.1 * 6 / 255
+    assert np.quantile(error, 0.999) < 2e-5
+
+
+def plane(view, normal: NDArray, count: int = 40) -> tuple[DeformedSplats, NDArray]:
+    """Flat opaque splats on the plane through the origin, and its distances [H,W] along the camera's rays."""
+    across = unit(np.cross(normal, (0.3, 0.5, 0.8)))
+    axes = np.stack([across, np.cross(normal, across)])
+    grid = np.linspace(-1.6, 1.6, count)
+    x, y = (v.ravel() for v in np.meshgrid(grid, grid))
+    full = 0.1**2 * (np.eye(3) - np.outer(normal, normal)) + 1e-10 * np.outer(normal, normal)
+    splats = DeformedSplats(
+        x[:, None] * axes[0] + y[:, None] * axes[1],
+        np.broadcast_to(full.reshape(9)[[0, 1, 2, 4, 5, 8]], (len(x), 6)),
+        np.full(len(x), 0.9),
+        np.zeros((len(x), 1, 3)),
+    )
+    facing = view.rays()[1].reshape(view.height, view.width, 3) @ normal
+    return single(splats), -(view.origin @ normal) / facing
+
+
+@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize("slant", [0.0, 60.0])
+def test_distances_and_normals_of_a_plane(lens: str, slant: float) -> None:
+    view = camera(lens)
+    ahead = unit(view.origin)
+    side = unit(np.cross(ahead, (0, 0, 1)))
+    tilt = np.radians(slant)
+    normal = np.cos(tilt) * ahead + np.sin(tilt) * np.cross(side, ahead)
+    splats, distance = plane(view, normal)
+    normals = np.broadcast_to(-normal, (len(splats), 3)).astype(np.float32)
+    picture = project(splats, view, near=NEAR, normals=normals).picture(NORMALS)
+    solid = picture[..., 0] < 1e-2
+    assert solid.mean() > 0.1
+    error = np.abs(picture[solid][:, 4] / (1.0 - picture[solid][:, 0]) / distance[solid] - 1.0)
+    assert np.median(error) < 1e-2
+    assert np.quantile(error, 0.95) < 2e-2
+    # Towards the camera, whichever way they were given.
+    np.testing.assert_allclose(
+        unit(picture[solid][:, 5:8]), np.broadcast_to(normal, (solid.sum(), 3)), atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_opacity_gathered_before_a_distance(lens: str) -> None:
+    view = camera(lens)
+    splats = all_kinds(view.origin, antialiased=True)
+    chance = np.random.default_rng(1)
+    pixels = chance.uniform(0, (view.width, view.height), (500, 2))
+    distances = chance.uniform(0.2, 6.0, 500)
+    seen = reference.project(splats, view, NEAR, intrinsics(view).limits)
+    d = pixels[:, None] - seen.means
+    alpha = seen.opacities * np.exp(-0.5 * np.einsum("kni,nij,knj->kn", d, seen.conics, d))
+    alpha = np.where(alpha < reference.ALPHA_MIN, 0.0, np.minimum(alpha, reference.ALPHA_MAX))
+    nearer = seen.distances + np.einsum("kni,ni->kn", d, seen.slopes) < distances[:, None]
+    want = 1.0 - np.prod(1.0 - alpha * nearer, axis=1)
+    assert np.ptp(want) > 0.9
+    got = project(splats, view, near=NEAR).opacity_before(pixels, distances)
+    # Rounding puts a splat on the other side of ALPHA_MIN now and then.
+    assert np.quantile(np.abs(got - want), 0.99) < 1e-4
+    assert np.abs(got - want).max() < 1.1 / 255
+
+
+def test_what_is_left_early_is_what_lets_nothing_through() -> None:
+    view = camera()
+    ahead = unit(-view.origin)
+    count = 400
+    values = parameters(count)
+    values["means"] = 0.5 * values["means"] + ahead * np.linspace(-1.0, 30.0, count)[:, None]
+    values["log_scales"][:] = np.log(3.0)
+    values["logits"][:] = 1.0
+    splats = single(splats_of(values))
+    seen = project(splats, view, near=NEAR)
+    tiles, stops = seen.blend(DEPTH)
+    picture = untiled(tiles, view.width, view.height)
+    assert (stops < seen.starts[1:]).all() and (stops - seen.starts[:-1]).max() <= 24
+    want = expected(splats, view)
+    assert picture[..., 0].max() < T_MIN
+    # All that was left out together weighs no more than what got through.
+    brightest = np.abs(splats.sh * harmonics.C0 + 0.5).max()
+    assert np.abs(picture[..., 1:4] - want[..., 1:4]).max() < T_MIN * brightest + 1e-5
+
+
+def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
+    view = camera()
+    chance = np.random.default_rng(3)
+    values = parameters(4000, 3, 3)
+    values["log_scales"] = chance.uniform(-30.0, 20.0, (4000, 3))
+    values["means"][:1000] = view.origin + unit(-view.origin) * NEAR * (1.0 + 1e-6)
+    values["means"][1000:1500] *= 1e6
+    values["means"][1500:1600] = view.origin
+    values["logits"] = chance.choice([-100.0, -5.0, 0.0, 5.0, 100.0], 4000)
+    for lens in LENSES:
+        for antialiased in (False, True):
+            splats = single(splats_of(values, antialiased))
+            normals = unit(chance.normal(size=(4000, 3))).astype(np.float32)
+            seen = project(splats, camera(lens), near=NEAR, normals=normals)
+            assert seen.pairs > 1000
+            tiles, stops = seen.blend(NORMALS)
+            assert np.isfinite(tiles).all()
+            assert tiles[:, 0].min() >= 0.0 and tiles[:, 0].max() <= 1.0
+            slopes = chance.normal(size=(seen.tiles, 3, 256)).astype(np.float32)
+            colour = np.ascontiguousarray(tiles[:, 1:4])
+            sums = seen.gradients(colour, slopes, stops)
+            assert np.isfinite(sums[: seen.pairs]).all()
+            before = seen.opacity_before(chance.uniform(0, (75, 50), (100, 2)), np.full(100, 5.0))
+            assert np.isfinite(before).all()
+
+
+def test_threads_that_ask_at_once_get_their_own_pictures() -> None:
+    view = camera()
+    scenes = [all_kinds(view.origin, seed=seed) for seed in range(4)]
+    want = [project(splats, view, near=NEAR).picture() for splats in scenes]
+    wrong: list[int] = []
+
+    def ask(n: int) -> None:
+        for _ in range(15):
+            if not np.array_equal(project(scenes[n], view, near=NEAR).picture(), want[n]):
+                wrong.append(n)
+
+    threads = [threading.Thread(target=ask, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_tiles_are_the_picture_cut_up() -> None:
+    picture = np.random.default_rng(0).normal(size=(35, 50, 3)).astype(np.float32)
+    tiles = tiled(picture)
+    assert tiles.shape == (3 * 4, 3, 256)
+    assert tiles[5, 2, 16 * 7 + 9] == picture[16 + 7, 16 + 9, 2]
+    np.testing.assert_array_equal(untiled(tiles, 50, 35), picture)
