@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
@@ -182,6 +183,24 @@ def test_other_camera_models_are_refused(tmp_path):
         load_dataset(tmp_path)
 
 
+def test_photos_that_were_all_scaled_down_take_their_intrinsics_with_them(tmp_path):
+    _write(tmp_path, "OPENCV", n=4)
+    for photo in (tmp_path / "images/cam").iterdir():
+        with Image.open(photo) as pixels:
+            small = pixels.reduce(2)
+        small.save(photo)
+    with pytest.warns(
+        UserWarning, match="96x64 pixels, all photos have 48x32: the intrinsics are scaled by 0.5"
+    ):
+        data = load_dataset(tmp_path)
+    for view in (*data.train, *data.test):
+        assert_spot_is_where_the_camera_says(view, data.source_to_world[:3, :3] @ TILT @ POINT)
+    (tmp_path / "images/cam/01.png").unlink()
+    save(tmp_path / "images/cam/01.png", np.zeros((HEIGHT, WIDTH, 3), dtype=np.uint8))
+    with pytest.raises(DatasetError, match="is 48 pixels wide, the intrinsics say 96; use"):
+        load_dataset(tmp_path)  # photos of two sizes were not all scaled alike
+
+
 def test_impossible_intrinsics_and_sizes(tmp_path):
     _write(tmp_path / "a", params=(-1.0, 94.0, *C), n=2)
     with pytest.raises(
@@ -252,5 +271,5 @@ def test_damaged_and_missing_parts(tmp_path):
 def test_without_pycolmap_the_cure_is_named(tmp_path, monkeypatch):
     _write(tmp_path, n=2)
     monkeypatch.setitem(sys.modules, "pycolmap", None)
-    with pytest.raises(DatasetError, match=r"needs pycolmap; run pip install pycolmap"):
+    with pytest.raises(DatasetError, match=r"needs pycolmap; pip install 'cagefield\[colmap\]'"):
         load_dataset(tmp_path)

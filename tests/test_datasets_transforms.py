@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cagefield.datasets import load_dataset
 from cagefield.errors import DatasetError
@@ -472,3 +473,23 @@ def test_chair_is_a_bounded_cut_out_with_its_own_test_views():
         opaque = np.argwhere(view.load()[..., 3] > 128)[:, ::-1]
         positions, _ = view.camera.project(np.zeros((1, 3)))
         assert np.abs(opaque.mean(axis=0) - positions[0]).max() < 40  # the chair is 200 px across
+
+
+def test_photos_that_were_all_scaled_down_take_their_intrinsics_with_them(tmp_path):
+    _ngp(tmp_path, 4)
+    for photo in (tmp_path / "images").iterdir():
+        with Image.open(photo) as pixels:
+            small = pixels.reduce(2)
+        small.save(photo)
+    with pytest.warns(
+        UserWarning, match="96x64 pixels, all photos have 48x32: the intrinsics are scaled by 0.5"
+    ):
+        data = load_dataset(tmp_path)
+    assert data.train[0].camera.fx == FOCAL[0] / 2 and data.train[0].camera.cx == AXIS[0] / 2
+    for view in data.train:
+        assert_spot_is_where_the_camera_says(view)
+    save(tmp_path / "images/0002.png", np.zeros((HEIGHT, WIDTH, 3), dtype=np.uint8))
+    with pytest.raises(
+        DatasetError, match=r"images/0000: key 'w' is 96, but .*0000.png is 48x32; use the photos"
+    ):
+        load_dataset(tmp_path)

@@ -35,7 +35,7 @@ except ValueError as error:
         cwd=__file__.rpartition("/")[0],
         check=True,
     )
-    assert done.stdout == ("this NeRF needs PyTorch, which is not installed; pip install torch\n")
+    assert done.stdout == ("this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'\n")
     assert isinstance(small_field(), Field)
 
 

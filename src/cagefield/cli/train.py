@@ -147,7 +147,7 @@ def nerf_config(training: TrainingOptions, preset: Preset, ndc: Ndc = "auto") ->
         import torch  # noqa: F401
     except ImportError as error:
         raise CagefieldError(
-            "--field nerf needs PyTorch, which is not installed; pip install torch"
+            "--field nerf needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
         ) from error
     small = preset == "small" or (preset == "auto" and not devices.is_gpu())
     return (NerfConfig.small if small else NerfConfig)(

@@ -1,4 +1,4 @@
-"""COLMAP models, binary or text, with their photos; read by pycolmap (extra `cagefield[colmap]`).
+"""COLMAP models, binary or text, with their photos; read by pycolmap.
 
 COLMAP's cameras look along +z with +y down, and pixel (0,0) has its centre at (.5,.5): axes y and z are
 flipped, intrinsics are taken as they are.
@@ -6,7 +6,7 @@ flipped, intrinsics are taken as they are.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.captures import stored_camera, unbounded_capture, uniform_size, warn_of_scaling
 from cagefield.datasets.colmap_files import check_whole
-from cagefield.datasets.llff import stored_camera, unbounded_capture
-from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders
+from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders, read_header
 from cagefield.datasets.region import cube_of_interest, depths_of_points, levelling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View, report_missing
 from cagefield.errors import CameraError, DatasetError
@@ -49,18 +49,20 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
     if model_folder is None:
         places = ", ".join(_MODEL_FOLDERS)
         raise DatasetError(f"{path}: no COLMAP model (cameras.bin or cameras.txt) in {places}")
-    model, images = _read_model(model_folder)
+    model, images = read_model(model_folder)
     if not images:
         raise DatasetError(f"{model_folder}: the model has no registered images; run COLMAP's mapper again")
     root = next((f for f in _upwards(model_folder) if photo_folders(f)), None)
     if root is None:
         raise DatasetError(f"{model_folder}: no folder images in it or up to three levels above it")
-    poses = np.stack([_pose(image) for image in images])
+    poses = np.stack([pose_of(image) for image in images])
     levelling = np.eye(4)
     levelling[:3, :3] = levelling_rotation(poses)
-    cameras = {camera_id: _camera(model_folder, camera) for camera_id, camera in model.cameras.items()}
+    cameras = {camera_id: camera_of(model_folder, camera) for camera_id, camera in model.cameras.items()}
 
     folders = photo_folders(root)
+    if 1 in folders and _scale_to_photos(model_folder, cameras, images, folders[1]):
+        folders = {1: folders[1]}  # the names of the others count from the old size
     used = [cameras[image.camera_id] for image in images]
     factor = choose_downscale(max(max(c.width, c.height) for c in used), downscale, folders)
     usable = sorted((f for f in folders if factor % f == 0), reverse=True)
@@ -78,7 +80,7 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
         view = View(image.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
     report_missing(root, sorted(missing), len(images))
-    points = sparse_points(model, {view.name for view in views}, levelling)
+    points = sparse_points(model, {view.name: view.name for view in views}, levelling)
     positions = np.empty((0, 3)) if points is None else points.positions
     view_cameras = [view.camera for view in views]
     bounds = cube_of_interest(view_cameras, points=positions)
@@ -87,12 +89,12 @@ def load_colmap(path: Path, downscale: int | None, holdout: int) -> Dataset:
     return unbounded_capture(root, views, holdout, bounds, levelling, depths, points)
 
 
-def sparse_points(model: Any, names: Collection[str], source_to_world: FloatArray) -> SparsePoints | None:
-    """The points of a pycolmap reconstruction, moved by the rigid `source_to_world` [4,4]; None without any.
+def sparse_points(model: Any, names: Mapping[str, str], source_to_world: FloatArray) -> SparsePoints | None:
+    """The points of a pycolmap reconstruction, moved by the similarity `source_to_world` [4,4]; None without.
 
-    Of the images that see a point those are named that are in `names`.
+    `names` gives the views of the images; others are not named among those that see a point.
     """
-    kept = {image_id: image.name for image_id, image in model.images.items() if image.name in names}
+    kept = {number: names[image.name] for number, image in model.images.items() if image.name in names}
     found = [point for _, point in sorted(model.points3D.items()) if np.isfinite(point.xyz).all()]
     if not found:
         return None
@@ -109,13 +111,13 @@ def sparse_points(model: Any, names: Collection[str], source_to_world: FloatArra
     )
 
 
-def _read_model(folder: Path) -> tuple[Any, list[Any]]:
+def read_model(folder: Path) -> tuple[Any, list[Any]]:
     """The pycolmap reconstruction and its registered images."""
     try:
         import pycolmap
     except ImportError:
         raise DatasetError(
-            f"{folder}: reading a COLMAP model needs pycolmap; run pip install pycolmap"
+            f"{folder}: reading a COLMAP model needs pycolmap; pip install 'cagefield[colmap]'"
         ) from None
     check_whole(folder)
     try:
@@ -141,7 +143,22 @@ def _photo(folders: dict[int, Path], factors: Sequence[int], name: str) -> tuple
     return 1, None
 
 
-def _pose(image: Any) -> FloatArray:
+def _scale_to_photos(where: Path, cameras: dict[int, Camera], images: Sequence[Any], folder: Path) -> bool:
+    """Whether the cameras were scaled, in place, to photos that were scaled down since."""
+    photos = [find_photo(folder / image.name) for image in images]
+    headers = [read_header(photo) for photo in photos if photo is not None]
+    used = [cameras[image.camera_id] for image in images]
+    said = [(camera.width, camera.height) for camera in used]
+    size = uniform_size(said, [(header.width, header.height) for header in headers]) if headers else None
+    if size is None:
+        return False
+    warn_of_scaling(str(where), said[0], size)
+    for camera_id in {image.camera_id for image in images}:
+        cameras[camera_id] = cameras[camera_id].resized(*size)
+    return True
+
+
+def pose_of(image: Any) -> FloatArray:
     """OpenGL camera-to-world matrix [4,4]."""
     rigid = image.cam_from_world
     matrix = np.asarray((rigid() if callable(rigid) else rigid).matrix(), dtype=np.float64)
@@ -152,7 +169,7 @@ def _pose(image: Any) -> FloatArray:
     return pose
 
 
-def _camera(folder: Path, camera: Any) -> Camera:
+def camera_of(folder: Path, camera: Any) -> Camera:
     """The COLMAP camera in the identity pose."""
     name, p = camera.model.name, [float(value) for value in camera.params]
     model: Lens = "pinhole"

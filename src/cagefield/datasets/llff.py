@@ -2,23 +2,31 @@
 
 Each row of the array [N,17] is a matrix [3,5], row by row, and the near and far depth of one photo, in the
 order of the sorted file names. The matrix's columns are the camera's down, right and backward axes, its
-position, and (height, width, focal length) in pixels. There is no lens distortion in the format: where the
-folder also has the COLMAP model, opening that (`sparse/0`) honours it.
+position, and (height, width, focal length) in pixels. There is no lens distortion in the format, and no
+points: where the folder also has the COLMAP model that the poses came from, both are taken from it.
 """
 
 from __future__ import annotations
 
+import importlib.util
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.captures import Size, stored_camera, unbounded_capture, uniform_size, warn_of_scaling
+from cagefield.datasets.colmap import camera_of, find_model, pose_of, read_model, sparse_points
 from cagefield.datasets.photos import EXTENSIONS, choose_downscale, photo_folders, read_header
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
-from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
+from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CameraError, DatasetError
+
+FloatArray = npt.NDArray[np.float64]
 
 POSES_FILE = "poses_bounds.npy"
 
@@ -28,7 +36,8 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
 
     Every `holdout`-th view tests. The world is rotated so that up is +z and the cameras look towards +y (see
     `levelling_rotation`). Photos come from `images`, `images_4`, ...: the folder whose factor is the largest
-    that divides the factor wanted.
+    that divides the factor wanted. Where all photos in `images` have one size and the file another with the
+    same aspect, the intrinsics are scaled, with a warning.
     """
     folder = path if path.is_dir() else path.parent
     file = folder / POSES_FILE
@@ -49,8 +58,16 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             f"{file} has poses of {len(rows)} photos, but {found or 'there is no folder images'}; poses and "
             "photos are paired by order, so all of them must be there"
         )
+    sizes = [(int(width), int(height)) for height, width in matrices[:, :2, 4]]
+    scaled = _scaled(photos[1], sizes) if 1 in complete else None
+    if scaled is not None:
+        warn_of_scaling(str(file), sizes[0], scaled)
+        matrices[:, :, 4] *= scaled[0] / sizes[0][0]
+        matrices[:, :2, 4] = scaled[::-1]
+        complete = {1: complete[1]}  # the names of the others count from the old size
     factor = choose_downscale(int(matrices[:, :2, 4].max()), downscale, complete)
     stored = max(f for f in complete if factor % f == 0)
+    model = _matching_model(folder, poses)
     views = []
     for index, photo in enumerate(photos[stored]):
         where = f"{file}: row {index} ({photo.name})"
@@ -59,56 +76,85 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             camera = Camera(
                 levelling @ poses[index], width, height, focal, focal, 0.5 * float(width), 0.5 * float(height)
             )
+            if model is not None:
+                lens = model.cameras[index].resized(camera.width, camera.height)
+                camera = lens.with_c2w(camera.c2w)
         except CameraError as error:
             raise DatasetError(f"{where}: {error}") from error
         view = View(photo.name, stored_camera(where, camera, photo, stored), photo)
         views.append(view.downscaled(factor // stored))
-    bounds = cube_of_interest([view.camera for view in views], rows[:, 15:])
-    return unbounded_capture(
-        folder, views, holdout, bounds, levelling, (float(rows[:, 15].min()), float(rows[:, 16].max()))
-    )
+    points = None if model is None else model.points([view.name for view in views], levelling)
+    positions = None if points is None else points.positions
+    bounds = cube_of_interest([view.camera for view in views], rows[:, 15:], positions)
+    depths = float(rows[:, 15].min()), float(rows[:, 16].max())
+    return unbounded_capture(folder, views, holdout, bounds, levelling, depths, points)
 
 
-def unbounded_capture(
-    folder: Path,
-    views: Sequence[View],
-    holdout: int,
-    bounds: npt.NDArray[np.float64],
-    levelling: npt.NDArray[np.float64],
-    depths: tuple[float, float] | None,
-    points: SparsePoints | None = None,
-) -> Dataset:
-    """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
-    train, test = hold_out(views, holdout)
-    return Dataset(
-        name=folder.resolve().name,
-        path=folder,
-        train=train,
-        test=test,
-        val=(),
-        unbounded=True,
-        bounds=bounds,
-        white_background=False,
-        source_to_world=levelling,
-        depths=depths,
-        points=points,
-    )
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """The COLMAP model that the poses came from: lenses by row, and how it moves into the file's world."""
+
+    reconstruction: Any
+    names: tuple[str, ...]
+    cameras: tuple[Camera, ...]
+    to_file: FloatArray
+
+    def points(self, views: Sequence[str], levelling: FloatArray) -> SparsePoints | None:
+        """Its points in the data set's world; `views` are the views' names by row."""
+        names = dict(zip(self.names, views, strict=True))
+        return sparse_points(self.reconstruction, names, levelling @ self.to_file)
 
 
-def stored_camera(where: str, camera: Camera, photo: Path, factor: int) -> Camera:
-    """`camera` for the size of a photo stored at 1/`factor` of the camera's size.
+def _matching_model(folder: Path, poses: FloatArray) -> _Model | None:
+    """The folder's COLMAP model where it has the same cameras as `poses` [N,4,4], moved by a similarity.
 
-    Raises DatasetError where the photo's size differs from that by more than rounding.
+    None where there is none, where it has other cameras, and where pycolmap is missing.
     """
-    header = read_header(photo)
-    for side, found, full in (("wide", header.width, camera.width), ("high", header.height, camera.height)):
-        if abs(found * factor - full) >= factor:
-            raise DatasetError(
-                f"{where}: {photo} is {found} pixels {side}, the intrinsics say {full}"
-                + (f" / {factor}" if factor > 1 else "")
-                + "; use the photos that the intrinsics belong to"
-            )
-    return camera.resized(header.width, header.height)
+    place = find_model(folder)
+    if place is None or importlib.util.find_spec("pycolmap") is None:
+        return None
+    try:
+        reconstruction, images = read_model(place)
+        images.sort(key=lambda image: image.name)
+        cameras = tuple(camera_of(place, reconstruction.cameras[image.camera_id]) for image in images)
+    except DatasetError as error:
+        warnings.warn(f"{error}; {folder / POSES_FILE} is used without lens and points", stacklevel=4)
+        return None
+    if len(images) != len(poses):
+        return None
+    to_file = _similarity(np.stack([pose_of(image) for image in images]), poses)
+    if to_file is None:
+        return None
+    return _Model(reconstruction, tuple(image.name for image in images), cameras, to_file)
+
+
+def _similarity(source: FloatArray, target: FloatArray) -> FloatArray | None:
+    """The similarity [4,4] that takes poses [N,4,4] to others; None where they differ by more.
+
+    Allowed are half a degree, and a hundredth of the cameras' spread.
+    """
+    rotations = target[:, :3, :3] @ np.swapaxes(source[:, :3, :3], 1, 2)
+    left, _, right = np.linalg.svd(rotations.sum(axis=0))
+    rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    cosines = 0.5 * (np.einsum("nij,ij->n", rotations, rotation) - 1.0)
+    turned = source[:, :3, 3] @ rotation.T
+    first, second = turned - turned.mean(axis=0), target[:, :3, 3] - target[:, :3, 3].mean(axis=0)
+    square = float((first**2).sum())
+    scale = float((first * second).sum()) / square if square > 0 else 1.0
+    misses = np.linalg.norm(scale * first - second, axis=1)
+    spread = np.linalg.norm(second, axis=1).max()
+    if scale <= 0 or cosines.min() < np.cos(np.radians(0.5)) or misses.max() > 0.01 * spread:
+        return None
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale * rotation
+    matrix[:3, 3] = target[:, :3, 3].mean(axis=0) - scale * turned.mean(axis=0)
+    return matrix
+
+
+def _scaled(photos: Sequence[Path], sizes: Sequence[Size]) -> Size | None:
+    """The size of photos that were scaled down since `sizes` (width, height) were written, else None."""
+    headers = [read_header(photo) for photo in photos]
+    return uniform_size(sizes, [(header.width, header.height) for header in headers])
 
 
 def _read_rows(file: Path) -> npt.NDArray[np.float64]:

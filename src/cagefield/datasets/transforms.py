@@ -2,7 +2,8 @@
 
 All three give OpenGL camera-to-world matrices, which are used as they are. The keys of the three dialects are
 read alike; a key in a frame wins over the same key of the file:
-  size        w, h; else the size of the photo
+  size        w, h; else the size of the photo. Where all photos have another one with the same aspect, the
+              intrinsics are scaled, with a warning
   focal       fl_x, fl_y in pixels; x_fov, y_fov in degrees; camera_angle_x, camera_angle_y in radians
   axis        cx, cy in pixels; else the middle of the image
   lens        camera_model (PINHOLE, SIMPLE_PINHOLE, OPENCV, OPENCV_FISHEYE), is_fisheye, k1..k4, p1, p2
@@ -20,7 +21,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -28,6 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.captures import uniform_size, warn_of_scaling
 from cagefield.datasets.photos import Header, choose_downscale, find_photo, is_cut_out, read_header
 from cagefield.datasets.point_files import read_points
 from cagefield.datasets.region import cube_of_interest, depths_of_points
@@ -129,6 +131,29 @@ class _TransformsFile:
                 self.missing.append(name)
             else:
                 self.views.append(View(name, _camera(f"{where} ({name})", self.values, frame, photo), photo))
+        self._scale_to_photos()
+
+    def _scale_to_photos(self) -> None:
+        """Scales the cameras where all photos were scaled alike since the file was written.
+
+        Raises DatasetError where photos have another size for any other reason.
+        """
+        headers = [read_header(view.image_path) for view in self.views]
+        said = [(view.camera.width, view.camera.height) for view in self.views]
+        found = [(header.width, header.height) for header in headers]
+        if said == found:
+            return
+        size = uniform_size(said, found)
+        if size is None:
+            index = next(i for i in range(len(said)) if said[i] != found[i])
+            key, value = ("w", said[index][0]) if said[index][0] != found[index][0] else ("h", said[index][1])
+            raise DatasetError(
+                f"{self.path}: frame {self.views[index].name}: key {key!r} is {value}, but "
+                f"{self.views[index].image_path} is {found[index][0]}x{found[index][1]}; use the photos that "
+                "the intrinsics belong to, or scale w, h, fl_x, fl_y, cx and cy to these"
+            )
+        warn_of_scaling(str(self.path), said[0], size)
+        self.views = [replace(view, camera=view.camera.resized(*size)) for view in self.views]
 
     def split_views(self) -> dict[str, list[View]]:
         """The views by split, as the file's own lists say; all in train where it has none."""
@@ -210,7 +235,7 @@ def _camera(where: str, values: dict[str, Any], frame: dict[str, Any], photo: Pa
     """The full-size camera of one frame."""
     merged = {**values, **frame}
     header = read_header(photo)
-    width, height = _size(where, merged, header, photo)
+    width, height = _size(where, merged, header)
     fx, fy = _focal_lengths(where, frame, width, height)
     if fx is None and fy is None:
         fx, fy = _focal_lengths(where, values, width, height)
@@ -235,15 +260,13 @@ def _camera(where: str, values: dict[str, Any], frame: dict[str, Any], photo: Pa
         raise DatasetError(f"{where}: {str(error).replace('c2w', 'transform_matrix')}") from error
 
 
-def _size(where: str, merged: dict[str, Any], header: Header, photo: Path) -> tuple[int, int]:
-    for key, found in (("w", header.width), ("h", header.height)):
-        expected = _number(where, merged, key)
-        if expected is not None and expected != found:
-            raise DatasetError(
-                f"{where}: key {key!r} is {expected:g}, but {photo} is {header.width}x{header.height}; "
-                "use the photos that the intrinsics belong to, or scale w, h, fl_x, fl_y, cx and cy to these"
-            )
-    return header.width, header.height
+def _size(where: str, merged: dict[str, Any], header: Header) -> tuple[int, int]:
+    """(width, height) as the file says; the photo's where it says nothing."""
+    width, height = _number(where, merged, "w"), _number(where, merged, "h")
+    for key, value in (("w", width), ("h", height)):
+        if value is not None and (value < 1 or value != int(value)):
+            raise DatasetError(f"{where}: key {key!r} must be a whole number of pixels, got {value:g}")
+    return int(width or header.width), int(height or header.height)
 
 
 def _focal_lengths(

@@ -220,7 +220,9 @@ class NerfField:
         try:
             from cagefield.fields.nerf_torch import TorchNerf
         except ImportError as error:
-            raise FieldError("this NeRF needs PyTorch, which is not installed; pip install torch") from error
+            raise FieldError(
+                "this NeRF needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
+            ) from error
         return TorchNerf(self)
 
     def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
