@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,22 +12,32 @@ from scipy.ndimage import map_coordinates
 from cagefield.datasets.procedural.parts import Part, apply
 
 
+class Around(Protocol):
+    """A closed surface seen from within."""
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance [N] of points [3,N] within it to its nearest wall, negative outside."""
+        ...
+
+
 class Occlusion:
     """Openness in [0,1] of surface points of the scene as modelled, from a lattice of distances.
 
     1 - sum_i w_i max(0, h_i - distance(p + h_i n)) / h_i: how much nearer other surfaces are than open space.
     """
 
-    spacing = 0.025
     taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
 
-    def __init__(self, parts: tuple[Part, ...]) -> None:
-        self._parts = parts
+    def __init__(
+        self, parts: tuple[Part, ...], around: Around | None = None, spacing: float = 0.025
+    ) -> None:
+        """`around`: a closed surface that the parts stand in, such as a room's walls; spacing: the lattice's."""
+        self._parts, self._around, self.spacing = parts, around, spacing
 
     @cached_property
     def _lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """(origin [3], distances [X,Y,Z]) of the union of the parts, up to the reach of the last tap."""
-        reach = self.taps[-1][0] + self.spacing
+        reach = self.reach
         lows = np.min([part.bounds[0] for part in self._parts], 0) - reach
         highs = np.max([part.bounds[1] for part in self._parts], 0) + reach
         axes = [np.arange(lo, hi + self.spacing, self.spacing) for lo, hi in zip(lows, highs, strict=True)]
@@ -53,10 +64,34 @@ class Occlusion:
 
     def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
         """Openness [N] at points [3,N] with unit normals [3,N], both as modelled."""
-        origin, lattice = self._lattice
         openness = np.ones(points.shape[1], np.float32)
         for height, weight in self.taps:
-            at = (points + np.float32(height) * normals - origin[:, None]) / np.float32(self.spacing)
-            distance = map_coordinates(lattice, at, order=1, mode="nearest")
+            distance = self.distance(points + np.float32(height) * normals)
             openness -= np.float32(weight / height) * np.clip(height - distance, 0, height)
         return np.clip(openness, 0, 1)
+
+    @property
+    def reach(self) -> float:
+        """The largest distance that is known; `distance` is no larger."""
+        return self.taps[-1][0] + self.spacing
+
+    @property
+    def bounds(self) -> NDArray[np.float32]:
+        """Box [2,3] outside which no part is within `reach`."""
+        origin, lattice = self._lattice
+        size = np.array(lattice.shape, np.float32) - 1
+        return np.stack([origin, origin + np.float32(self.spacing) * size])
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance [N] of points [3,N] to the nearest surface as modelled, up to `reach`."""
+        distance = self.distance_to_parts(points)
+        if self._around is not None:
+            np.minimum(distance, self._around.distance(points), out=distance)
+        return distance
+
+    def distance_to_parts(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same without what is around the parts."""
+        origin, lattice = self._lattice
+        at = (points - origin[:, None]) / np.float32(self.spacing)
+        distance: NDArray[np.float32] = map_coordinates(lattice, at, order=1, mode="nearest")
+        return distance

@@ -46,12 +46,17 @@ class Primitive:
     """A textured shape, placed by poses [K,4,4] (its own frame to the scene as modelled).
 
     gloss: strength and exponent of the highlight; keep the exponent low, SH colour is smooth.
+    luminous: factor of the texture where that is what the surface sends out, whatever light falls on it; 0
+    for a surface that is lit. mirror: share that the top face (+z of its own frame) reflects at right
+    angles, more where it is seen at a slant; 0 for none.
     """
 
     shape: Shape
     texture: Texture
     poses: Array = field(default_factory=lambda: np.eye(4)[None])
     gloss: tuple[float, float] = (0.08, 12.0)
+    luminous: float = 0.0
+    mirror: float = 0.0
 
     def __post_init__(self) -> None:
         poses = np.array(self.poses, np.float64).reshape(-1, 4, 4)

@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.occlusion import Occlusion
 from cagefield.datasets.procedural.parts import Part, Placed, affine, apply
+from cagefield.datasets.procedural.room_light import Room, RoomLight
+from cagefield.datasets.procedural.shading import Light, shade
 from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
-from cagefield.datasets.procedural.tracing import trace
+from cagefield.datasets.procedural.tracing import Hits, trace
 from cagefield.errors import SceneError
 from cagefield.rendering.frame import Background, Frame
 
@@ -32,6 +34,7 @@ class ProceduralScene:
     relit     True: a turned part is lit anew, as in the world. False: a part carries its colours like an
               edited radiance field, colour(p, d) = modelled colour(canonical point, canonical direction).
     lowest    elevation in degrees of the lowest camera that make_scene places
+    room      the room that the parts stand in, whose walls are parts too, and whose window lights them
     """
 
     name: str
@@ -39,6 +42,7 @@ class ProceduralScene:
     modelled: tuple[Part, ...] = ()
     relit: bool = True
     lowest: float = 5.0
+    room: Room | None = None
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts]
@@ -129,21 +133,7 @@ class ProceduralScene:
         height, width = camera.height, camera.width
         fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
         directions = apply(camera.c2w[:3, :3], fine.local_directions().T)
-        hits = trace(self.placed, camera.origin, directions)
-        rgb, normals = np.zeros((2, directions.shape[1], 3), np.float32)
-        origin = camera.origin.astype(np.float32)[:, None]
-        for index, item in enumerate(self.placed):
-            rows = np.flatnonzero(hits.primitive == index)
-            if len(rows):
-                toward = directions[:, rows]
-                rgb[rows], normals[rows] = surface(
-                    item,
-                    origin + hits.t[rows] * toward,
-                    hits.instance[rows],
-                    toward,
-                    openness=self.occlusion,
-                    relit=self.relit,
-                )
+        rgb, normals, hits = self.shoot(camera.origin, directions)
         seen = np.isfinite(hits.t)
 
         def mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -159,6 +149,71 @@ class ProceduralScene:
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
         return Frame.from_premultiplied(mean(rgb), opacity, depth, normals=normal, background=background)
 
+    def shoot(
+        self, origin: Array, directions: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], Hits]:
+        """(rgb [N,3], normals [N,3], hits) of rays from one origin [3] with unit directions [3,N]."""
+        hits = trace(self.placed, origin, directions)
+        rgb, normals = self._colours(self.placed, hits, origin, directions)
+        for index, item in enumerate(self.placed):
+            if item.primitive.mirror:
+                self._reflect(index, hits, origin, directions, rgb, normals)
+        return rgb, normals, hits
+
+    def _colours(
+        self, placed: Sequence[Placed], hits: Hits, origin: Array, directions: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(rgb [N,3], normals [N,3]) of the surfaces that rays [3,N] hit, 0 where they hit none."""
+        rgb, normals = np.zeros((2, directions.shape[1], 3), np.float32)
+        start = origin.astype(np.float32)[:, None]
+        for index, item in enumerate(placed):
+            rows = np.flatnonzero(hits.primitive == index)
+            if len(rows):
+                toward = directions[:, rows]
+                rgb[rows], normals[rows] = surface(
+                    item,
+                    start + hits.t[rows] * toward,
+                    hits.instance[rows],
+                    toward,
+                    openness=self.occlusion,
+                    relit=self.relit,
+                    light=self.light,
+                )
+        return rgb, normals
+
+    def _reflect(
+        self,
+        index: int,
+        hits: Hits,
+        origin: Array,
+        directions: NDArray[np.float32],
+        rgb: NDArray[np.float32],
+        normals: NDArray[np.float32],
+    ) -> None:
+        """Adds to `rgb` [N,3] what the top face of a polished primitive reflects, once.
+
+        The face is a plane, so that the reflected rays all come from the camera's mirror image. The share of
+        the reflection is F = m + (1 - m) (1 - cos)^5, m the primitive's `mirror`.
+        Source: Schlick, "An inexpensive BRDF model for physically-based rendering" (1994), equation 15.
+        """
+        item = self.placed[index]
+        up = item.linear[0, :, 2].astype(np.float64)
+        up /= np.linalg.norm(up)
+        rows = np.flatnonzero(hits.primitive == index)
+        rows = rows[normals[rows] @ up > 0.9999]
+        if not len(rows):
+            return
+        top = item.shift[0] + item.linear[0, :, 2] * item.extent[2]
+        image = origin - 2 * ((origin - top) @ up) * up
+        cosine = up.astype(np.float32) @ directions[:, rows]
+        mirrored = directions[:, rows] - 2 * cosine * up.astype(np.float32)[:, None]
+        others = self.placed[:index] + self.placed[index + 1 :]
+        found = trace(others, image, mirrored, hits.t[rows])
+        reflected, _ = self._colours(others, found, image, mirrored)
+        base = np.float32(item.primitive.mirror)
+        share = (base + (1 - base) * (1 - np.abs(cosine)) ** 5)[:, None]
+        rgb[rows] = rgb[rows] * (1 - share) + share * reflected
+
     def field(self, eps: float = 0.004) -> SurfaceField:
         """This scene as a radiance field whose surfaces are about `eps` (world units) soft."""
         if not 0 < eps < np.inf:
@@ -166,7 +221,7 @@ class ProceduralScene:
         reach = SHELL * eps
         low, high = self.bounds
         bounds = np.stack([low - reach, high + reach])
-        return SurfaceField(self.placed, self.occlusion, self.relit, eps, bounds)
+        return SurfaceField(self.placed, self.occlusion, self.relit, eps, bounds, self.light)
 
     def _indices(self, part: str | Sequence[str]) -> tuple[int, ...]:
         wanted = (part,) if isinstance(part, str) else tuple(part)
@@ -189,8 +244,8 @@ class ProceduralScene:
 
     def _with(self, parts: Iterable[Part]) -> ProceduralScene:
         scene = replace(self, parts=tuple(parts))
-        # the occlusion of the modelled parts is shared by all scenes made from them
-        scene.__dict__["occlusion"] = self.occlusion
+        # what light the modelled parts get is shared by all scenes made from them
+        scene.__dict__["occlusion"], scene.__dict__["light"] = self.occlusion, self.light
         return scene
 
     @cached_property
@@ -201,4 +256,11 @@ class ProceduralScene:
     @cached_property
     def occlusion(self) -> Occlusion:
         """Baked occlusion of the scene as modelled (computed on first use)."""
-        return Occlusion(self.modelled)
+        if self.room is None:
+            return Occlusion(self.modelled)
+        return Occlusion(self.room.furniture(self.modelled), self.room, self.room.detail)
+
+    @cached_property
+    def light(self) -> Light:
+        """The light that falls on the scene as modelled."""
+        return shade if self.room is None else RoomLight(self.room, self.occlusion)

@@ -7,6 +7,8 @@ Colours are combined as sRGB-encoded values, like the radiance a field is traine
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,31 +28,50 @@ WRAP = 0.3
 """Share by which the key light reaches around the terminator."""
 
 
-def _dot(first: Float32, second: Float32) -> Float32:
+def dot(first: Float32, second: Float32) -> Float32:
+    """Dot products [N] of vectors [3,N] (or one [3])."""
     return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+class Light(Protocol):
+    """What falls on the surfaces of a scene, and what they send on."""
+
+    def __call__(
+        self,
+        albedo: Float32,
+        points: Float32,
+        normals: Float32,
+        viewdirs: Float32,
+        *,
+        occlusion: Float32,
+        gloss: tuple[float, float],
+    ) -> Float32:
+        """rgb [N,3] of surface points; see `shade`. points [3,N] are as modelled."""
+        ...
 
 
 def shade(
     albedo: Float32,
+    points: Float32,
     normals: Float32,
     viewdirs: Float32,
     *,
     occlusion: Float32,
     gloss: tuple[float, float],
 ) -> Float32:
-    """rgb [N,3] in [0,1] of surface points.
+    """rgb [N,3] in [0,1] of surface points, wherever they are (`points` is not looked at).
 
     albedo [N,3]; normals [3,N] unit, outwards; viewdirs [3,N] unit, from the camera; occlusion [N] in [0,1]
     (1 is open); gloss: strength and exponent of the highlight.
     """
     up = 0.5 + 0.5 * normals[2]
     ambient = GROUND + (SKY - GROUND) * up[:, None]
-    key = np.maximum((_dot(KEY_DIRECTION, normals) + WRAP) / (1 + WRAP), 0)
-    fill = np.maximum(_dot(FILL_DIRECTION, normals), 0)
+    key = np.maximum((dot(KEY_DIRECTION, normals) + WRAP) / (1 + WRAP), 0)
+    fill = np.maximum(dot(FILL_DIRECTION, normals), 0)
     light = ambient * occlusion[:, None]
     light = light + (key * (0.4 + 0.6 * occlusion))[:, None] * KEY_COLOR + fill[:, None] * FILL_COLOR
     halfway = KEY_DIRECTION[:, None] - viewdirs
-    facing = np.maximum(_dot(normals, halfway) / np.sqrt(_dot(halfway, halfway)), np.float32(1e-6))
+    facing = np.maximum(dot(normals, halfway) / np.sqrt(dot(halfway, halfway)), np.float32(1e-6))
     highlight = np.float32(gloss[0]) * facing ** np.float32(gloss[1]) * occlusion
     out: Float32 = np.clip(albedo * light + highlight[:, None], 0, 1).astype(np.float32)
     return out

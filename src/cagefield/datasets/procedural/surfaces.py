@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.datasets.procedural.parts import Placed, apply
-from cagefield.datasets.procedural.shading import shade
+from cagefield.datasets.procedural.shading import Light, shade
 
 Float32 = NDArray[np.float32]
 Int = NDArray[np.intp]
@@ -29,7 +29,14 @@ def _unit(vectors: Float32) -> Float32:
 
 
 def surface(
-    item: Placed, points: Float32, instance: Int, viewdirs: Float32, *, openness: Openness, relit: bool
+    item: Placed,
+    points: Float32,
+    instance: Int,
+    viewdirs: Float32,
+    *,
+    openness: Openness,
+    relit: bool,
+    light: Light = shade,
 ) -> tuple[Float32, Float32]:
     """(rgb [N,3], unit world normals [N,3]) of points [3,N] on the surface of one placed primitive.
 
@@ -44,8 +51,12 @@ def surface(
         modelled_points = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
         modelled_normals = _unit(apply(motion[:3, :3].T, normals))
         modelled_dirs = _unit(apply(inverse[:3, :3], viewdirs))
-    rgb = shade(
-        item.primitive.texture(local.T, instance),
+    albedo = item.primitive.texture(local.T, instance)
+    if item.primitive.luminous:
+        return albedo * np.float32(item.primitive.luminous), normals.T
+    rgb = light(
+        albedo,
+        modelled_points,
         normals if relit else modelled_normals,
         viewdirs if relit else modelled_dirs,
         occlusion=openness(modelled_points, modelled_normals),
@@ -67,6 +78,7 @@ class SurfaceField:
     relit: bool
     eps: float
     bounds: NDArray[np.float64]
+    light: Light = shade
 
     def __call__(self, positions: NDArray[Any], viewdirs: NDArray[Any]) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,3]); rgb is 0 further than SHELL * eps from all surfaces."""
@@ -86,6 +98,7 @@ class SurfaceField:
                 np.ascontiguousarray(viewdirs[rows].T, np.float32),
                 openness=self.openness,
                 relit=self.relit,
+                light=self.light,
             )
         return sigma, rgb
 

@@ -310,7 +310,8 @@ class Ramp:
     axis: int
     low: float
     high: float
+    grain: float = 0.05
 
     def __call__(self, points: Float32, instance: NDArray[np.intp]) -> Float32:
         share = np.clip((points[:, self.axis] - self.low) / (self.high - self.low), 0, 1).astype(np.float32)
-        return _mix(self.first, self.second, share) * (1 + 0.05 * noise(points, 0.5))[:, None]
+        return _mix(self.first, self.second, share) * (1 + self.grain * noise(points, 0.5))[:, None]

@@ -34,8 +34,16 @@ class Hits:
     instance: Int
 
 
-def trace(placed: Sequence[Placed], origin: NDArray[np.float64], directions: Float32) -> Hits:
-    """Nearest surfaces of all primitives along rays from one origin [3] with unit directions [3,N]."""
+def trace(
+    placed: Sequence[Placed],
+    origin: NDArray[np.float64],
+    directions: Float32,
+    beyond: Float32 | None = None,
+) -> Hits:
+    """Nearest surfaces of all primitives along rays from one origin [3] with unit directions [3,N].
+
+    `beyond` [N]: surfaces nearer than these distances are passed over.
+    """
     count = directions.shape[1]
     hits = Hits(np.full(count, np.inf, np.float32), np.full(count, -1, np.intp), np.zeros(count, np.intp))
     start = np.asarray(origin, np.float32)
@@ -51,7 +59,7 @@ def trace(placed: Sequence[Placed], origin: NDArray[np.float64], directions: Flo
             ball = ((low + high) / 2 - start).astype(np.float32), np.float32(np.linalg.norm(high - low) / 2)
             rays = np.flatnonzero(_meets(directions, *ball))
             bundles[part.name] = rays, directions[:, rays]
-        _trace_primitive(placed[index], index, start, *bundles[part.name], hits)
+        _trace_primitive(placed[index], index, start, *bundles[part.name], hits, beyond)
     return hits
 
 
@@ -67,7 +75,13 @@ def _meets(directions: Float32, to_center: Float32, radius: np.float32) -> NDArr
 
 
 def _trace_primitive(
-    item: Placed, index: int, start: Float32, rays: Int, directions: Float32, hits: Hits
+    item: Placed,
+    index: int,
+    start: Float32,
+    rays: Int,
+    directions: Float32,
+    hits: Hits,
+    beyond: Float32 | None,
 ) -> None:
     """Updates the hits of rays (indices [M], directions [3,M]) with one primitive's nearest surfaces."""
     to_center = item.shift - start
@@ -77,7 +91,8 @@ def _trace_primitive(
     local_direction = item.local_vectors(directions[:, pair], instance)
     local_origin = np.einsum("kij,kj->ik", item.inverse, -to_center)[:, instance]
 
-    enter, leave = np.zeros(len(pair), np.float32), hits.t[rays[pair]]
+    enter = np.zeros(len(pair), np.float32) if beyond is None else beyond[rays[pair]]
+    leave = hits.t[rays[pair]]
     with np.errstate(divide="ignore", invalid="ignore"):
         for axis in range(3):
             slope = 1 / local_direction[axis]
