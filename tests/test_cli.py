@@ -327,3 +327,20 @@ def test_make_scene_refuses_unknown_names_and_other_folders(
     error = refused(capsys, "make-scene", "plant", "-o", tmp_path / "holidays", "--overwrite")
     assert "holds no transforms_train.json and is left as it is" in error
     assert files_of(tmp_path) == {"holidays/beach.jpg": b"sea"}
+
+
+def test_make_scene_writes_captures_of_rooms(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "photos"
+    argv = ["make-scene", "room-chair", "-o", out, "--views", 9, "--size", 64]
+    assert "photos of room-chair (parts: seat, " in printed(capsys, *argv, "--no-points")
+    data = cagefield.load_dataset(out)
+    assert (len(data.train), len(data.test)) == (7, 2) and data.unbounded and data.points is None
+    assert sorted(path.name for path in (out / "depth").iterdir()) == ["frame_00001.npy", "frame_00009.npy"]
+    (out / "note.txt").write_text("mine")
+    printed(capsys, *argv, "--overwrite", "--depth", "none")
+    assert (out / "sparse_pc.ply").is_file() and not (out / "depth").exists()
+    assert (out / "note.txt").read_text() == "mine"
+    error = refused(capsys, "make-scene", "room-chair", "-o", tmp_path / "new", "--test-views", 3)
+    assert "holds out every 8th" in error
+    assert "for rooms" in refused(capsys, "make-scene", "plant", "-o", tmp_path / "new", "--no-points")
+    assert not (tmp_path / "new").exists()

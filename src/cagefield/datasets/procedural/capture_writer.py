@@ -4,8 +4,8 @@ images/frame_00001.jpg ...   photos, no alpha
 transforms.json              OPENCV intrinsics, OpenGL c2w in the room's own world
 sparse_pc.ply                the sparse points
 colmap/sparse/0/*.txt        the same as a COLMAP model, with the photos that see each point
-depth/frame_00001.npy ...    float32 [H,W]: true distance along the ray in world units, of every HOLDOUT-th photo
-                             from the first on (those that `load_dataset` holds out), or of all
+depth/frame_00001.npy ...    float32 [H,W]: true distance along the ray in world units, of every HOLDOUT-th
+                             photo from the first on (those that `load_dataset` holds out), or of all
 """
 
 from __future__ import annotations
@@ -142,7 +142,9 @@ def _write_colmap(found: Tracks, cameras: Sequence[Camera], names: Sequence[str]
     first = cameras[0]
     lens = (*first.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
     numbers = " ".join(repr(float(v)) for v in (first.fx, first.fy, first.cx, first.cy, *lens))
-    (folder / "cameras.txt").write_text(f"1 OPENCV {first.width} {first.height} {numbers}\n", encoding="utf-8")
+    (folder / "cameras.txt").write_text(
+        f"1 OPENCV {first.width} {first.height} {numbers}\n", encoding="utf-8"
+    )
     lines = []
     row_in_image = np.zeros(len(found.view), int)
     for index, (camera, name) in enumerate(zip(cameras, names, strict=True)):
@@ -164,7 +166,9 @@ def _write_colmap(found: Tracks, cameras: Sequence[Camera], names: Sequence[str]
     rows = []
     for index in range(len(found)):
         mine = order[ends[index] : ends[index + 1]]
-        track = " ".join(f"{view + 1} {row}" for view, row in zip(found.view[mine], row_in_image[mine], strict=True))
+        track = " ".join(
+            f"{view + 1} {row}" for view, row in zip(found.view[mine], row_in_image[mine], strict=True)
+        )
         x, y, z = found.positions[index]
         r, g, b = found.rgb[index]
         rows.append(f"{index + 1} {x:.9g} {y:.9g} {z:.9g} {r} {g} {b} {found.errors[index]:.4f} {track}")

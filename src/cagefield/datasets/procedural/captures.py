@@ -57,7 +57,9 @@ CAPTURES = {
     for capture in (
         Capture("room-digger", Phone(distortion=(0.045, -0.02, 0.0, 0.0)), 64, _circle),
         Capture("room-chair", Phone(640, 360, 66.0), 48, _arc),
-        Capture("room-microphone", Phone(distortion=(-0.03, 0.0, 0.0008, -0.0006), adapts=0.7), 56, _close_up),
+        Capture(
+            "room-microphone", Phone(distortion=(-0.03, 0.0, 0.0008, -0.0006), adapts=0.7), 56, _close_up
+        ),
         Capture("room-plant", Phone(fov_x_deg=58.0), 96, _tour),
     )
 }

@@ -1,7 +1,7 @@
 """Cameras as a person with a phone holds them, and what the phone makes of what it sees.
 
-A walk is a smooth path with jitter; the camera looks roughly at what is photographed, a little rolled. A photo
-is a picture with the phone's exposure, noise and 8 bits.
+A walk is a smooth path with jitter; the camera looks roughly at what is photographed, a little rolled. A
+photo is a picture with the phone's exposure, noise and 8 bits.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ class Phone:
         )
         pose = camera.c2w.copy()
         pose[:3, :3] = pose[:3, :3] @ Rotation.from_euler("z", roll_deg, degrees=True).as_matrix()
-        lens = {"model": "opencv", "distortion": self.distortion} if self.distortion else {}
-        return replace(camera, c2w=pose, **lens)
+        if not self.distortion:
+            return replace(camera, c2w=pose)
+        return replace(camera, c2w=pose, model="opencv", distortion=self.distortion)
 
     def resized(self, longer_side: int) -> Phone:
         """The same phone with smaller or larger photos."""

@@ -28,10 +28,8 @@ class Occlusion:
 
     taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
 
-    def __init__(
-        self, parts: tuple[Part, ...], around: Around | None = None, spacing: float = 0.025
-    ) -> None:
-        """`around`: a closed surface that the parts stand in, such as a room's walls; spacing: the lattice's."""
+    def __init__(self, parts: tuple[Part, ...], around: Around | None = None, spacing: float = 0.025) -> None:
+        """`around`: a closed surface that the parts stand in, as a room's walls; `spacing`: the lattice's."""
         self._parts, self._around, self.spacing = parts, around, spacing
 
     @cached_property

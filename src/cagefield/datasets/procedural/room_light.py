@@ -135,14 +135,12 @@ class RoomLight:
         low, high = self.occlusion.bounds
         open_ = np.ones(points.shape[1], np.float32)
         far = np.float32(SHADOW_STEPS[-1])
-        near = np.flatnonzero(
-            ((points > low[:, None] - far) & (points < high[:, None] + far)).all(0)
-        )
+        near = np.flatnonzero(((points > low[:, None] - far) & (points < high[:, None] + far)).all(0))
         points, least = points[:, near], open_[near]
         toward = self._toward(points)
         known = np.float32(self.occlusion.reach)
         for step in SHADOW_STEPS:
-            half_width = np.float32(min(0.35 * step, 0.98 * known))
+            half_width = np.float32(min(0.35 * step, 0.98 * float(known)))
             distance = self.occlusion.distance_to_parts(points + np.float32(step) * toward)
             share = np.clip(0.5 + 0.5 * distance / half_width, 0, 1)
             np.minimum(least, np.where(distance >= 0.99 * known, 1, share), out=least)

@@ -1,7 +1,7 @@
 """The built-in scenes in rooms: white walls, a window with an outside, a floor, polished tables.
 
-World as in the scenes alone: z up, the object within about [-1,1]^3, some 25 cm a unit. The window is in the +y
-wall.
+World as in the scenes alone: z up, the object within about [-1,1]^3, some 25 cm a unit. The window is in the
++y wall.
 """
 
 from __future__ import annotations
@@ -82,7 +82,9 @@ def room_plant() -> ProceduralScene:
     plants = _moved(plant().parts, (-1.0, 5.0, floor + 1.97), 2.1)
     chairs = _moved(_turned(chair().parts, 200.0), (6.8, 0.5, floor + 1.95), 2.1)
     diggers = _moved(_turned(digger().parts, 115.0), (-8.9, -2.0, floor + 2.66), 1.2)
-    shelf = _table((-9.2, -2.0), (1.6, 2.6), floor + 2.06, floor, Plain(hexcolor("#d9d4c8"), 0.004), 0.05, "shelf")
+    shelf = _table(
+        (-9.2, -2.0), (1.6, 2.6), floor + 2.06, floor, Plain(hexcolor("#d9d4c8"), 0.004), 0.05, "shelf"
+    )
     lamp = part(
         "lamp",
         at(Cylinder(0.9, 0.05, 0.03), Plain(hexcolor("#3a3a3c")), (7.8, -7.2, floor + 0.05)),
@@ -103,9 +105,7 @@ def room_plant() -> ProceduralScene:
         _picture(room, -7.0, 2.2, 1.5, 1.1),
         _door(room),
     )
-    return _furnished(
-        "room-plant", room, parts, floor=_boards(hexcolor("#c3b39a"), hexcolor("#a89678"), 1.6)
-    )
+    return _furnished("room-plant", room, parts, floor=_boards(hexcolor("#c3b39a"), hexcolor("#a89678"), 1.6))
 
 
 ROOMS: dict[str, Callable[[], ProceduralScene]] = {
@@ -136,10 +136,14 @@ def _shell(room: Room, floor: Texture, walls: Texture) -> tuple[Part, ...]:
     (u0, v0), (u1, v1) = room.window
     t = THICK
 
-    def slab(texture: Texture, low: tuple[float, float, float], high: tuple[float, float, float]) -> Primitive:
+    def slab(
+        texture: Texture, low: tuple[float, float, float], high: tuple[float, float, float]
+    ) -> Primitive:
         corners = np.array([low, high])
         half = (corners[1] - corners[0]) / 2
-        return at(Box((float(half[0]), float(half[1]), float(half[2]))), texture, corners.mean(0), gloss=MATTE)
+        return at(
+            Box((float(half[0]), float(half[1]), float(half[2]))), texture, corners.mean(0), gloss=MATTE
+        )
 
     ceiling = Plain(hexcolor("#f7f6f2"), 0.003)
     holed = (
@@ -183,7 +187,11 @@ def _outside(wall: float) -> Part:
     """A sky with hills below it and some houses in front, all brighter than white paper in the room."""
     haze, blue = hexcolor("#f4f7fa"), hexcolor("#9cc3ea")
     sky = Layered(
-        Mottled(hexcolor("#8fa57e"), hexcolor("#b4c09c"), 6.0, 0.5), Ramp(haze, blue, 2, -20.0, 40.0, 0.0), 2, -16.0, 2.0
+        Mottled(hexcolor("#8fa57e"), hexcolor("#b4c09c"), 6.0, 0.5),
+        Ramp(haze, blue, 2, -20.0, 40.0, 0.0),
+        2,
+        -16.0,
+        2.0,
     )
     grass = Mottled(hexcolor("#8ea36c"), hexcolor("#a8b884"), 3.0, 0.5)
     back = wall + FAR
@@ -221,9 +229,7 @@ def _table(
     (x, y), (a, b) = middle, half
     board = at(Box((a, b, 0.07), 0.03), texture, (x, y, top - 0.07), gloss=SHINY)
     height = (top - 0.14 - floor) / 2
-    corners = [
-        (x + i * (a - 0.25), y + j * (b - 0.25), floor + height) for i in (-1, 1) for j in (-1, 1)
-    ]
+    corners = [(x + i * (a - 0.25), y + j * (b - 0.25), floor + height) for i in (-1, 1) for j in (-1, 1)]
     legs = at(Box((0.1, 0.1, height), 0.02), texture, corners, gloss=SATIN)
     return part(name, replace(board, mirror=mirror), legs)
 
@@ -247,7 +253,12 @@ def _door(room: Room) -> Part:
         "door",
         at(Box((1.7, 0.06, 4.0)), Plain(hexcolor("#d8d3c6"), 0.004), (2.0, y + 0.06, floor + 4.0)),
         at(Box((1.5, 0.08, 3.85), 0.02), leaf, (2.0, y + 0.08, floor + 3.85)),
-        at(Cylinder(0.09, 0.14, 0.02), Plain(hexcolor("#b7b9bb")), (3.2, y + 0.2, floor + 3.9), rotate_deg=(90, 0, 0)),
+        at(
+            Cylinder(0.09, 0.14, 0.02),
+            Plain(hexcolor("#b7b9bb")),
+            (3.2, y + 0.2, floor + 3.9),
+            rotate_deg=(90, 0, 0),
+        ),
     )
 
 

@@ -1,9 +1,9 @@
-"""Sparse points of a capture with known depth, as structure from motion would find them: where there is texture.
+"""Sparse points of a capture with known depth, as structure from motion finds them: where there is texture.
 
-A candidate is a corner of a photo (the smaller eigenvalue of the structure tensor is large). It is a point where
-other photos see it too: not hidden, by the true depth, and alike, by the correlation of small patches, which
-reflections and highlights fail. Every sighting has an error in pixels; the point is where the sightings' rays
-come closest, so its place has the error that follows from them.
+A candidate is a corner of a photo (the smaller eigenvalue of the structure tensor is large). It is a point
+where other photos see it too: not hidden, by the true depth, from no very different side, and alike, by the
+correlation of small patches of the surface, which reflections and highlights fail. Every sighting has an error
+in pixels; the point is where the sightings' rays come closest, so its place has the error that follows.
 """
 
 from __future__ import annotations
@@ -26,13 +26,16 @@ NOISE = 0.7
 """Deviation of a sighting, in pixels along each axis."""
 
 CORNER = 2e-5
-"""Least eigenvalue of a corner's structure tensor, of grey values in [0,1]: twenty times that of the noise."""
+"""Least eigenvalue of a corner's structure tensor, of grey values in [0,1]: twenty times the noise's."""
 
 ALIKE = 0.6
 """Least correlation of the patches of two sightings."""
 
 PATCH = 4
-"""Half width of a patch in pixels."""
+"""Half width in pixels of a patch, which is looked up at every other pixel."""
+
+WIDEST_ANGLE_DEG = 50.0
+"""Between the rays of two photos that match."""
 
 SAME = 0.01
 """Relative difference up to which a distance agrees with the depth of a photo."""
@@ -71,7 +74,10 @@ def tracks(
     seed: int = 0,
     most: int = 250,
 ) -> Tracks:
-    """The points that photos [H,W,3] with distances along their rays [H,W] show, up to `most` new ones a photo."""
+    """The points that photos [H,W,3] show, up to `most` new ones a photo.
+
+    depths [H,W]: true distances along the rays through the pixels' centres.
+    """
     rng = np.random.RandomState(seed)
     greys = [gaussian_filter(photo.mean(axis=2, dtype=np.float32) / 255, 0.7) for photo in photos]
     positions: list[Array] = []
@@ -85,7 +91,8 @@ def tracks(
         if not len(pixels):
             continue
         origins, directions = camera.rays(pixels)
-        points = origins + directions * depths[index][pixels[:, 1], pixels[:, 0], None].astype(np.float64)
+        depth = depths[index][pixels[:, 1], pixels[:, 0], None]
+        points = (origins + directions * depth).astype(np.float64)
         seen, at = _sightings(points, index, pixels, greys, depths, cameras)
         seen &= (rng.uniform(size=seen.shape) < MATCHED) | (np.arange(len(cameras)) == index)
         seen[seen.sum(axis=1) < LEAST_SIGHTINGS] = False
@@ -102,7 +109,9 @@ def tracks(
         count += len(good)
     if not count:
         empty = np.empty(0, np.intp)
-        return Tracks(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty(0), empty, empty, np.empty((0, 2)))
+        return Tracks(
+            np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty(0), empty, empty, np.empty((0, 2))
+        )
     point, view, pixel = (np.concatenate(column) for column in zip(*sightings, strict=True))
     return Tracks(
         np.concatenate(positions), np.concatenate(colours), np.concatenate(errors), point, view, pixel
@@ -138,19 +147,23 @@ def _sightings(
     cameras: Sequence[Camera],
 ) -> tuple[NDArray[np.bool_], Array]:
     """(which views [N,V] see points [N,3] found at pixels [N,2] of view `index`, and where [N,V,2])."""
-    offsets = np.arange(-PATCH, PATCH + 1)
-    v, u = np.meshgrid(offsets, offsets, indexing="ij")
+    offsets = np.arange(-PATCH, PATCH + 1, 2)
+    v, u = (grid.ravel() for grid in np.meshgrid(offsets, offsets, indexing="ij"))
+    around = (pixels[:, None] + np.stack([u, v], 1)).reshape(-1, 2)
 
     def patches(grey: Float32, at: Array) -> Array:
-        """Normalised patches [N,P] around positions [N,2]."""
-        rows = at[:, 1, None] - 0.5 + v.ravel()
-        columns = at[:, 0, None] - 0.5 + u.ravel()
-        values = map_coordinates(grey, [rows, columns], order=1, mode="nearest").astype(np.float64)
+        """Normalised patches [N,P] at positions [N P,2]."""
+        values = map_coordinates(grey, (at[:, ::-1] - 0.5).T, order=1, mode="nearest").astype(np.float64)
+        values = values.reshape(-1, len(u))
         values -= values.mean(axis=1, keepdims=True)
         return values / np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1e-9)
 
-    own = pixels + 0.5
-    model = patches(greys[index], own)
+    own = (pixels + 0.5).astype(np.float64)
+    model = patches(greys[index], (around + 0.5).astype(np.float64))
+    origins, directions = cameras[index].rays(around)
+    surface = origins + directions * depths[index][around[:, 1], around[:, 0], None]
+    surface = surface.reshape(len(pixels), len(u), 3)
+    rays = _units(points - cameras[index].origin)
     seen = np.zeros((len(points), len(cameras)), bool)
     at = np.zeros((len(points), len(cameras), 2))
     for view, camera in enumerate(cameras):
@@ -164,12 +177,19 @@ def _sightings(
         column, row = position[rows].astype(int).T
         distance = np.linalg.norm(points[rows] - camera.origin, axis=1)
         rows = rows[np.abs(depths[view][row, column] - distance) < SAME * distance]
+        angle = (_units(points[rows] - camera.origin) * rays[rows]).sum(axis=1)
+        rows = rows[angle > np.cos(np.radians(WIDEST_ANGLE_DEG))]
         if not len(rows):
             continue
-        alike = (patches(greys[view], position[rows]) * model[rows]).sum(axis=1)
+        there, _ = camera.project(surface[rows].reshape(-1, 3))
+        alike = (patches(greys[view], np.nan_to_num(there)) * model[rows]).sum(axis=1)
         rows = rows[alike > ALIKE]
         seen[rows, view], at[rows, view] = True, position[rows]
     return seen, at
+
+
+def _units(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def _triangulated(
