@@ -6,7 +6,6 @@ COLMAP measures pixels as cagefield does: the first pixel has its centre at (.5,
 from __future__ import annotations
 
 import contextlib
-import sqlite3
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -27,6 +26,12 @@ OnProgress = Callable[[float, str], None]
 INSTALL = "pip install 'cagefield[colmap]'"
 
 _FATAL = 3  # glog's level that only ends the process
+
+# Work is done in batches, so that progress is known without a look into the database: Python's SQLite and
+# pycolmap's own in one process would break each other's locks (sqlite.org, "How To Corrupt An SQLite
+# Database File", 2.2).
+_PHOTOS_AT_ONCE = 8
+_TILE = 12  # pairs are matched in tiles of so many photos each way, whose descriptors are read once
 
 
 @dataclass(frozen=True)
@@ -139,21 +144,20 @@ def extract(
     if masks is not None:
         reader.mask_path = str(masks)
 
-    def poll() -> None:
+    for start in range(0, len(names), _PHOTOS_AT_ONCE):
+        batch = list(names[start : start + _PHOTOS_AT_ONCE])
+        call(
+            pycolmap.extract_features,
+            database,
+            images,
+            image_names=batch,
+            reader_options=reader,
+            extraction_options=options,
+            device=pycolmap.Device.cpu,
+        )
         if on_progress is not None:
-            done = _rows(database, "descriptors")
-            on_progress(min(1.0, done / len(names)), f"features of {done} of {len(names)} photos")
-
-    call(
-        pycolmap.extract_features,
-        database,
-        images,
-        image_names=list(names),
-        reader_options=reader,
-        extraction_options=options,
-        device=pycolmap.Device.cpu,
-        poll=poll,
-    )
+            done = start + len(batch)
+            on_progress(done / len(names), f"features of {done} of {len(names)} photos")
 
 
 def match(
@@ -174,24 +178,22 @@ def match(
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = seed
     listing = database.with_name(database.name + ".pairs.txt")
-    listing.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in pairs), encoding="utf-8")
-    table = "two_view_geometries" if verify else "matches"
-
-    def poll() -> None:
+    pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing))
+    ordered = sorted(pairs, key=lambda pair: (pair[0] // _TILE, pair[1] // _TILE, pair))
+    for start in range(0, len(ordered), _TILE**2):
+        batch = ordered[start : start + _TILE**2]
+        listing.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in batch), encoding="utf-8")
+        call(
+            pycolmap.match_image_pairs,
+            database,
+            matching_options=options,
+            pairing_options=pairing,
+            verification_options=verification,
+            device=pycolmap.Device.cpu,
+        )
         if on_progress is not None:
-            done = min(_rows(database, table), len(pairs))
-            on_progress(done / max(1, len(pairs)), f"matches of {done} of {len(pairs)} pairs")
-
-    pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing), block_size=64)
-    call(
-        pycolmap.match_image_pairs,
-        database,
-        matching_options=options,
-        pairing_options=pairing,
-        verification_options=verification,
-        device=pycolmap.Device.cpu,
-        poll=poll,
-    )
+            done = start + len(batch)
+            on_progress(done / len(pairs), f"matches of {done} of {len(pairs)} pairs")
     listing.unlink(missing_ok=True)
 
 
@@ -243,17 +245,6 @@ def _vlad(descriptors: npt.NDArray[np.float32], words: npt.NDArray[np.float32]) 
     np.add.at(summed, nearest, descriptors - words[nearest])
     rooted = np.sign(summed.ravel()) * np.sqrt(np.abs(summed.ravel()))
     return np.asarray(rooted / max(np.linalg.norm(rooted), 1e-12), np.float64)
-
-
-def _rows(database: Path, table: str) -> int:
-    """How many rows a table has, 0 while it cannot be read."""
-    try:
-        with contextlib.closing(
-            sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=0.05)
-        ) as source:
-            return int(source.execute(f"SELECT COUNT(*) FROM {table}").fetchone()[0])
-    except sqlite3.Error:
-        return 0
 
 
 def share(on_progress: OnProgress | None, start: float, end: float) -> OnProgress:
