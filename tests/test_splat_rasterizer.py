@@ -85,9 +85,9 @@ def test_extreme_shapes_alone(kind: tuple[int, int]) -> None:
     assert np.sort(error.ravel())[-3] < 2e-3 and error.max() < 1.1 / 255
 
 
-@pytest.mark.parametrize("length", [3.0, 10.0])
+@pytest.mark.parametrize("length", [3.0, 30.0])
 def test_long_thin_splats_with_their_means_far_outside(length: float) -> None:
-    """Lines half a pixel wide, their means up to 500 pixels away: rounding must not fray them."""
+    """Lines half a pixel wide, their means up to 1300 pixels away: rounding must not fray them."""
     view = camera(width=160, height=120)
     right, up = view.c2w[:3, 0], view.c2w[:3, 1]
     along = unit(np.array([[1.0, 0.3], [0.2, 1.0], [1.0, -0.8]]))
@@ -103,7 +103,9 @@ def test_long_thin_splats_with_their_means_far_outside(length: float) -> None:
     got = project(single(splats), view, near=NEAR).picture(COLOUR)
     want = expected(single(splats), view)[..., :4]
     assert np.ptp(want[..., 0]) > 0.3
-    assert db(got - want) > 50.0
+    # Float32 knows a position 1300 pixels away to 1e-4 pixels, and a line .55 wide to as much of its alpha.
+    assert db(got - want) > 65.0
+    assert np.abs(got - want).max() < 1e-2
 
 
 def test_no_splats_and_none_in_sight() -> None:
@@ -152,7 +154,7 @@ def plane(view, normal: NDArray, count: int = 40) -> tuple[DeformedSplats, NDArr
 
 
 @pytest.mark.parametrize("lens", LENSES)
-@pytest.mark.parametrize("slant", [0.0, 60.0])
+@pytest.mark.parametrize("slant", [0.0, 60.0, 80.0])
 def test_distances_and_normals_of_a_plane(lens: str, slant: float) -> None:
     view = camera(lens)
     ahead = unit(view.origin)
@@ -165,8 +167,9 @@ def test_distances_and_normals_of_a_plane(lens: str, slant: float) -> None:
     solid = picture[..., 0] < 1e-2
     assert solid.mean() > 0.1
     error = np.abs(picture[solid][:, 4] / (1.0 - picture[solid][:, 0]) / distance[solid] - 1.0)
+    # Local affine: a splat of .1 units, seen from 4, is off by some of the square of the ratio over cos(80).
     assert np.median(error) < 1e-2
-    assert np.quantile(error, 0.95) < 2e-2
+    assert np.quantile(error, 0.95) < 0.03
     # Towards the camera, whichever way they were given.
     np.testing.assert_allclose(
         unit(picture[solid][:, 5:8]), np.broadcast_to(normal, (solid.sum(), 3)), atol=1e-5

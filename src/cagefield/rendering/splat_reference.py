@@ -21,7 +21,7 @@ from cagefield.rendering.frame import Background, Frame
 
 Array = NDArray[Any]
 
-BLUR, ALPHA_MIN, ALPHA_MAX = 0.3, 1.0 / 255.0, 0.99
+BLUR, SLOPE_BLUR, ALPHA_MIN, ALPHA_MAX = 0.3, 0.02, 1.0 / 255.0, 0.99
 LEAST_COMPENSATION = 0.005
 
 
@@ -67,7 +67,7 @@ def project(
     distance = np.linalg.norm(offset, axis=1)
     along = offset / distance[:, None]
     conics = np.linalg.inv(blurred)
-    slopes = np.einsum("ni,nij,nkj,nkl->nl", along, C, M, conics)
+    slopes = np.einsum("ni,nij,nkj,nkl->nl", along, C, M, np.linalg.inv(flat + SLOPE_BLUR * np.eye(2)))
     turned = along if splats.rotations is None else np.einsum("nji,nj->ni", splats.rotations[rows], along)
     degree = int(np.sqrt(splats.sh.shape[1])) - 1
     colours = 0.5 + np.einsum("nk,nkc->nc", sh.basis(turned, degree), splats.sh[rows].astype(np.float64))

@@ -1,7 +1,7 @@
 """Sorted splats blended in tiles of 16 x 16 pixels, and the gradients of it by hand (Numba).
 
 Notation: at a pixel, splat k (near to far) has alpha a_k = o exp(-d^T Q d / 2), d the pixel minus the
-projected mean, Q the conic (A, B; B, C). With T_k the product of (1 - a_j) over the nearer ones and
+projected mean, d^T Q d = A (x + k y)^2 + D y^2. With T_k the product of (1 - a_j) over the nearer ones and
 w_k = a_k T_k, the pixel's colour is sum_k w_k c_k + T b, b the background.
 
 One flat loop over the pixels of the rows that a splat reaches is what vectorises: state lies in one buffer at
@@ -77,14 +77,15 @@ def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)
-        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        A, k, D, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
         low, high = rows_of(p, y0)
         if with_depth:
             t, tx, ty = p[10], p[11], p[12]
             for i in range(low, high):
                 dx = state[X + i] - mx
                 dy = state[Y + i] - my
-                q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+                l = dx + k * dy
+                q = A * l * l + D * dy * dy
                 a = min(o * exp_negative(-HALF * q), MOST)
                 a = a if a >= LEAST else ZERO
                 w = a * state[i]
@@ -97,7 +98,8 @@ def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
             for i in range(low, high):
                 dx = state[X + i] - mx
                 dy = state[Y + i] - my
-                q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+                l = dx + k * dy
+                q = A * l * l + D * dy * dy
                 a = min(o * exp_negative(-HALF * q), MOST)
                 a = a if a >= LEAST else ZERO
                 w = a * state[i]
@@ -124,12 +126,13 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)
-        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[13], p[14], p[15]
+        A, k, D, o, r, g, b = p[2], p[3], p[4], p[5], p[13], p[14], p[15]
         low, high = rows_of(p, y0)
         for i in range(low, high):
             dx = state[X + i] - mx
             dy = state[Y + i] - my
-            q = dx * (A * dx + B * dy) + dy * (B * dx + C * dy)
+            l = dx + k * dy
+            q = A * l * l + D * dy * dy
             a = min(o * exp_negative(-HALF * q), MOST)
             a = a if a >= LEAST else ZERO
             w = a * state[i]
@@ -164,16 +167,18 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)
-        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        A, k, D, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
         low, high = rows_of(p, y0)
         s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s19 = ZERO
         h0 = h1 = h2 = h3 = h4 = h5 = h6 = h7 = h8 = ZERO
         for i in range(low, high):
             dx = state[X + i] - mx
             dy = state[Y + i] - my
-            ex = A * dx + B * dy
-            ey = B * dx + C * dy
-            full = o * exp_negative(-HALF * (dx * ex + dy * ey))
+            l = dx + k * dy
+            ex = A * l
+            f = D * dy
+            ey = k * ex + f
+            full = o * exp_negative(-HALF * (l * ex + dy * f))
             a = min(full, MOST)
             a = a if a >= LEAST else ZERO
             T = state[i]
@@ -255,7 +260,8 @@ def opacity_before(packed, ids, starts, across, pixels, distances, out):
             p = packed[ids[e]]
             dx, dy = x - p[0], y - p[1]
             if p[10] + p[11] * dx + p[12] * dy < distances[n]:
-                a = p[5] * np.exp(-HALF * (dx * (p[2] * dx + p[3] * dy) + dy * (p[3] * dx + p[4] * dy)))
+                l = dx + p[3] * dy
+                a = p[5] * np.exp(-HALF * (p[2] * l * l + p[4] * dy * dy))
                 if a >= LEAST:
                     through *= ONE - min(a, MOST)
         out[n] = ONE - through

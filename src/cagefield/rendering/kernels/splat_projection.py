@@ -38,10 +38,16 @@ LEAST_COMPENSATION = 0.005
 PINHOLE, OPENCV, FISHEYE = 0, 1, 2
 
 PACKED = 16
-"""Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, B, C,
-5 opacity,
+"""Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, k, D
+(the quadratic form is A (x + k y)^2 + D y^2: no difference of large numbers far from the mean), 5 opacity,
 6-8 colour, 9 half-height of what is above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its slope
 per pixel, 13-15 normal."""
+
+SLOPE_BLUR = 0.02
+"""Variance, in pixels^2, with which the slope of the distance is found: BLUR would level slanted splats."""
+
+MOST_VARIANCE = 1e30
+"""Splats of larger variances, in world units^2, are not drawn."""
 
 FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
 """Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
@@ -176,6 +182,8 @@ def project(
         M = np.empty((2, 3))
         jacobian(x, y, z, W, fx, fy, limits, model, coefficients, M)
         C = covariances[i]
+        if not C[0] + C[3] + C[5] < MOST_VARIANCE:
+            continue
         v00 = M[0, 0] * C[0] + M[0, 1] * C[1] + M[0, 2] * C[2]
         v01 = M[0, 0] * C[1] + M[0, 1] * C[3] + M[0, 2] * C[4]
         v02 = M[0, 0] * C[2] + M[0, 1] * C[4] + M[0, 2] * C[5]
@@ -185,16 +193,19 @@ def project(
         a = v00 * M[0, 0] + v01 * M[0, 1] + v02 * M[0, 2]
         b = v00 * M[1, 0] + v01 * M[1, 1] + v02 * M[1, 2]
         c = v10 * M[1, 0] + v11 * M[1, 1] + v12 * M[1, 2]
-        sharp = a * c - b * b
-        a += BLUR
-        c += BLUR
-        det = a * c - b * b
+        # Rounded covariances may be indefinite.
+        sharp = max(0.0, a * c - b * b)
+        det = sharp + BLUR * (a + c + BLUR)
+        slope_det = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR)
         o = np.float64(opacities[i])
         if antialiased:
-            o *= max(LEAST_COMPENSATION, np.sqrt(max(sharp, 0.0) / det))
+            o *= max(LEAST_COMPENSATION, np.sqrt(sharp / det))
         reach = 2.0 * np.log(o / ALPHA_MIN)
-        if not (reach > 0.0 and det > 0.0):
+        if not reach > 0.0:
             continue
+        a_slope, c_slope = a + SLOPE_BLUR, c + SLOPE_BLUR
+        a += BLUR
+        c += BLUR
         xd, yd, _, _, _, _ = distort(x / z, y / z, model, coefficients)
         u = fx * xd + centre[0]
         v = fy * yd + centre[1]
@@ -202,16 +213,16 @@ def project(
         ry = np.sqrt(reach * c)
         if not (u + rx > 0.0 and v + ry > 0.0 and u - rx < size[0] and v - ry < size[1]):
             continue
-        tiles[i, 0] = max(0, int(np.floor((u - rx) / TILE)))
-        tiles[i, 1] = min(across, int(np.floor((u + rx) / TILE)) + 1)
-        tiles[i, 2] = max(0, int(np.floor((v - ry) / TILE)))
-        tiles[i, 3] = min(down, int(np.floor((v + ry) / TILE)) + 1)
+        tiles[i, 0] = int(max(0.0, (u - rx) / TILE))
+        tiles[i, 1] = int(min(across - 1.0, (u + rx) / TILE)) + 1
+        tiles[i, 2] = int(max(0.0, (v - ry) / TILE))
+        tiles[i, 3] = int(min(down - 1.0, (v + ry) / TILE)) + 1
         row = packed[i]
         row[0] = u - 0.5
         row[1] = v - 0.5
         row[2] = c / det
-        row[3] = -b / det
-        row[4] = a / det
+        row[3] = -b / c
+        row[4] = 1.0 / c
         row[5] = o
         row[9] = ry
         distance = np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -219,8 +230,8 @@ def project(
         row[10] = distance
         along_u = ex * v00 + ey * v01 + ez * v02
         along_v = ex * v10 + ey * v11 + ez * v12
-        row[11] = (along_u * c - along_v * b) / det
-        row[12] = (along_v * a - along_u * b) / det
+        row[11] = (along_u * c_slope - along_v * b) / slope_det
+        row[12] = (along_v * a_slope - along_u * b) / slope_det
         if with_normals:
             facing = normals[i, 0] * ex + normals[i, 1] * ey + normals[i, 2] * ez
             sign = -1.0 if facing > 0.0 else 1.0
@@ -250,15 +261,16 @@ def overlaps(p, across, down):
     y1 = y0 + (TILE - 1)
     if x0 <= 0.0 and x1 >= 0.0 and y0 <= 0.0 and y1 >= 0.0:
         return True
-    A, B, C = p[2], p[3], p[4]
+    A, k, D = p[2], p[3], p[4]
     least = 1e30
     for side in range(2):
         y = y0 if side == 0 else y1
-        x = clamped(-B * y / A, x0, x1)
-        least = min(least, A * x * x + 2.0 * B * x * y + C * y * y)
+        l = clamped(-k * y, x0, x1) + k * y
+        least = min(least, A * l * l + D * y * y)
         x = x0 if side == 0 else x1
-        y = clamped(-B * x / C, y0, y1)
-        least = min(least, A * x * x + 2.0 * B * x * y + C * y * y)
+        y = clamped(-A * k * x / (A * k * k + D), y0, y1)
+        l = x + k * y
+        least = min(least, A * l * l + D * y * y)
     return least < 2.0 * np.log(p[5] / ALPHA_MIN)
 
 
