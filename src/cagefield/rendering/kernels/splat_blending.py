@@ -24,10 +24,10 @@ from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, ALPHA_MIN, A
 
 F, U = np.float32, np.uint64
 LEAST, MOST = F(ALPHA_MIN), F(ALPHA_MAX)
-ZERO, ONE, HALF, EIGHTH = F(0), F(1), F(0.5), F(1 / 8)
+ZERO, ONE, HALF, MINUS_16TH = F(0), F(1), F(0.5), F(-1 / 16)
 T_MIN = F(1e-3)
-P_MIN = F(-8)
-"""Exponents below this are this: alpha is then below ALPHA_MIN whatever the opacity."""
+Q_MAX = F(16)
+"""Larger values of the quadratic form are this: alpha is then below ALPHA_MIN whatever the opacity."""
 E1, E2, E3, E4, E5 = F(0.99997018), F(0.49960978), F(0.16494888), F(0.03824679), F(0.00505834)
 """Of the polynomial 1 + E1 x + ... that has the least largest relative error to exp(x) on [-1, 0]: 8e-7."""
 ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8 = (U(AREA * k) for k in range(1, 9))
@@ -42,9 +42,9 @@ SUMS = 20
 
 
 @njit(inline="always", **FAST)
-def exp_negative(p):
-    """exp(p) for p in [P_MIN, 0], to 1e-5 of it: a polynomial of p/8, squared three times."""
-    x = max(p, P_MIN) * EIGHTH
+def falloff(q):
+    """exp(-q/2) for q in [0, Q_MAX], to 1e-5 of it: a polynomial of -q/16, squared three times."""
+    x = min(q, Q_MAX) * MINUS_16TH
     y = ONE + x * (E1 + x * (E2 + x * (E3 + x * (E4 + x * E5))))
     y = y * y
     y = y * y
@@ -86,7 +86,7 @@ def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
                 dy = state[Y + i] - my
                 l = dx + k * dy
                 q = A * l * l + D * dy * dy
-                a = min(o * exp_negative(-HALF * q), MOST)
+                a = min(o * falloff(q), MOST)
                 a = a if a >= LEAST else ZERO
                 w = a * state[i]
                 state[ROW1 + i] += w * r
@@ -100,7 +100,7 @@ def blend_tile(state, packed, ids, begin, end, x0, y0, with_depth):
                 dy = state[Y + i] - my
                 l = dx + k * dy
                 q = A * l * l + D * dy * dy
-                a = min(o * exp_negative(-HALF * q), MOST)
+                a = min(o * falloff(q), MOST)
                 a = a if a >= LEAST else ZERO
                 w = a * state[i]
                 state[ROW1 + i] += w * r
@@ -133,7 +133,7 @@ def blend_normals_tile(state, packed, ids, begin, end, x0, y0):
             dy = state[Y + i] - my
             l = dx + k * dy
             q = A * l * l + D * dy * dy
-            a = min(o * exp_negative(-HALF * q), MOST)
+            a = min(o * falloff(q), MOST)
             a = a if a >= LEAST else ZERO
             w = a * state[i]
             state[ROW1 + i] += w * r
@@ -178,7 +178,7 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
             ex = A * l
             f = D * dy
             ey = k * ex + f
-            full = o * exp_negative(-HALF * (l * ex + dy * f))
+            full = o * falloff(l * ex + dy * f)
             a = min(full, MOST)
             a = a if a >= LEAST else ZERO
             T = state[i]
