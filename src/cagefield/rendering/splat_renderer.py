@@ -48,7 +48,7 @@ class SplatRenderer:
         self.field = field
         self.edits = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
-        self.splats: DeformedSplats = deformed_splats(field, self.edits)
+        self.splats: DeformedSplats = deformed_splats(field, self.edits, preserve_opacity=preserve_opacity)
         self._buffers = Buffers()
         self._normals: Float32 | None = None
 
@@ -62,7 +62,7 @@ class SplatRenderer:
     ) -> SplatRenderer:
         """A renderer of the same field under other edits.
 
-        `coarse` evaluates shells from coarse lattices: ready sooner, slightly off. `proceed` is called now
+        `coarse` integrates flow shells with long steps: ready sooner, slightly off. `proceed` is called now
         and then, and gives the renderer up by raising.
         """
         other = object.__new__(SplatRenderer)
@@ -70,7 +70,9 @@ class SplatRenderer:
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
-        other.splats = deformed_splats(self.field, edits, coarse=coarse, proceed=proceed)
+        other.splats = deformed_splats(
+            self.field, edits, preserve_opacity=other.preserve_opacity, coarse=coarse, proceed=proceed
+        )
         other._normals = None
         return other
 

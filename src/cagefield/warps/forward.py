@@ -1,0 +1,97 @@
+"""A warp's map to deformed space at many points, soon: for splats, which are taken there and not sampled.
+
+Everything but the flow shell is the float64 reference, which is vectorised. A flow shell goes forwards
+through its steps by a kernel, where the reference inverts the way back: they differ by the error of the
+integration, which falls with the fourth power of the step. On boxes of half-size .3 in .8, turned by 140
+degrees and scaled by 1.2, that is 3e-8 of the scene, and 4e-6 in the Jacobian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cagefield.hexahedron import Array
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.flow_table import table_along
+from cagefield.warps.maps import Mapped, Warp
+
+COARSE_STRAIN = 1.0
+"""Strain of a step (see `FlowShell`) while something moves: as for lattices of 32^3 nodes.
+
+On the boxes above it costs 2e-7 of the scene for a translation, 2e-3 for the turn by 140 degrees.
+"""
+
+CHUNK = 65_536
+"""Points mapped between two calls of `proceed`."""
+
+
+def to_deformed(
+    warp: Warp, points: Array, *, coarse: bool = False, proceed: Callable[[], None] | None = None
+) -> Mapped:
+    """Canonical points [N,3] in deformed space, as `warp.to_deformed`.
+
+    `coarse` takes a flow shell with long steps. `proceed` is called now and then, and gives the map up by
+    raising.
+    """
+    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+        shell = warp.shell.with_strain(COARSE_STRAIN) if coarse else warp.shell
+        warp = replace(warp, shell=_ForwardFlow(shell, coarse))
+    parts = []
+    for first in range(0, max(len(points), 1), CHUNK):
+        if proceed is not None:
+            proceed()
+        parts.append(warp.to_deformed(points[first : first + CHUNK]))
+    if len(parts) == 1:
+        return parts[0]
+    return Mapped(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.jacobian for part in parts]),
+        np.concatenate([part.lost for part in parts]),
+    )
+
+
+@dataclass(frozen=True)
+class _ForwardFlow:
+    """A flow shell whose way to deformed space is the kernel's."""
+
+    flow: FlowShell
+    coarse: bool
+
+    def to_canonical(self, points: Array) -> tuple[Array, Array]:
+        """As the flow shell."""
+        return self.flow.to_canonical(points)
+
+    def to_deformed(self, points: Array) -> tuple[Array, Array]:
+        """(deformed points [N,3], Jacobians [N,3,3]) of canonical points [N,3] in the shell."""
+        from cagefield.warps.kernels.flow_forward import march
+
+        motion = self.flow.motion
+        moved, jacobian = np.empty_like(points), np.empty((len(points), 3, 3))
+        lost = np.empty(len(points), dtype=bool)
+        steps, followed = (2, 5e-2) if self.coarse else (3, 1e-4)
+        march(
+            np.ascontiguousarray(points),
+            table_along(self.flow, self.flow.knots),
+            not motion.confines.is_affine,
+            not motion.is_affine,
+            steps,
+            followed,
+            moved,
+            jacobian,
+            lost,
+        )
+        if lost.any():
+            moved[lost], jacobian[lost] = self.flow.to_deformed(points[lost])
+        return moved, jacobian
+
+    def least_ratio(self) -> float:
+        """As the flow shell."""
+        return self.flow.least_ratio()
+
+    def problem(self) -> str | None:
+        """As the flow shell."""
+        return self.flow.problem()

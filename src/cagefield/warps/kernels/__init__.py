@@ -1,0 +1,1 @@
+"""Kernels of the warps for many points at once (Numba)."""
