@@ -13,8 +13,8 @@ from cagefield.rendering.deformed_splats import DeformedSplats, rotation_matrice
 NEAR = 0.3
 LENSES = {
     "pinhole": (),
-    "opencv": (-0.12, 0.05, 0.004, -0.003),
-    "opencv_fisheye": (0.05, -0.01, 0.002, -0.001),
+    "opencv": (-0.12, 0.05, 0.04, -0.03),
+    "opencv_fisheye": (0.1, -0.03, 0.02, -0.01),
 }
 
 

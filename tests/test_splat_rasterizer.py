@@ -22,6 +22,8 @@ from cagefield.rendering.splat_rasterizer import (
     tiled,
     untiled,
 )
+from cagefield.rendering.splat_renderer import SplatRenderer
+from splat_scenes import random_splats
 from splat_views import LENSES, NEAR, all_kinds, camera, parameters, single, splats_of, unit
 
 
@@ -251,6 +253,28 @@ def test_threads_that_ask_at_once_get_their_own_pictures() -> None:
     def ask(n: int) -> None:
         for _ in range(15):
             if not np.array_equal(project(scenes[n], view, near=NEAR).picture(), want[n]):
+                wrong.append(n)
+
+    threads = [threading.Thread(target=ask, args=(n,)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_threads_that_share_a_renderer_get_their_own_pictures() -> None:
+    renderer = SplatRenderer(random_splats(400))
+    views = [camera(), camera("opencv"), camera("opencv_fisheye", 64, 64), camera(width=40)]
+    want = [renderer.render(view).rgb for view in views]
+    pixels, distances = np.full((50, 2), 20.0), np.linspace(0.0, 6.0, 50)
+    gathered = [renderer.opacity_before(view, pixels, distances) for view in views]
+    wrong: list[int] = []
+
+    def ask(n: int) -> None:
+        for _ in range(15):
+            same = np.array_equal(renderer.render(views[n]).rgb, want[n])
+            if not (same and (renderer.opacity_before(views[n], pixels, distances) == gathered[n]).all()):
                 wrong.append(n)
 
     threads = [threading.Thread(target=ask, args=(n,)) for n in range(4)]

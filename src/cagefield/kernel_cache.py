@@ -1,6 +1,6 @@
-"""The folder in which Quadrants keeps compiled kernels.
+"""The folders in which compiled kernels are kept: those of Quadrants, and those of Numba.
 
-Where it cannot be used, or fails in the middle, a warning says so, and every process compiles its own.
+Where one cannot be used, or fails in the middle, a warning says so, and every process compiles its own.
 """
 
 from __future__ import annotations
@@ -38,21 +38,14 @@ def kernel_cache() -> Path | None:
     states of the packages that hold kernels must not share a folder. Folders that nobody used for long are
     removed.
     """
-    place = "~/.cache/cagefield/kernels"
-    try:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
-        place = str(base)
-        folder = base / _source_digest()
-        # Quadrants ends the process where it cannot make this folder in its own.
-        lock = folder / "kernel_compilation_manager" / "qdcache.lock"
-        lock.parent.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)
-        if not all(map(_is_usable, (folder, *folder.rglob("*")))):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except (OSError, RuntimeError) as error:
-        _warn(place, error)
+    # Quadrants ends the process where it cannot make this folder in its own.
+    folder = cache_folder(_source_digest(), "kernel_compilation_manager")
+    if folder is None:
         return None
-    _tidy(folder, lock)
+    lock = folder / "kernel_compilation_manager" / "qdcache.lock"
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
+            lock.unlink()
     if _is_held(lock):
         warnings.warn(
             f"another process holds {lock}, so this one compiles its own kernels; "
@@ -60,6 +53,26 @@ def kernel_cache() -> Path | None:
             stacklevel=3,
         )
         return None
+    return folder
+
+
+def cache_folder(name: str, within: str = "") -> Path | None:
+    """The folder `name` of compiled kernels, made where it is missing, with the folder `within` in it.
+
+    None, with a warning, where it cannot be used. Folders beside it that nobody used for long are removed.
+    """
+    place: str | Path = "~/.cache/cagefield/kernels"
+    try:
+        place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
+        folder = place / name
+        (folder / within).mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        if not all(map(_is_usable, (folder, *folder.rglob("*")))):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except (OSError, RuntimeError) as error:
+        tell_that_none_are_kept(place, error)
+        return None
+    _tidy(folder)
     return folder
 
 
@@ -76,7 +89,7 @@ def forgive() -> None:
                 return method(cache, *args)
             except OSError as error:
                 if not told:
-                    _warn(str(Path(cache.cache_folder).parent), error)
+                    tell_that_none_are_kept(Path(cache.cache_folder).parent, error)
                 told.append(error)
                 return None
 
@@ -100,7 +113,8 @@ def _is_usable(part: Path) -> bool:
     return os.access(part, os.R_OK | os.W_OK | (os.X_OK if part.is_dir() else 0)) or not part.exists()
 
 
-def _warn(place: str, error: Exception) -> None:
+def tell_that_none_are_kept(place: str | Path, error: Exception) -> None:
+    """Warns that kernels are not kept in a folder."""
     reason = getattr(error, "strerror", None) or error
     warnings.warn(
         f"compiled kernels cannot be kept in {place} ({reason}), so every process compiles its own; "
@@ -109,16 +123,13 @@ def _warn(place: str, error: Exception) -> None:
     )
 
 
-def _tidy(folder: Path, lock: Path) -> None:
-    """Removes what nobody needs beside a folder of kernels, and the lock of a process that died with it."""
+def _tidy(folder: Path) -> None:
+    """Removes the folders beside one of kernels that nobody needs."""
     with contextlib.suppress(OSError):
         for other in list(folder.parent.iterdir()):
             with contextlib.suppress(OSError):
                 if time.time() - other.stat().st_mtime > KEPT_SECONDS:
                     shutil.rmtree(other, ignore_errors=True)
-    with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
-            lock.unlink()
 
 
 def _is_held(lock: Path) -> bool:

@@ -125,9 +125,13 @@ class Projection:
 
 
 class Buffers:
-    """Memory that one owner's projections share; a projection is valid until its owner makes the next."""
+    """Memory that one owner's projections share; a projection is valid until its owner makes the next.
+
+    Threads that share an owner hold `lock` from a projection to the last use of it.
+    """
 
     def __init__(self) -> None:
+        self.lock = threading.RLock()
         self._arrays: dict[str, NDArray[Any]] = {}
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:

@@ -102,10 +102,12 @@ class SplatRenderer:
                 )
         if should_stop is not None and should_stop():
             return None
-        seen = self.project(camera, near=near, region=region, normals=normals)
-        if should_stop is not None and should_stop():
-            return None
-        return _frame(seen.picture(NORMALS if normals else DEPTH), background, normals)
+        with self._buffers.lock:
+            seen = self.project(camera, near=near, region=region, normals=normals)
+            if should_stop is not None and should_stop():
+                return None
+            picture = seen.picture(NORMALS if normals else DEPTH)
+        return _frame(picture, background, normals)
 
     def project(
         self, camera: Camera, *, near: float = 0.0, region: Region | None = None, normals: bool = False
@@ -130,7 +132,8 @@ class SplatRenderer:
         pixels = np.asarray(pixels, np.float64)
         if len(pixels) and not ((pixels >= 0) & (pixels < (camera.width, camera.height))).all():
             raise CagefieldError(f"pixels must lie inside the picture of {camera.width}x{camera.height}")
-        return self.project(camera).opacity_before(pixels, np.asarray(distances))
+        with self._buffers.lock:
+            return self.project(camera).opacity_before(pixels, np.asarray(distances))
 
 
 def flattest_axes(covariances: Float32) -> Float32:

@@ -18,9 +18,10 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
-from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, ALPHA_MIN, AREA, FAST, TILE
+from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, ALPHA_MIN, AREA, TILE
 
 F, U = np.float32, np.uint64
 LEAST, MOST = F(ALPHA_MIN), F(ALPHA_MAX)

@@ -17,12 +17,11 @@ Real-Time Radiance Field Rendering" (2023), equation 5; Yu et al., "Mip-Splattin
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from cagefield import sh as harmonics
+from cagefield.rendering.kernels.compiling import FAST, njit
 
 TILE = 16
 AREA = TILE * TILE
@@ -48,9 +47,6 @@ SLOPE_BLUR = 0.02
 
 MOST_VARIANCE = 1e30
 """Splats of larger variances, in world units^2, are not drawn."""
-
-FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
-"""Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
 
 C0, C1 = harmonics.C0, harmonics.C1
 C20, C21, C22, C23, C24 = harmonics.C2

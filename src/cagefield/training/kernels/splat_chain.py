@@ -21,11 +21,11 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from cagefield.rendering.kernels.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import (
     BLUR,
-    FAST,
     LEAST_COMPENSATION,
     clamped,
     distort,

@@ -13,9 +13,10 @@ Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
-from cagefield.rendering.kernels.splat_projection import AREA, FAST, TILE, harmonics_at
+from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.rendering.kernels.splat_projection import AREA, TILE, harmonics_at
 
 MOMENTS, RUNNING = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
