@@ -65,6 +65,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.import_nerf import ImportNerf
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
+    from cagefield.cli.poses import Poses
     from cagefield.cli.render import Render
     from cagefield.cli.train import Train
     from cagefield.cli.view import View
@@ -72,6 +73,7 @@ def parse(args: list[str]) -> Command | int:
     commands = (
         Annotated[Demo, tyro.conf.subcommand("demo")]
         | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
+        | Annotated[Poses, tyro.conf.subcommand("poses")]
         | Annotated[Train, tyro.conf.subcommand("train")]
         | Annotated[ImportNerf, tyro.conf.subcommand("import")]
         | Annotated[Bake, tyro.conf.subcommand("bake")]

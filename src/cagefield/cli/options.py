@@ -31,17 +31,20 @@ class PhotoOptions:
     """Which photos are used."""
 
     data: tyro.conf.Positional[Path]
-    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model."""
+    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model; for training also a
+    folder of photos alone or a video, whose poses are then found first."""
     downscale: int | None = None
     """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
 
-    def load(self) -> Dataset:
-        """The data set."""
+    def load(self, posed_in: Path | None = None) -> Dataset:
+        """The data set; photos without poses get them first, in the folder `posed_in` where it is given."""
+        from cagefield.cli.poses import posed
         from cagefield.datasets import load_dataset
 
-        return load_dataset(self.data, downscale=self.downscale, holdout=self.holdout)
+        data = self.data if posed_in is None else posed(self.data, posed_in)
+        return load_dataset(data, downscale=self.downscale, holdout=self.holdout)
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ class Train:
                 f"{checkpoint} is an interrupted training; give --resume to go on, or --overwrite"
             )
         config = self.training.config()
-        dataset = self.photos.load()
+        dataset = self.photos.load(posed_in=target.with_name(target.name + ".poses"))
         devices.start(self.device)
         target.parent.mkdir(parents=True, exist_ok=True)
         if self.field == "nerf":

@@ -6,11 +6,14 @@ from pathlib import Path
 
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
+from cagefield.datasets.raw_photos import find_raw_photos, is_video
 from cagefield.datasets.transforms import load_transforms
 from cagefield.datasets.views import Dataset, View, check_holdout
 from cagefield.errors import DatasetError
 
-__all__ = ["Dataset", "View", "load_dataset"]
+__all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
+
+_TRANSFORMS = ("transforms.json", "transforms_train.json")
 
 
 def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int = 8) -> Dataset:
@@ -38,15 +41,32 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
             return load_llff(path, downscale, holdout)
         if path.name in MODEL_FILES:
             return load_colmap(path.parent, downscale, holdout)
+        if is_video(path):
+            raise DatasetError(
+                f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
+            )
         raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
-    if any((path / name).is_file() for name in ("transforms_train.json", "transforms.json")):
+    if any((path / name).is_file() for name in _TRANSFORMS):
         return load_transforms(path, downscale, holdout)
     if (path / POSES_FILE).is_file():
         return load_llff(path, downscale, holdout)
     if find_model(path) is not None:
         return load_colmap(path, downscale, holdout)
+    if has_photos_alone(path):
+        raise DatasetError(
+            f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield train "
+            "does that by itself)"
+        )
     raise DatasetError(
-        f"{path}: no camera file; looked for transforms.json, transforms_train.json, {POSES_FILE} and a "
-        "COLMAP model (sparse/0/cameras.bin or .txt). Photos alone have no poses: "
-        "run COLMAP or ns-process-data on them"
+        f"{path}: no camera file; looked for {', '.join(_TRANSFORMS)}, {POSES_FILE} and a COLMAP model "
+        "(sparse/0/cameras.bin or .txt), and there are no photos either"
     )
+
+
+def has_photos_alone(path: Path) -> bool:
+    """Whether `path` is a video, or a folder of photos without a file of their cameras."""
+    if path.is_file():
+        return is_video(path)
+    if not path.is_dir() or any((path / name).is_file() for name in (*_TRANSFORMS, POSES_FILE)):
+        return False
+    return find_model(path) is None and bool(find_raw_photos(path))

@@ -1,0 +1,99 @@
+"""`cagefield poses`: a data set of photos alone, or of a video."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tyro
+
+from cagefield.cli.options import Flag, Output, check_folder, progress_bar
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.datasets.structure_from_motion import PosesReport
+
+_LISTED = 20  # photos named at the end, at most
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Find out where photos were taken: a data set of a folder of photos or a video, ready for training.
+
+    Ctrl-C keeps what is done so far; the same command goes on.
+    """
+
+    photos: tyro.conf.Positional[Path]
+    """Folder of photos (EXIF orientation is applied), or a video."""
+    out: Output
+    """Folder of the data set."""
+    frames: int = 80
+    """How many frames of a video to take: the sharpest, evenly along it."""
+    overwrite: Flag = False
+    """Replace the data set that is there."""
+
+    def run(self) -> None:
+        """Makes the data set; prints what became of the photos."""
+        from cagefield.datasets.structure_from_motion import RECORD
+
+        if self.frames < 3:
+            raise CagefieldError(f"--frames is {self.frames}; it must be at least 3")
+        check_folder(self.out, self.overwrite, RECORD)
+        print(make(self.photos, self.out, self.frames))
+        print(f"data set written to {self.out}; next: cagefield train {self.out} -o SCENE")
+
+
+def make(photos: Path, target: Path, frames: int = 80) -> str:
+    """Writes the data set `target` of photos or a video, with a progress bar; returns lines about it."""
+    from cagefield.datasets.structure_from_motion import make_poses, work_folder
+
+    start = time.monotonic()
+    try:
+        with progress_bar("Finding poses") as move:
+            report = make_poses(
+                photos.expanduser(),
+                target,
+                frames=frames,
+                on_progress=lambda done, note: move(done, 1.0, note),
+            )
+    except KeyboardInterrupt:
+        if work_folder(target).is_dir():
+            print(f"stopped; what is done is kept in {work_folder(target)}, the same command goes on")
+        raise
+    return summary(report, time.monotonic() - start)
+
+
+def posed(photos: Path, target: Path) -> Path:
+    """The data set to be trained on: `photos` itself where it has poses, else made of it in `target`.
+
+    A data set that was made of the same photos before is used again.
+    """
+    from cagefield.datasets.dataset import has_photos_alone
+    from cagefield.datasets.structure_from_motion import RECORD, is_made_of
+
+    photos = photos.expanduser()
+    if not has_photos_alone(photos):
+        return photos
+    if is_made_of(target, photos):
+        print(f"{photos} has no poses; those in {target} were found before")
+        return target
+    check_folder(target, True, RECORD)
+    print(f"{photos} has no poses; finding them first, into {target}", flush=True)
+    print(make(photos, target), flush=True)
+    return target
+
+
+def summary(report: PosesReport, seconds: float) -> str:
+    """Lines: how many photos found their place, points, error and time; then the other photos."""
+    took = f"{seconds / 60:.1f} min" if seconds >= 60 else f"{seconds:.0f} s"
+    lines = [
+        f"{report.placed} of {report.total} photos found their place in {took}; {report.points} points, "
+        f"mean reprojection error {report.error:.2f} pixels"
+    ]
+    listed = sorted(report.left_out.items())
+    lines += [f"  left out: {name}: {reason}" for name, reason in listed[:_LISTED]]
+    if len(listed) > _LISTED:
+        lines.append(f"  and {len(listed) - _LISTED} more, see {report.folder / 'poses.json'}")
+    return "\n".join(lines)

@@ -1,0 +1,194 @@
+"""Photos as they come from a camera, and videos: found, turned upright, and judged by their sharpness."""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageOps
+from scipy.ndimage import laplace
+
+from cagefield.datasets.photos import EXTENSIONS
+from cagefield.errors import DatasetError
+
+VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
+
+OTHER_PHOTOS = (".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
+"""Photos that may not be readable: named where they are left out."""
+
+_SHARPNESS_SIDE = 640  # pixels of the longer side at which sharpness is measured
+_DIAGONAL = 43.267  # millimetres of a 36 x 24 film's frame, which EXIF's 35 mm focal lengths refer to
+_FOCAL_35 = 0xA405  # EXIF: FocalLengthIn35mmFilm
+_EXIF_IFD = 0x8769
+_ORIENTATION = 0x0112
+_MIDDLE = 0.6  # share of a frame's stretch of the video in whose middle the sharpest is taken
+
+
+@dataclass(frozen=True)
+class RawPhoto:
+    """An upright photo on disk: `focal` in pixels where the camera wrote it, `sharpness` to compare by."""
+
+    name: str
+    path: Path
+    width: int
+    height: int
+    focal: float | None
+    sharpness: float
+    alpha: bool
+
+
+def is_video(path: Path) -> bool:
+    """Whether this is a video's file, by its name."""
+    return path.is_file() and path.suffix.lower() in VIDEOS
+
+
+def find_raw_photos(folder: Path) -> list[Path]:
+    """The photos in a folder and below, by name; hidden files and folders are left out."""
+    known = {*EXTENSIONS, *OTHER_PHOTOS}
+    found = [
+        file
+        for file in folder.rglob("*")
+        if file.suffix.lower() in known
+        and file.is_file()
+        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
+    ]
+    return sorted(found, key=lambda file: file.relative_to(folder).as_posix())
+
+
+def upright(source: Path, name: str, folder: Path) -> RawPhoto:
+    """The photo `source` in `folder`, under `name`, turned as its EXIF orientation says.
+
+    The file is copied where nothing has to change; else it is written anew, as PNG with alpha and as JPEG
+    without, and its name gets that extension.
+
+    Raises DatasetError where it cannot be read.
+    """
+    try:
+        with Image.open(source) as image:
+            image.load()
+            exif = image.getexif()
+            focal_35 = exif.get_ifd(_EXIF_IFD).get(_FOCAL_35) or 0
+            turned = ImageOps.exif_transpose(image)
+            as_it_is = exif.get(_ORIENTATION, 1) == 1 and source.suffix.lower() in EXTENSIONS
+    except Exception as error:  # Pillow raises whatever its decoders do
+        wanted = "convert it to JPEG" if source.suffix.lower() in OTHER_PHOTOS else "replace the file"
+        raise DatasetError(f"{source}: cannot be read as a photo; {wanted}") from error
+    alpha = turned.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in turned.info
+    plain = turned.mode in ("L", "RGB", "RGBA", "LA", "P", "CMYK", "YCbCr")
+    target = folder / name
+    if as_it_is and plain:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(source, target)
+    else:
+        name += ".png" if alpha else ".jpg"
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        converted = _eight_bit(turned).convert("RGBA" if alpha else "RGB")
+        converted.info.pop("exif", None)
+        if alpha:
+            converted.save(target, compress_level=1)
+        else:
+            converted.save(target, quality=95, subsampling=0)
+    width, height = turned.size
+    focal = float(focal_35) * float(np.hypot(width, height)) / _DIAGONAL
+    grey = _eight_bit(turned).convert("L")
+    return RawPhoto(name, target, width, height, focal or None, sharpness(grey), alpha)
+
+
+def sharpness(grey: Image.Image) -> float:
+    """Variance of the Laplacian of the photo, shrunk to 640 pixels, over the variance of its grey values."""
+    scale = min(1.0, _SHARPNESS_SIDE / max(grey.size))
+    size = max(1, round(grey.width * scale)), max(1, round(grey.height * scale))
+    return _sharpness(np.asarray(grey.resize(size, Image.Resampling.BOX), dtype=np.float32))
+
+
+def video_frames(
+    video: Path, count: int, folder: Path, on_progress: Callable[[float, str], None] | None = None
+) -> list[Path]:
+    """About `count` frames of a video in `folder`, upright, evenly along it: the sharpest of each stretch.
+
+    Raises DatasetError where the video cannot be read, or is shorter than `count` frames.
+    """
+    if count < 3:
+        raise DatasetError(f"frames must be at least 3, got {count}")
+    values = []
+    for values_so_far, frame in enumerate(_small_frames(video), start=1):
+        values.append(_sharpness(frame.astype(np.float32)))
+        if on_progress is not None and values_so_far % 30 == 0:
+            on_progress(0.0, f"{values_so_far} frames of the video looked at")
+    if len(values) < 3:
+        raise DatasetError(f"{video}: holds {len(values)} frames that can be read; give a longer video")
+    chosen = sharpest_frames(np.array(values), count)
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = "+".join(f"eq(n\\,{index})" for index in chosen)
+    _run(
+        video,
+        ["-vf", f"select={wanted}", "-fps_mode", "passthrough", "-q:v", "1", "-qmin", "1"],
+        folder / "frame_%04d.jpg",
+    )
+    frames = sorted(folder.glob("frame_*.jpg"))
+    if len(frames) < 3:
+        raise DatasetError(f"{video}: its frames cannot be read; convert it to MP4")
+    return frames
+
+
+def sharpest_frames(values: npt.NDArray[np.float64], count: int) -> list[int]:
+    """The frames, of which `values` is the sharpness, that are sharpest within `count` even stretches.
+
+    Only the middle of each stretch counts, so that neighbours stay apart.
+    """
+    count = min(count, len(values))
+    edges = np.linspace(0, len(values), count + 1)
+    chosen = []
+    for start, end in itertools.pairwise(edges):
+        margin = 0.5 * (1.0 - _MIDDLE) * (end - start)
+        first = min(int(np.ceil(start + margin)), int(np.ceil(end)) - 1)
+        last = max(int(np.ceil(end - margin)), first + 1)
+        chosen.append(first + int(np.argmax(values[first:last])))
+    return chosen
+
+
+def _small_frames(video: Path, width: int = 320, height: int = 240) -> Iterator[npt.NDArray[np.uint8]]:
+    """All frames, grey, [height,width]; whatever the video's aspect is."""
+    command = [
+        *_ffmpeg(video), "-vf", f"scale={width}:{height}", "-pix_fmt", "gray", "-fps_mode", "passthrough",
+        "-f", "rawvideo", "-",
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        try:
+            assert process.stdout is not None
+            while len(data := process.stdout.read(width * height)) == width * height:
+                yield np.frombuffer(data, dtype=np.uint8).reshape(height, width)
+        finally:
+            process.kill()
+
+
+def _ffmpeg(video: Path) -> list[str]:
+    import imageio_ffmpeg
+
+    return [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y", "-i", str(video)]
+
+
+def _run(video: Path, options: list[str], target: Path) -> None:
+    done = subprocess.run([*_ffmpeg(video), *options, str(target)], capture_output=True, text=True)
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or ["ffmpeg failed"]
+        raise DatasetError(f"{video}: its frames cannot be read ({lines[-1]}); convert it to MP4")
+
+
+def _sharpness(grey: npt.NDArray[np.float32]) -> float:
+    return float(laplace(grey).var() / (grey.var() + 1.0))
+
+
+def _eight_bit(image: Image.Image) -> Image.Image:
+    """An image of more than 8 bits a channel, scaled to 8; others as they are."""
+    if image.mode in ("I", "F") or image.mode.startswith("I;16"):
+        values = np.asarray(image, dtype=np.float64)
+        return Image.fromarray(np.rint(values * (255.0 / max(values.max(), 1.0))).astype(np.uint8))
+    return image
