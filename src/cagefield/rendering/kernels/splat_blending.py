@@ -20,7 +20,7 @@ import numba as nb
 import numpy as np
 from numba import prange
 
-from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, ALPHA_MIN, AREA, TILE
 
 F, U = np.float32, np.uint64

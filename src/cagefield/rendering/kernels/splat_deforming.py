@@ -12,10 +12,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
-FAST: dict[str, Any] = {"error_model": "numpy", "cache": True}
-"""Options of every kernel."""
+from cagefield.compiling import njit
+
+PLAIN: dict[str, Any] = {"error_model": "numpy", "cache": True}
+"""Options of every kernel: rounding matters to covariances of flat splats, so no `fastmath`."""
 
 BLOCK = 1024
 """Splats that a thread takes at a time."""
@@ -25,7 +27,7 @@ ROUNDING = 2e-7
 smallest, so that the covariance of a flat splat stays positive."""
 
 
-@njit(parallel=True, **FAST)
+@njit(parallel=True, **PLAIN)
 def in_boxes(points, boxes, inside):
     """Writes which points [N,3] lie in one of the boxes [B,2,3]."""
     for n in prange(len(points)):
@@ -40,7 +42,7 @@ def in_boxes(points, boxes, inside):
         inside[n] = found
 
 
-@njit(**FAST)
+@njit(**PLAIN)
 def polar_rotation(J, R):
     """Writes R of J = R S, by Newton's method X <- (g X + X^-T / g) / 2 from J; 1 for a singular J.
 
@@ -83,7 +85,7 @@ def polar_rotation(J, R):
             return
 
 
-@njit(parallel=True, **FAST)
+@njit(parallel=True, **PLAIN)
 def deform(source, jacobian, quaternions, log_scales, covariances, rotations, growth):
     """Writes what J [M,3,3] makes of the splats with numbers `source` [M].
 
@@ -142,7 +144,7 @@ def deform(source, jacobian, quaternions, log_scales, covariances, rotations, gr
                     rotations[m, i, j] = Q[i, j]
 
 
-@njit(parallel=True, **FAST)
+@njit(parallel=True, **PLAIN)
 def times(jacobian, before):
     """Writes J J_0 into J [M,3,3], for J_0 [M,3,3] of the maps before."""
     for m in prange(len(jacobian)):

@@ -21,7 +21,7 @@ import numpy as np
 from numba import prange
 
 from cagefield import sh as harmonics
-from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.compiling import FAST, njit
 
 TILE = 16
 AREA = TILE * TILE

@@ -23,7 +23,7 @@ import numba as nb
 import numpy as np
 from numba import prange
 
-from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import (
     BLUR,
     LEAST_COMPENSATION,

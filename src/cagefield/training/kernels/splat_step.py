@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from cagefield.rendering.kernels.compiling import FAST, njit
+from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import AREA, TILE, harmonics_at
 
 MOMENTS, RUNNING = 13, 17

@@ -14,15 +14,11 @@ The oracle is `FlowShell.to_deformed`.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
+from cagefield.compiling import FAST, njit
 from cagefield.warps.flow_table import HEADER, MOMENT
-
-FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
-"""Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
 
 U = np.uint64
 LANES = U(32)
