@@ -15,6 +15,7 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
+from cagefield import sh as harmonics
 from cagefield.devices import floats
 from cagefield.fields.voxel import VoxelField
 from cagefield.hexahedron import Array
@@ -29,15 +30,7 @@ ivec3 = qd.types.vector(3, qd.i32)
 vec8 = qd.types.vector(8, qd.f32)
 ivec8 = qd.types.vector(8, qd.i32)
 
-SH_C0 = 0.28209479177387814
-SH_C1 = 0.4886025119029199
-SH_C2 = (
-    1.0925484305920792,
-    -1.0925484305920792,
-    0.31539156525252005,
-    -1.0925484305920792,
-    0.5462742152960396,
-)
+SH_C0, SH_C1, SH_C2, SH_C3 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics.C3
 
 
 def to_device(values: NDArray[np.generic]) -> qd.ndarray:
@@ -106,7 +99,7 @@ def transform_of(field: VoxelField) -> tuple[Array, Array, Array]:
 
 @qd.func
 def sh_basis(d: vec3, K: qd.template()):
-    """The K real spherical harmonics of the unit direction d, degree 0 to 2 (as `cagefield.sh.basis`)."""
+    """The K real spherical harmonics of the unit direction d, degree 0 to 3 (as `cagefield.sh.basis`)."""
     b = qd.Vector.zero(qd.f32, K)
     b[0] = SH_C0
     if qd.static(K > 1):
@@ -119,6 +112,14 @@ def sh_basis(d: vec3, K: qd.template()):
         b[6] = SH_C2[2] * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y)
         b[7] = SH_C2[3] * d.x * d.z
         b[8] = SH_C2[4] * (d.x * d.x - d.y * d.y)
+    if qd.static(K > 9):
+        b[9] = SH_C3[0] * d.y * (3.0 * d.x * d.x - d.y * d.y)
+        b[10] = SH_C3[1] * d.x * d.y * d.z
+        b[11] = SH_C3[2] * d.y * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)
+        b[12] = SH_C3[3] * d.z * (2.0 * d.z * d.z - 3.0 * d.x * d.x - 3.0 * d.y * d.y)
+        b[13] = SH_C3[4] * d.x * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)
+        b[14] = SH_C3[5] * d.z * (d.x * d.x - d.y * d.y)
+        b[15] = SH_C3[6] * d.x * (d.x * d.x - 3.0 * d.y * d.y)
     return b
 
 

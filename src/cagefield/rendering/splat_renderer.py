@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield import devices
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
@@ -25,9 +26,14 @@ from cagefield.rendering.splat_rasterizer import (
     project,
 )
 
+if TYPE_CHECKING:
+    from cagefield.rendering.splat_device import DeviceProjection, SplatArrays
+
 
 class SplatRenderer:
     """Renders one SplatField under one edit stack, with the same methods as `Renderer`.
+
+    On a GPU the splats stay there between frames; see `splat_device`.
 
     The splats are deformed once, when the renderer is made; frames cost the same with edits and without.
     Pictures are within 50 dB and better of `splat_reference`. A fisheye lens shows what is less than 87
@@ -51,6 +57,7 @@ class SplatRenderer:
         self.splats: DeformedSplats = deformed_splats(field, self.edits, preserve_opacity=preserve_opacity)
         self._buffers = Buffers()
         self._normals: Float32 | None = None
+        self._arrays: SplatArrays | None = None
 
     def with_edits(
         self,
@@ -73,7 +80,7 @@ class SplatRenderer:
         other.splats = deformed_splats(
             self.field, edits, preserve_opacity=other.preserve_opacity, coarse=coarse, proceed=proceed
         )
-        other._normals = None
+        other._normals = other._arrays = None
         return other
 
     def render(
@@ -111,14 +118,21 @@ class SplatRenderer:
 
     def project(
         self, camera: Camera, *, near: float = 0.0, region: Region | None = None, normals: bool = False
-    ) -> Projection:
+    ) -> Projection | DeviceProjection:
         """The splats as the camera sees them; valid until this renderer projects again."""
         if normals and self._normals is None:
             self._normals = flattest_axes(self.splats.covariances)
+        near = max(near, near_depth(self.field.bounds))
+        if devices.is_gpu():
+            from cagefield.rendering import splat_device
+
+            if self._arrays is None or (normals and not self._arrays.has_normals):
+                self._arrays = splat_device.SplatArrays(self.splats, self._normals)
+            return splat_device.project(self._arrays, camera, near=near, region=region)
         return project(
             self.splats,
             camera,
-            near=max(near, near_depth(self.field.bounds)),
+            near=near,
             region=region,
             normals=self._normals if normals else None,
             buffers=self._buffers,

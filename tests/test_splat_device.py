@@ -1,0 +1,165 @@
+"""The device's splat rasteriser: on whichever device runs here, against the same oracle as the CPU's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cagefield import Cage, Edit, devices
+from cagefield.edits import EditStack
+from cagefield.rendering import splat_device, splat_reference
+from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.kernels.splat_blending import T_MIN
+from cagefield.rendering.splat_device import SplatArrays
+from cagefield.rendering.splat_rasterizer import COLOUR, DEPTH, NORMALS, Projection, intrinsics, project
+from cagefield.rendering.splat_renderer import SplatRenderer
+from splat_scenes import random_splats
+from splat_views import NEAR, all_kinds, camera, parameters, single, splats_of, unit
+
+
+def db(error: NDArray) -> float:
+    """Peak signal-to-noise ratio of an error, for a peak of 1."""
+    return float(-10.0 * np.log10(max(np.mean(np.square(error)), 1e-30)))
+
+
+def on_device(splats: DeformedSplats, view, **options) -> splat_device.DeviceProjection:
+    return splat_device.project(SplatArrays(splats), view, near=NEAR, **options)
+
+
+@pytest.mark.parametrize(
+    ("lens", "antialiased", "degree", "turned"),
+    [
+        ("pinhole", False, 0, False),
+        ("pinhole", True, 3, True),
+        ("opencv", True, 1, False),
+        ("opencv_fisheye", False, 2, True),
+    ],
+)
+def test_pictures_are_those_of_the_oracle(lens: str, antialiased: bool, degree: int, turned: bool) -> None:
+    view = camera(lens)
+    splats = all_kinds(view.origin, degree, antialiased, turned)
+    got = on_device(splats, view).picture(DEPTH)
+    seen = splat_reference.project(splats, view, NEAR, intrinsics(view).limits)
+    colour, through, depth = splat_reference.blend(seen, view.width, view.height)
+    assert db(got[..., 0] - through) > 50.0
+    assert db(got[..., 1:4] - colour) > 50.0
+    assert db((got[..., 4] - depth) / np.linalg.norm(view.origin)) > 50.0
+
+
+@pytest.mark.parametrize("region", [None, (5, 3, 50, 41)])
+def test_regions_normals_and_opacities_are_those_of_the_cpu(region) -> None:
+    view = camera()
+    splats = all_kinds(view.origin)
+    chance = np.random.default_rng(0)
+    normals = unit(chance.normal(size=(len(splats), 3))).astype(np.float32)
+    here = project(splats, view, near=NEAR, region=region, normals=normals)
+    there = splat_device.project(SplatArrays(splats, normals), view, near=NEAR, region=region)
+    assert db(there.picture(NORMALS) - here.picture(NORMALS)) > 60.0
+    pixels = chance.uniform(0, (here.width, here.height), (200, 2))
+    distances = chance.uniform(0.2, 6.0, 200)
+    want = here.opacity_before(pixels, distances)
+    assert np.ptp(want) > 0.9
+    assert np.quantile(np.abs(there.opacity_before(pixels, distances) - want), 0.98) < 1e-4
+
+
+def gathered(seen, sums: NDArray, count: int) -> NDArray:
+    """The sums of each splat [count, SUMS] of those of its pairs."""
+    out = np.zeros((count, sums.shape[1]))
+    for q, n in enumerate(seen.order):
+        out[n] = sums[seen.slots[seen.firsts[q] : seen.firsts[q + 1]]].astype(np.float64).sum(axis=0)
+    return out
+
+
+@pytest.mark.parametrize("lens", ["pinhole", "opencv_fisheye"])
+def test_gradients_are_those_of_the_cpu(lens: str) -> None:
+    """The CPU's are compared with the oracle's differences in test_splat_gradients."""
+    view = camera(lens)
+    splats = single(splats_of(parameters(40), antialiased=True))
+    here, there = project(splats, view, near=NEAR), on_device(splats, view)
+    np.testing.assert_array_equal(np.sort(there.order), np.sort(here.order))
+    tiles, stops = here.blend(COLOUR)
+    background = np.array([0.2, 0.5, 0.9], np.float32)[:, None]
+    colour = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background)
+    slopes = np.random.default_rng(0).normal(size=colour.shape).astype(np.float32)
+    want = gathered(here, here.gradients(colour, slopes, stops), len(splats))
+    got = gathered(there, there.gradients(colour, slopes), len(splats))
+    # Rounding puts a pixel's alpha on the other side of ALPHA_MIN now and then.
+    assert np.abs(want).max(axis=0).min() > 0.0
+    error = np.linalg.norm(got - want, axis=0) / np.linalg.norm(want, axis=0)
+    assert error.max() < 3e-3 and np.median(error) < 1e-3
+
+
+def test_gradients_stop_where_the_picture_does() -> None:
+    """Behind what lets less than T_MIN through a splat neither shows nor has a gradient."""
+    view = camera()
+    ahead = unit(-view.origin)
+    values = parameters(40)
+    values["means"] = 0.1 * values["means"] + ahead * np.linspace(-1.0, 3.0, 40)[:, None]
+    values["log_scales"][:] = np.log(5.0)
+    values["logits"][:] = 1.0
+    splats = single(splats_of(values))
+    seen = on_device(splats, view)
+    tiles, _ = seen.blend(COLOUR)
+    assert tiles[:, 0].max() < T_MIN
+    sums = gathered(seen, seen.gradients(np.ascontiguousarray(tiles[:, 1:4]), tiles[:, 1:4]), 40)
+    weights = sums[seen.order, 9]
+    assert (weights[:4] > 0.0).all() and (sums[seen.order[12:]] == 0.0).all()
+    # Weights of a pixel and what it lets through add up to 1.
+    inside = view.width * view.height
+    np.testing.assert_allclose(weights.sum(), inside, rtol=T_MIN)
+
+
+def test_no_splats_and_none_in_sight() -> None:
+    view = camera()
+    splats = single(splats_of(parameters(8)))
+    nothing = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
+    behind = replace(splats, means=(splats.means + np.float32(2.0) * view.origin.astype(np.float32)))
+    for empty in (nothing, behind):
+        seen = on_device(empty, view)
+        picture = seen.picture(DEPTH)
+        assert seen.pairs == 0
+        assert (picture[..., 0] == 1.0).all() and (picture[..., 1:] == 0.0).all()
+        assert seen.gradients(*2 * (np.zeros((seen.tiles, 3, 256), np.float32),)).shape == (0, 20)
+        assert seen.opacity_before(np.array([[3.5, 4.5]]), np.array([9.0])) == 0.0
+
+
+def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
+    view = camera()
+    chance = np.random.default_rng(3)
+    values = parameters(2000, 0, 3)
+    values["log_scales"] = chance.uniform(-30.0, 20.0, (2000, 3))
+    values["means"][:500] = view.origin + unit(-view.origin) * NEAR * (1.0 + 1e-6)
+    values["means"][500:800] *= 1e6
+    values["means"][800:900] = view.origin
+    values["logits"] = chance.choice([-100.0, -5.0, 0.0, 5.0, 100.0], 2000)
+    seen = on_device(single(splats_of(values, antialiased=True)), view)
+    assert seen.pairs > 100
+    tiles, _ = seen.blend(DEPTH)
+    assert np.isfinite(tiles).all()
+    slopes = chance.normal(size=(seen.tiles, 3, 256)).astype(np.float32)
+    assert np.isfinite(seen.gradients(np.ascontiguousarray(tiles[:, 1:4]), slopes)).all()
+
+
+def test_a_gpu_draws_the_renderers_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SplatRenderer takes the device's rasteriser where a GPU runs, edited or not."""
+    field = random_splats(200)
+    inner = Cage.box((0, 0, 0), 0.6)
+    edits = EditStack([Edit(inner, adjustment="discrete").translate((0.3, 0.2, 0.0))])
+    view = camera()
+    plain = SplatRenderer(field)
+    assert isinstance(plain.project(view), Projection) or devices.is_gpu()
+    want = [r.render(view, normals=True, near=0.5) for r in (plain, plain.with_edits(edits))]
+    monkeypatch.setattr(devices, "is_gpu", lambda: True)
+    renderer = SplatRenderer(field)
+    assert isinstance(renderer.project(view), splat_device.DeviceProjection)
+    got = [r.render(view, normals=True, near=0.5) for r in (renderer, renderer.with_edits(edits))]
+    for a, b in zip(got, want, strict=True):
+        assert db(a.rgb - b.rgb) > 50.0
+        assert db(a.opacity - b.opacity) > 50.0
+        assert np.quantile(np.abs(a.normals - b.normals), 0.98) < 1e-2
+    assert db(got[0].rgb - got[1].rgb) < 40.0
+    part = renderer.render(view, region=(10, 5, 30, 20))
+    np.testing.assert_allclose(part.rgb, renderer.render(view).rgb[5:25, 10:40], atol=2e-3)
