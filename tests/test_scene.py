@@ -298,5 +298,5 @@ def test_edits_that_are_no_stack_are_refused() -> None:
 def test_what_is_no_camera_or_no_nerf_is_refused() -> None:
     with pytest.raises(SceneError, match=r"camera must be a Camera, got 'test'; give one such as"):
         ball_scene().render("test")  # type: ignore[arg-type]
-    with pytest.raises(SceneError, match=r"must be a NerfField, got VoxelField; .* Scene\(bake\(field\)\)"):
+    with pytest.raises(SceneError, match=r"or a SplatField, got VoxelField; .* Scene\(bake\(field\)\)"):
         Scene.baked(ball_field(), {})  # type: ignore[arg-type]

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from cagefield.edits.files import save_edits as save_edits
     from cagefield.errors import CagefieldError as CagefieldError
     from cagefield.fields.nerf import NerfField as NerfField
+    from cagefield.fields.splat import SplatField as SplatField
     from cagefield.fields.voxel import VoxelField as VoxelField
     from cagefield.rendering.frame import Frame as Frame
     from cagefield.scene import Scene as Scene
@@ -40,6 +41,7 @@ _HOME = {
     "Frame": "cagefield.rendering.frame",
     "NerfField": "cagefield.fields.nerf",
     "Scene": "cagefield.scene",
+    "SplatField": "cagefield.fields.splat",
     "VoxelField": "cagefield.fields.voxel",
     "load_dataset": "cagefield.datasets.dataset",
     "load_edits": "cagefield.edits.files",

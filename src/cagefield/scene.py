@@ -1,7 +1,7 @@
 """Scene: a trained field, the edits on it and the cameras it was seen by; a folder on disk.
 
     SCENE/
-      field.safetensors   the VoxelField, in canonical space
+      field.safetensors   the VoxelField or SplatField, in canonical space; the file says which
       original.safetensors  the NerfField that it was baked from, if any, in the same space
       edits.yaml          the edit stack, as a person would write it
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
@@ -22,9 +22,10 @@ from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
@@ -33,6 +34,7 @@ from cagefield.errors import SceneError
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.seen import seen_by
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
@@ -47,14 +49,23 @@ from cagefield.scene_files import (
     VERSION,
     check_destination,
     read_cameras,
+    read_field,
     read_manifest,
     write_json,
 )
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
-    from cagefield.rendering.renderer import Renderer
-    from cagefield.training.voxel import TrainResult
+    from cagefield.rendering.renderers import AnyRenderer
+
+    class Trained(Protocol):
+        """What a trainer hands out: the field, and the gains [train views,3] of the photos."""
+
+        @property
+        def field(self) -> VoxelField | SplatField: ...
+
+        @property
+        def gains(self) -> NDArray[np.float32]: ...
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,7 +83,7 @@ class Scene:
         SceneError: a version this cagefield does not write, gains that do not fit the cameras.
     """
 
-    field: VoxelField
+    field: VoxelField | SplatField
     edits: EditStack = dataclasses.field(default_factory=lambda: EditStack([]))
     cameras: Mapping[str, tuple[Camera, ...]] = dataclasses.field(default_factory=dict)
     background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
@@ -90,23 +101,25 @@ class Scene:
         object.__setattr__(self, "gains", _gains(self.gains, len(cameras.get("train", ()))))
 
     @classmethod
-    def trained(cls, result: TrainResult, dataset: Dataset) -> Scene:
+    def trained(cls, result: Trained, dataset: Dataset) -> Scene:
         """The scene of a field trained on a data set, with its cameras and no edits.
 
-        Its background is what the photos have: white behind cut-outs, else black.
+        Its background is the result's, where that has one, else what the photos have: white behind cut-outs,
+        else black.
         """
+        white = (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0)
         splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
         return cls(
             result.field,
             cameras={split: tuple(view.camera for view in views) for split, views in splits.items() if views},
-            background=(1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
+            background=background_rgb(getattr(result, "background", white)),
             gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
         )
 
     @classmethod
     def baked(
         cls,
-        original: NerfField,
+        original: NerfField | SplatField,
         cameras: Mapping[str, tuple[Camera, ...]],
         background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
         *,
@@ -115,21 +128,23 @@ class Scene:
         unbounded: bool = False,
         on_progress: Callable[[float], None] | None = None,
     ) -> Scene:
-        """The scene of a field and its voxels, unedited; of an `unbounded` one what the cameras see is baked.
+        """The scene of a field's voxels, unedited; of an `unbounded` one what the cameras see is baked.
+
+        A NerfField is kept beside its voxels, splats are not.
 
         Raises:
             FieldError: options outside their range, a field that is empty.
             SceneError: a field of another class.
         """
-        if not isinstance(original, NerfField):
+        if not isinstance(original, NerfField | SplatField):
             raise SceneError(
-                f"the original must be a NerfField, got {type(original).__name__}; "
+                f"the original must be a NerfField or a SplatField, got {type(original).__name__}; "
                 "of another field make Scene(bake(field))"
             )
         from cagefield.fields.baking import bake
 
         every = [camera for group in cameras.values() for camera in group]
-        near = original.near if original.ndc is None else 0.0
+        near = original.near if isinstance(original, NerfField) and original.ndc is None else 0.0
         voxels = bake(
             original,
             resolution,
@@ -139,7 +154,8 @@ class Scene:
             seen=partial(seen_by, every, near=near) if unbounded and every else None,
             on_progress=on_progress,
         )
-        return cls(voxels, cameras=cameras, background=background, original=original)
+        kept = original if isinstance(original, NerfField) else None
+        return cls(voxels, cameras=cameras, background=background, original=kept)
 
     @classmethod
     def open(cls, path: Path | str) -> Scene:
@@ -159,7 +175,7 @@ class Scene:
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
         cameras = read_cameras(folder / CAMERAS)
         edits = load_edits(folder / EDITS, check=False)
-        field = VoxelField.load(folder / FIELD)
+        field = read_field(folder / FIELD)
         original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).is_file() else None
         try:
             return cls(
@@ -223,11 +239,12 @@ class Scene:
         return scene
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
-        """How far the edits' lattices are off their exact maps, in voxels of the field (its smallest edge).
+        """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.
 
-        An unbounded field's voxels are those in the middle of its box of interest.
+        That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
+        what most splats are wide.
         """
-        return self.edits.lattice_errors(float(min(self.field.voxel_size)))
+        return self.edits.lattice_errors(self.field.sample_spacing)
 
     def render(
         self,
@@ -239,9 +256,10 @@ class Scene:
     ) -> Frame:
         """The edited scene seen by `camera`, over the scene's own background unless another is given.
 
-        "none" puts nothing behind it. The fused renderer is kept between calls. `exact` takes the plain
-        sampled renderer, with every edit evaluated in float64 at every sample: slow, and the reference; where
-        the scene has an original field, that one, by its own hierarchical sampling.
+        "none" puts nothing behind it. The renderer is kept between calls. `exact` evaluates every edit in
+        float64, without a lattice: of voxels at every sample of the plain sampled renderer, slow, and the
+        reference; of splats at every splat; where the scene has an original field, of that one, by its own
+        hierarchical sampling.
 
         Raises:
             CagefieldError: no camera, or a background outside [0, 1].
@@ -262,6 +280,8 @@ class Scene:
         if self.original is not None:
             return self._render_original(self.original, camera, background, normals)
         field = self.field
+        if isinstance(field, SplatField):
+            return cast(Frame, self._exact_splats.render(camera, background=background, normals=normals))
         near, far = _sampling_range(field, camera)
         samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
         return render_sampled(
@@ -272,7 +292,7 @@ class Scene:
             far=far,
             samples=min(4096, max(64, samples)),
             background=background,
-            edits=EditStack(edit.replace(lattice=None) for edit in self.edits),
+            edits=self._exact_edits,
             normals=normals,
             preserve_opacity=self.preserve_opacity,
         )
@@ -283,25 +303,32 @@ class Scene:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
         from cagefield.rendering.nerf import render_nerf
 
-        edits = EditStack(edit.replace(lattice=None) for edit in self.edits)
         return render_nerf(
             original,
             camera,
-            edits=edits,
+            edits=self._exact_edits,
             background=background,
             preserve_opacity=self.preserve_opacity,
             normals=normals,
         )
 
     @cached_property
-    def renderer(self) -> Renderer:
-        """The fused renderer; a scene made by `with_edits` shares the field's arrays on the device."""
-        from cagefield.rendering.renderer import Renderer
+    def renderer(self) -> AnyRenderer:
+        """The renderer of the field's kind; a scene made by `with_edits` shares the field's arrays."""
+        from cagefield.rendering.renderers import renderer_of
 
-        origin: Renderer | None = self.__dict__.get("_origin")
-        if origin is None:
-            return Renderer(self.field, self.edits, preserve_opacity=self.preserve_opacity)
-        return origin.with_edits(self.edits, preserve_opacity=self.preserve_opacity)
+        origin: AnyRenderer | None = self.__dict__.get("_origin")
+        if origin is not None:
+            return origin.with_edits(self.edits, preserve_opacity=self.preserve_opacity)
+        return renderer_of(self.field, self.edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def _exact_splats(self) -> AnyRenderer:
+        return self.renderer.with_edits(self._exact_edits, preserve_opacity=self.preserve_opacity)
+
+    @property
+    def _exact_edits(self) -> EditStack:
+        return EditStack(edit.replace(lattice=None) for edit in self.edits)
 
 
 def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:

@@ -1,4 +1,4 @@
-"""What a scene's folder holds, and the reading of its manifest and cameras; `scene` states the layout."""
+"""What a scene's folder holds, and the reading of its parts; `scene` states the layout."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from typing import Any
 
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.files import kind_of
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.frame import background_rgb
 
 FORMAT = "cagefield-scene"
@@ -76,6 +79,18 @@ def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any,
         return background_rgb(document.get("background")), document.get("gains", ()), opacity
     except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error}") from None
+
+
+def read_field(path: Path) -> VoxelField | SplatField:
+    """The field in a file, of the kind that its header names.
+
+    Raises:
+        FieldError: the file is missing, damaged, of a kind that scenes do not hold or of a newer version.
+    """
+    kind = kind_of(path)
+    if kind == "SplatField":
+        return SplatField.load(path)
+    return VoxelField.load(path)
 
 
 def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:

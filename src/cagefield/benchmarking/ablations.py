@@ -114,7 +114,7 @@ def resolution(subject: Subject, resolutions: Sequence[int] = RESOLUTIONS) -> Ab
     """Both shells from lattices of several resolutions and exact: error of the map, and of pictures."""
     rows: list[tuple[str, ...]] = []
     pictures: list[list[Panel]] = []
-    voxel = float(min(subject.scene.field.voxel_size))
+    voxel = subject.scene.field.sample_spacing
     for shell in ("flow", "trilinear"):
         exact = subject.with_edit(lambda e, s=shell: e.replace(shell=s, lattice=None))  # type: ignore[misc]
         frames, large = seen(subject.scene.with_edits(exact), subject.cameras), subject.picture(exact)

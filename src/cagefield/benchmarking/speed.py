@@ -15,6 +15,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
 from cagefield.rendering.sampled import intersect_box
 from cagefield.scene import Scene
 
@@ -188,7 +189,7 @@ def _middle(scene: Scene) -> tuple[NDArray[np.float64], float]:
     An unbounded scene's content is what its box of interest holds.
     """
     field = scene.field
-    if field.contracted or not len(field.vertices):
+    if isinstance(field, SplatField) or field.contracted or not len(field.vertices):
         return field.center, float(field.half_size.max())
     grid = np.stack(np.unravel_index(field.vertices, field.resolution), axis=1)
     lower, upper = field.bounds

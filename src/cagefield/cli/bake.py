@@ -1,4 +1,4 @@
-"""`cagefield bake`: the voxel field of a scene, anew from the original field that it holds."""
+"""`cagefield bake`: the voxels of a scene, from its splats or anew from the original field that it holds."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.cameras import Camera
     from cagefield.fields.nerf import NerfField
+    from cagefield.fields.splat import SplatField
     from cagefield.scene import Scene
 
 
 @dataclass(frozen=True)
 class Bake:
-    """Bake a scene's original field (a NeRF) into the voxels that are edited interactively."""
+    """Bake a scene's splats, or its original NeRF, into voxels."""
 
     scene: tyro.conf.Positional[Path]
-    """Scene folder, from `cagefield import` or `cagefield train --field nerf`."""
+    """Scene folder, from `cagefield import` or `cagefield train --field splat` or nerf."""
     out: OptionalOutput = None
-    """New scene folder; left out, the scene itself is changed, which needs --overwrite."""
+    """New scene folder, needed for splats, which stay where they are; left out, the scene itself is changed,
+    which needs --overwrite."""
     baking: Baking = field(default_factory=BakingOptions)
     device: Device = "auto"
     overwrite: Flag = False
@@ -35,6 +37,7 @@ class Bake:
     def run(self) -> None:
         """Bakes, writes the scene, prints the PSNR between the two fields."""
         from cagefield import devices
+        from cagefield.fields.splat import SplatField
         from cagefield.scene import Scene
         from cagefield.scene_files import check_destination
 
@@ -44,38 +47,47 @@ class Bake:
                 f"without -o the scene {self.scene} itself would change; give -o NEW_SCENE, or --overwrite"
             )
         scene = Scene.open(self.scene)
-        if scene.original is None:
+        splats = scene.field if isinstance(scene.field, SplatField) else None
+        original = scene.original if splats is None else splats
+        if original is None:
             raise CagefieldError(
                 f"scene {self.scene} holds no original field to bake, only voxels; import a checkpoint or "
-                "train with --field nerf"
+                "train with --field splat or nerf"
+            )
+        if splats is not None and destination.resolve() == self.scene.resolve():
+            raise CagefieldError(
+                f"voxels in the place of the splats of {self.scene} would lose them; give -o NEW_SCENE"
             )
         check_destination(destination, self.overwrite)
         devices.start(self.device)
         baked, figures = bake_scene(
-            scene.original,
+            original,
             scene.cameras,
             scene.background,
             self.baking,
-            unbounded=scene.field.contracted,
+            unbounded=scene.field.unbounded,
         )
         dataclasses.replace(scene, field=baked.field).save(destination, overwrite=self.overwrite)
         print(f"{figures}\nscene written to {destination}")
 
 
 def bake_scene(
-    original: NerfField,
+    original: NerfField | SplatField,
     cameras: Mapping[str, tuple[Camera, ...]],
     background: tuple[float, float, float] | None,
     options: BakingOptions,
     *,
     unbounded: bool = False,
 ) -> tuple[Scene, str]:
-    """The scene of a NeRF baked into voxels, with a progress bar on stderr, and a line of figures.
+    """The scene of a NeRF's or splats' voxels, with a progress bar on stderr, and a line of figures.
 
     Of an `unbounded` one what the cameras see is baked.
     """
     import time
+    from typing import cast
 
+    from cagefield.fields.splat import SplatField
+    from cagefield.fields.voxel import VoxelField
     from cagefield.rendering.agreement import agreement
     from cagefield.scene import Scene
 
@@ -90,7 +102,7 @@ def bake_scene(
             unbounded=unbounded,
             on_progress=lambda done: move(done, 1.0, ""),
         )
-    seconds, voxels = time.perf_counter() - began, scene.field
+    seconds, voxels = time.perf_counter() - began, cast(VoxelField, scene.field)
     nx, ny, nz = voxels.resolution
     line = f"baked {nx} x {ny} x {nz} voxels, {len(voxels.vertices)} stored, in {seconds:.0f} s"
     seen = cameras.get("test") or next((group for group in cameras.values() if group), ())
@@ -98,5 +110,6 @@ def bake_scene(
         some = seen[:: max(1, len(seen) // options.compare)][: options.compare] if options.compare else ()
         if some:
             found = agreement(original, voxels, some, background or (1.0, 1.0, 1.0))
-            line += f"; PSNR of the voxels against the original {found:.2f} dB ({len(some)} views)"
+            against = "splats" if isinstance(original, SplatField) else "original"
+            line += f"; PSNR of the voxels against the {against} {found:.2f} dB ({len(some)} views)"
     return scene, line

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
+
+if TYPE_CHECKING:
+    from cagefield.fields.splat import SplatField
+    from cagefield.fields.voxel import VoxelField
 
 
 @dataclass(frozen=True)
@@ -18,21 +23,19 @@ class Info:
     def run(self) -> None:
         """Prints one line per fact."""
         from cagefield.cli.report import describe_edits
+        from cagefield.fields.splat import SplatField
         from cagefield.scene import Scene
 
         scene = Scene.open(self.scene)
         field = scene.field
-        nx, ny, nz = field.resolution
-        stored = len(field.vertices)
-        size = field.bounds[1] - field.bounds[0]
         megabytes = sum(file.stat().st_size for file in self.scene.iterdir() if file.is_file()) / 1e6
         print(f"scene       {self.scene} (version {scene.version}, {megabytes:.1f} MB)")
-        print(f"field       {nx} x {ny} x {nz} voxels, {stored} stored ({stored / (nx * ny * nz):.1%})")
-        kind = "unbounded, box of interest" if field.contracted else "box"
-        print(
-            f"            {kind} {size[0]:.4g} x {size[1]:.4g} x {size[2]:.4g} around {_point(field.center)}"
-        )
-        print(f"            voxel edge {max(field.voxel_size):.4g}, colour SH degree {field.sh_degree}")
+        content, details = _splats(field) if isinstance(field, SplatField) else _voxels(field)
+        kind = "unbounded, box of interest" if field.unbounded else "box"
+        size = " x ".join(f"{edge:.4g}" for edge in field.bounds[1] - field.bounds[0])
+        print(f"field       {content}")
+        print(f"            {kind} {size} around {_point(field.center)}")
+        print(f"            {details}, colour SH degree {field.sh_degree}")
         if scene.original is not None:
             original = scene.original
             print(f"original    NeRF: coarse {original.coarse}; fine {original.fine or 'none'}")
@@ -48,6 +51,28 @@ class Info:
             print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")
         for line in describe_edits(scene.edits, field):
             print(f"edits       {line}")
+
+
+def _voxels(field: VoxelField) -> tuple[str, str]:
+    """What a voxel field holds, and how fine it is."""
+    nx, ny, nz = field.resolution
+    stored = len(field.vertices)
+    share = stored / (nx * ny * nz)
+    return (
+        f"{nx} x {ny} x {nz} voxels, {stored} stored ({share:.1%})",
+        f"voxel edge {max(field.voxel_size):.4g}",
+    )
+
+
+def _splats(field: SplatField) -> tuple[str, str]:
+    """What a splat field holds, and how fine it is."""
+    arrays = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
+    megabytes = sum(array.nbytes for array in arrays) / 1e6
+    filtered = ", antialiased" if field.antialiased else ""
+    return (
+        f"{len(field)} splats ({megabytes:.1f} MB in memory){filtered}",
+        f"splat width {field.sample_spacing:.4g}",
+    )
 
 
 def _point(values: object) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cagefield import hexahedron
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
+from cagefield.fields.splat import SplatField
 from cagefield.hexahedron import Array
 from cagefield.warps.continuous import ContinuousWarp
 
@@ -19,16 +22,40 @@ if TYPE_CHECKING:
     from cagefield.fields.voxel import VoxelField
 
 
-def describe_edits(edits: Iterable[Edit], field: VoxelField) -> list[str]:
+@dataclass(frozen=True)
+class _Content:
+    """What a field is made of (`noun`): positions [M,3], weights [M]; a length of it, in `lengths`."""
+
+    noun: str
+    positions: Array
+    weights: NDArray[np.float32]
+    length: float
+    lengths: str
+
+    @classmethod
+    def of(cls, field: VoxelField | SplatField) -> _Content:
+        if isinstance(field, SplatField):
+            positions = field.means.astype(np.float64)
+            return cls("splats", positions, field.opacities, field.sample_spacing, "splat widths")
+        positions = _vertex_positions(field)
+        return cls("voxels", positions, np.ones(len(positions), np.float32), field.sample_spacing, "voxels")
+
+    def share(self, mask: NDArray[np.bool_]) -> float:
+        """The share of the weight where the mask [M] is True."""
+        total = float(self.weights.sum(dtype=np.float64))
+        return float(self.weights[mask].sum(dtype=np.float64)) / total if total > 0.0 else 0.0
+
+
+def describe_edits(edits: Iterable[Edit], field: VoxelField | SplatField) -> list[str]:
     """Per edit, in the order of the stack: a line on what it is, and indented ones on what it changes.
 
-    The shares are of the field's stored voxels inside the canonical inner cage and in the shell around it. An
-    edit that cannot be evaluated says why.
+    The shares are of the field's stored voxels, or of its splats' opacities, inside the canonical inner cage
+    and in the shell around it. An edit that cannot be evaluated says why.
     """
-    positions, voxel = _vertex_positions(field), float(min(field.voxel_size))
+    content = _Content.of(field)
     lines: list[str] = []
     for number, edit in enumerate(edits, start=1):
-        lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, positions, voxel))]
+        lines += [f"{number}. {_title(edit)}", *("   " + line for line in _details(edit, content))]
     return lines or ["no edits"]
 
 
@@ -45,11 +72,11 @@ def _title(edit: Edit) -> str:
     return f"{name}{kind}{hidden}"
 
 
-def _details(edit: Edit, positions: Array, voxel: float) -> Iterable[str]:
-    inside = edit.inner.contains(positions)
-    share = float(inside.mean()) if len(positions) else 0.0
+def _details(edit: Edit, content: _Content) -> Iterable[str]:
+    inside = edit.inner.contains(content.positions)
+    share = content.share(inside)
     if edit.deleted:
-        yield f"empties {share:.1%} of the field's voxels"
+        yield f"empties {share:.1%} of the field's {content.noun}"
         return
     for operation in edit.operations:
         yield f"{operation.noun} {operation}"
@@ -57,9 +84,10 @@ def _details(edit: Edit, positions: Array, voxel: float) -> Iterable[str]:
         yield "changes nothing: the inner cage is where it was"
         return
     reach = np.linalg.norm(edit.deformed.corners - edit.inner.corners, axis=1).max()
+    growth = _volume(edit.deformed) / _volume(edit.inner)
     yield (
-        f"{share:.1%} of the field's voxels follow the cage, whose corners move by up to {reach:.4g}; "
-        f"its volume becomes {_volume(edit.deformed) / _volume(edit.inner):.3g} times what it was"
+        f"{share:.1%} of the field's {content.noun} follow the cage, whose corners move by up to "
+        f"{reach:.4g}; its volume becomes {growth:.3g} times what it was"
     )
     try:
         warp = edit.exact_warp
@@ -67,13 +95,14 @@ def _details(edit: Edit, positions: Array, voxel: float) -> Iterable[str]:
         yield f"cannot be evaluated: {error}"
         return
     if isinstance(warp, ContinuousWarp):
-        gives = float((warp.outer.contains(positions) & ~inside).mean()) if len(positions) else 0.0
+        gives = content.share(warp.outer.contains(content.positions) & ~inside)
         ratio = warp.shell.least_ratio()
         state = "does not fold" if ratio > 0.0 else "folds, and is allowed to"
         yield f"{gives:.1%} of them give way; the shell {state} (least volume ratio {ratio:.3f})"
         if edit.lattice is not None:
             worst, mean = edit.lattice_error()
-            yield f"the lattice is off by {mean / voxel:.2g} voxels on average, {worst / voxel:.2g} at most"
+            mean, worst = mean / content.length, worst / content.length
+            yield f"the lattice is off by {mean:.2g} {content.lengths} on average, {worst:.2g} at most"
 
 
 def _volume(cage: Cage) -> float:

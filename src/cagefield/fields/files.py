@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cagefield.errors import FieldError
+
+
+def kind_of(path: str | Path) -> str | None:
+    """The kind of field that the header of a field file names; None where it names none.
+
+    Raises:
+        FieldError: the file is missing or cannot be read.
+    """
+    with _opened(path) as file:
+        return (file.metadata() or {}).get("kind")
 
 
 def read_tensors(
@@ -19,18 +30,11 @@ def read_tensors(
     Raises:
         FieldError: the file is missing, truncated, of another kind or of a newer version.
     """
-    from safetensors import SafetensorError, safe_open
-
     if not Path(path).is_file():
         raise FieldError(f"{path}: no such field file; {cure}")
-    try:
-        with safe_open(str(path), framework="numpy") as file:
-            metadata = file.metadata() or {}
-            tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError) as error:
-        raise FieldError(
-            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
-        ) from error
+    with _opened(path) as file:
+        metadata = file.metadata() or {}
+        tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     if metadata.get("kind") != kind:
         raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {kind!r}")
     if metadata.get("version") != version:
@@ -39,6 +43,20 @@ def read_tensors(
             f"{version!r}; update cagefield"
         )
     return metadata, tensors
+
+
+@contextmanager
+def _opened(path: str | Path) -> Iterator[Any]:
+    """A safetensors file; what goes wrong within is a FieldError that names it."""
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(str(path), framework="numpy") as file:
+            yield file
+    except (SafetensorError, OSError) as error:
+        raise FieldError(
+            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+        ) from error
 
 
 def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str, str]) -> None:

@@ -4,7 +4,8 @@ Notation: splat n has the mean m, the scales s = exp(log_scales) (standard devia
 rotation R of its unit quaternion (w, x, y, z), hence the covariance C = R diag(s^2) R^T, the opacity o in
 [0, 1] and harmonics k. Its colour seen along d is max(0, 0.5 + sum_l Y_l(d) k_l). A picture of splats shows
 each with alpha = o exp(-e^T Q e / 2) at a pixel's offset e from its projected mean, Q the inverse of its
-projected covariance, sorted by depth (`cagefield.rendering.splat_reference`).
+projected covariance, sorted by depth (`cagefield.rendering.splat_reference`). What the splats are at points,
+for code that samples, follows from that: see `cagefield.fields.splat_mixture`.
 
 Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), equations 1 to 6.
 """
@@ -12,14 +13,18 @@ Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Render
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
+
+if TYPE_CHECKING:
+    from cagefield.fields.splat_mixture import SplatMixture
 
 Float32 = NDArray[np.float32]
 
@@ -124,6 +129,31 @@ class SplatField:
         half = np.searchsorted(np.cumsum(weights[order]), 0.5 * weights.sum())
         return float(np.exp(np.float64(middle[order[half]])))
 
+    def __call__(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+        """(sigma [N] per world unit, rgb [N,3]) at canonical positions [N,3] along unit viewdirs [N,3].
+
+        The density whose integral along any ray is what a picture of the splats takes from it; the colours of
+        the splats at a point, weighted by their densities (`cagefield.fields.splat_mixture`).
+        """
+        sigma, rgb = self.mixture.along(np.asarray(positions), np.asarray(viewdirs)[:, None])
+        return sigma[:, 0], np.clip(rgb[:, 0], 0.0, 1.0)
+
+    def seen_along(self, positions: ArrayLike, viewdirs: ArrayLike) -> tuple[Float32, Float32]:
+        """(sigma [N], rgb [N,K,3]) at positions [N,3] along unit viewdirs [N,K,3]; sigma is their mean."""
+        sigma, rgb = self.mixture.along(np.asarray(positions), np.asarray(viewdirs))
+        return sigma.mean(axis=1), np.clip(rgb, 0.0, 1.0)
+
+    def mean_sigma(self, positions: ArrayLike) -> Float32:
+        """The density [N] at positions [N,3], as it is on average over directions."""
+        return self.mixture.mean_sigma(np.asarray(positions))
+
+    @cached_property
+    def mixture(self) -> SplatMixture:
+        """The splats, ready to be asked at points; made on first use."""
+        from cagefield.fields.splat_mixture import SplatMixture
+
+        return SplatMixture.of(self)
+
     def take(self, rows: NDArray[Any]) -> SplatField:
         """The splats of these rows, or where a mask is True, in the same box."""
         return SplatField(
@@ -173,6 +203,17 @@ class SplatField:
 
 _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
 _SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
+
+
+def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Rotations [N,3,3] of unit quaternions [N,4] (w, x, y, z)."""
+    w, x, y, z = quaternions.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _box_of(means: Float32) -> NDArray[np.float64]:

@@ -3,36 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cagefield.cameras import Camera
 from cagefield.fields.nerf import NerfField
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.frame import Background, background_rgb
 from cagefield.rendering.metrics import psnr
 
+if TYPE_CHECKING:
+    from cagefield.rendering.renderer import Renderer
+
 PIXELS = 2500
-"""Pixels compared in each view, on a regular grid."""
+"""Pixels compared in each view, on a regular grid; of splats all."""
 
 
 def agreement(
-    original: NerfField, voxels: VoxelField, cameras: Sequence[Camera], background: Background
+    original: NerfField | SplatField, voxels: VoxelField, cameras: Sequence[Camera], background: Background
 ) -> float:
     """PSNR in dB of the voxels' pictures against the original's, unedited; the mean over the cameras."""
-    from cagefield.rendering.nerf import Rays, trace
     from cagefield.rendering.renderer import Renderer
 
-    behind = np.array(background_rgb(background) or (0.0, 0.0, 0.0), np.float32)
+    behind = background_rgb(background) or (0.0, 0.0, 0.0)
     renderer = Renderer(voxels)
+    if isinstance(original, SplatField):
+        scores = _against_splats(original, renderer, cameras, behind)
+    else:
+        scores = _against_nerf(original, renderer, cameras, behind)
+    return float(np.mean(scores))
+
+
+def _against_splats(
+    original: SplatField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
+) -> list[float]:
+    from cagefield.rendering.splat_renderer import SplatRenderer
+
+    splats = SplatRenderer(original)
+    scores = []
+    for camera in cameras:
+        frame, exact = (one.render(camera, background=behind) for one in (renderer, splats))
+        if frame is not None and exact is not None:
+            scores.append(psnr(np.clip(frame.rgb, 0, 1), np.clip(exact.rgb, 0, 1)))
+    return scores
+
+
+def _against_nerf(
+    original: NerfField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
+) -> list[float]:
+    from cagefield.rendering.nerf import Rays, trace
+
     scores = []
     for camera in cameras:
         step = max(1, round((camera.width * camera.height / PIXELS) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
         pixels = np.stack([i.ravel(), j.ravel()], axis=1)
         rgb, opacity, _ = trace(original.torch, Rays.of(camera, original.torch.device, pixels))
-        exact = rgb.cpu().numpy() + (1.0 - opacity.cpu().numpy()[:, None]) * behind
-        frame = renderer.render(camera, background=background)
+        exact = rgb.cpu().numpy() + (1.0 - opacity.cpu().numpy()[:, None]) * np.array(behind, np.float32)
+        frame = renderer.render(camera, background=behind)
         if frame is not None:
             scores.append(psnr(np.clip(frame.rgb[j.ravel(), i.ravel()], 0, 1), np.clip(exact, 0, 1)))
-    return float(np.mean(scores))
+    return scores

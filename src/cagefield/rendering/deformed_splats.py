@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat import SplatField, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
 
 Float32 = NDArray[np.float32]
@@ -144,17 +144,6 @@ class _Places:
 def _frozen(values: Float32) -> Float32:
     values.setflags(write=False)
     return values
-
-
-def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Rotations [N,3,3] of unit quaternions [N,4] (w, x, y, z)."""
-    w, x, y, z = quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def covariances_of(quaternions: Float32, log_scales: Float32) -> Float32:

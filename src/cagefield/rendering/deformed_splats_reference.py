@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.deformed_splats import DeformedSplats, rotation_matrices
+from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.rendering.deformed_splats import DeformedSplats
 
 
 def deformed_splats_reference(

@@ -28,7 +28,7 @@ def open_hub(path: Path, device: str = "auto") -> tuple[Hub, from_server.Hello]:
     """
     scene = Scene.open(path)
     keeper = Keeper(scene, path)
-    session = Session(keeper.document(), scene.field.bounds, float(min(scene.field.voxel_size)))
+    session = Session(keeper.document(), scene.field.bounds, scene.field.sample_spacing)
     hub = Hub(session, keeper, device)
     recovered = keeper.recovered()
     if recovered is not None:
@@ -49,7 +49,7 @@ def hello_of(scene: Scene, name: str) -> from_server.Hello:
         page=0,
         name=name,
         bounds=(vec3(lower), vec3(upper)),
-        voxel=float(min(scene.field.voxel_size)),
+        voxel=scene.field.sample_spacing,
         up=vec3(shared_up(np.stack(every))) if every else (0.0, 0.0, 1.0),
         start=wire.CameraMessage(
             seq=0,

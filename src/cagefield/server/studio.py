@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.frame import Float32, Frame
-from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
 from cagefield.server import encoding
 from cagefield.server.pictures import Look, Region
 from cagefield.server.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
+
+if TYPE_CHECKING:
+    from cagefield.rendering.renderers import AnyRenderer
 
 QUICK_LATTICE = 32
 """Most lattice nodes along an axis while a cage is dragged."""
@@ -41,7 +45,7 @@ class _Kept:
     """A renderer that is ready, and what it shows."""
 
     shown: Shown
-    renderer: Renderer
+    renderer: AnyRenderer
 
 
 class Studio:
@@ -49,7 +53,7 @@ class Studio:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.plain = Renderer(scene.field)
+        self.plain = renderer_of(scene.field)
         self._edits: list[Edit] = []
         self._coarse: list[tuple[Edit, Edit]] = []
         self._exact: list[_Kept] = []
@@ -77,7 +81,7 @@ class Studio:
         picture, form = encoding.plain_or_jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
         few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
         stride = 1 if few else 2
-        scale = (far if not self.scene.field.contracted else 16.0 * far) / 65_000.0
+        scale = (far if not self.scene.field.unbounded else 16.0 * far) / 65_000.0
         depth = encoding.depths(frame, scale, stride)
         return PictureDone(
             task.number,
@@ -104,7 +108,7 @@ class Studio:
 
     def warm(self, stage: int) -> None:
         """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
-        voxel = float(max(self.scene.field.voxel_size))
+        voxel = self.scene.field.sample_spacing
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
         if stage == 3:
@@ -118,7 +122,7 @@ class Studio:
             )
             renderer.render(camera)
 
-    def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> Renderer:
+    def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
 
         `proceed` is called while it is made, and gives it up by raising.
@@ -157,7 +161,7 @@ class Studio:
         distance = float(np.linalg.norm(camera.origin - self._middle))
         return max(0.0, distance - self._radius), distance + self._radius
 
-    def _frame(self, task: PictureTask, edited: Renderer, stop: Stop) -> Frame | None:
+    def _frame(self, task: PictureTask, edited: AnyRenderer, stop: Stop) -> Frame | None:
         """The region of the picture; left of a split without the edits."""
         region, split = task.region, task.look.split
         if task.look.before or split is None:
@@ -172,7 +176,7 @@ class Studio:
                 parts.append(part)
         return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])
 
-    def _part(self, task: PictureTask, renderer: Renderer, region: Region, stop: Stop) -> Frame | None:
+    def _part(self, task: PictureTask, renderer: AnyRenderer, region: Region, stop: Stop) -> Frame | None:
         return renderer.render(
             task.camera,
             background=self.scene.background,
@@ -185,7 +189,7 @@ class Studio:
     def _step(self, camera: Camera, least: float) -> float:
         """Voxels between the samples of a moving picture: what a pixel shows in the middle of the field."""
         distance = float(np.linalg.norm(camera.origin - self._middle))
-        shown = distance / camera.fx / float(max(self.scene.field.voxel_size))
+        shown = distance / camera.fx / self.scene.field.sample_spacing
         return min(max(shown, least), LONGEST_STEP)
 
     def _quickly(self, edit: Edit) -> Edit:

@@ -81,7 +81,7 @@ class Working:
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=giving_up(stop))
         except GivenUpError:
             return Stopped(task.number)
-        voxel = float(min(self._studio.scene.field.voxel_size))
+        voxel = self._studio.scene.field.sample_spacing
         return Answered(task.number, (most / voxel, mean / voxel))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
@@ -121,5 +121,5 @@ class Working:
         canonical, _, _, emptied = stack.to_canonical(points.astype(np.float32), along)
         field = self._studio.scene.field
         sigma, _ = field(canonical.astype(np.float64), along)
-        dense = (np.asarray(sigma) * float(min(field.voxel_size)) > DENSE) & ~emptied
+        dense = (np.asarray(sigma) * field.sample_spacing > DENSE) & ~emptied
         return dense.tolist()

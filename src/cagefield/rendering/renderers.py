@@ -1,0 +1,31 @@
+"""The renderer that goes with a field."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cagefield.edits import EditStack
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
+
+if TYPE_CHECKING:
+    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.splat_renderer import SplatRenderer
+
+    AnyRenderer = Renderer | SplatRenderer
+
+
+def renderer_of(
+    field: VoxelField | SplatField, edits: EditStack | None = None, *, preserve_opacity: bool = True
+) -> AnyRenderer:
+    """The renderer of the field's kind under the edits: the march through voxels, the rasteriser of splats.
+
+    Raises EditError where an edit cannot be evaluated, DeviceError where no device starts.
+    """
+    if isinstance(field, SplatField):
+        from cagefield.rendering.splat_renderer import SplatRenderer
+
+        return SplatRenderer(field, edits, preserve_opacity=preserve_opacity)
+    from cagefield.rendering.renderer import Renderer
+
+    return Renderer(field, edits, preserve_opacity=preserve_opacity)

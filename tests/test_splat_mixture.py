@@ -1,0 +1,167 @@
+"""Splats at points: a density that integrates to what pictures show; closed forms and a plain sum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cagefield import sh
+from cagefield.errors import FieldError
+from cagefield.fields.protocol import Field
+from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat_mixture import LEAST, MAX_OPACITY
+from splat_scenes import random_splats
+
+
+def plain_sum(field: SplatField, points: np.ndarray, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(sigma [P], rgb [P,3]) from the definition: one splat after the other, Li_1/2 by its series."""
+    k = np.arange(1, 3001)
+    total, colour = np.zeros(len(points)), np.zeros((len(points), 3))
+    rotations = rotation_matrices(field.quaternions.astype(float))
+    for n in range(len(field)):
+        inverse = rotations[n] @ np.diag(np.exp(-2.0 * field.log_scales[n].astype(float))) @ rotations[n].T
+        offset = points - field.means[n]
+        z = min(field.opacities[n], MAX_OPACITY) * np.exp(
+            -0.5 * np.einsum("pi,ij,pj->p", offset, inverse, offset)
+        )
+        # 0.99^3000 is 1e-13
+        li = np.where(z < LEAST, 0.0, (z[:, None] ** k / np.sqrt(k)).sum(axis=1))
+        sigma = li * np.sqrt(np.einsum("pi,ij,pj->p", along, inverse, along) / (2.0 * np.pi))
+        shown = 0.5 + np.einsum("pt,tc->pc", sh.basis(along, field.sh_degree), field.sh[n].astype(float))
+        total += sigma
+        colour += sigma[:, None] * np.maximum(shown, 0.0)
+    return total, np.clip(colour / np.maximum(total, 1e-30)[:, None], 0.0, 1.0)
+
+
+def unit(values: np.ndarray) -> np.ndarray:
+    return values / np.linalg.norm(values, axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_sums_over_all_splats(degree: int) -> None:
+    chance = np.random.default_rng(1)
+    field = random_splats(60, degree)
+    assert isinstance(field, Field)
+    # needles and flakes, from a thousandth of the scene to beyond all of it
+    field = replace(field, log_scales=np.log(10.0 ** chance.uniform(-3.0, 0.7, (60, 3))))
+    points = np.concatenate(
+        [chance.uniform(-1.2, 1.2, (400, 3)), field.means, 3.0 * chance.normal(size=(50, 3))]
+    )
+    along = unit(chance.normal(size=points.shape))
+    points, along = points.astype(np.float32), along.astype(np.float32)
+    sigma, rgb = field(points, along)
+    expected, colour = plain_sum(field, points.astype(float), along.astype(float))
+    assert (expected > 0).mean() > 0.8
+    # float32 positions against splats of a thousandth: 1e-4 of their size
+    np.testing.assert_allclose(sigma, expected, rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(rgb[expected > 1e-2], colour[expected > 1e-2], atol=2e-3)
+
+
+def test_many_points_at_once_are_the_same_as_few() -> None:
+    chance = np.random.default_rng(2)
+    field = random_splats(30, 1)
+    points = chance.uniform(-1.0, 1.0, (20_000, 3)).astype(np.float32)
+    along = unit(chance.normal(size=(20_000, 2, 3))).astype(np.float32)
+    sigma, rgb = field(points, along[:, 1])
+    rows = np.arange(0, 20_000, 997)
+    few = field(points[rows], along[rows, 1])
+    np.testing.assert_array_equal(sigma[rows], few[0])
+    np.testing.assert_array_equal(rgb[rows], few[1])
+    mean, seen = field.seen_along(points, along)
+    np.testing.assert_array_equal(seen[:, 1], rgb)
+    np.testing.assert_allclose(mean, 0.5 * (sigma + field(points, along[:, 0])[0]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("opacity", [0.01, 0.5, 0.9, 0.99])
+def test_a_ray_loses_what_a_picture_shows(opacity: float) -> None:
+    """exp(-integral of sigma) = 1 - o g on any ray, near the mean and beside it, for any shape of splat."""
+    chance = np.random.default_rng(3)
+    for _ in range(12):
+        splat = SplatField(
+            np.zeros((1, 3)), np.log(chance.uniform(0.05, 1.0, (1, 3))), chance.normal(size=(1, 4)),
+            np.array([opacity]), np.zeros((1, 1, 3)),
+        )  # fmt: skip
+        direction = unit(chance.normal(size=3))
+        origin = chance.normal(size=3) * 0.2
+        rotation = rotation_matrices(splat.quaternions.astype(float))[0]
+        inverse = rotation @ np.diag(np.exp(-2.0 * splat.log_scales[0].astype(float))) @ rotation.T
+        nearest = -(direction @ inverse @ origin) / (direction @ inverse @ direction)
+        width = (direction @ inverse @ direction) ** -0.5
+        at = origin + nearest * direction
+        g = np.exp(-0.5 * at @ inverse @ at)
+        # Where sigma peaks, over sqrt(-ln o) of the width, 4000 steps of a 400th are many.
+        t = nearest + width * (np.arange(-2000, 2000) + 0.5) / 400.0
+        points = (origin + t[:, None] * direction).astype(np.float32)
+        sigma, _ = splat(points, np.tile(direction.astype(np.float32), (len(t), 1)))
+        lost = 1.0 - np.exp(-sigma.astype(float).sum() * width / 400.0)
+        # what falls below LEAST is left out on the flanks
+        assert lost == pytest.approx(opacity * g, abs=1.5 * LEAST)
+
+
+def test_rays_through_many_splats_lose_the_product() -> None:
+    """Transmittances multiply, in whatever order the splats are met."""
+    from cagefield.rendering.compositing import composite
+
+    chance = np.random.default_rng(4)
+    field = random_splats(25, 0)
+    field = replace(field, log_scales=np.log(chance.uniform(0.1, 0.4, (25, 3))))
+    origin = np.array([0.1, -0.2, 0.3])
+    for direction in unit(chance.normal(size=(6, 3))):
+        left = 1.0
+        for n in range(25):
+            rotation = rotation_matrices(field.quaternions[n : n + 1].astype(float))[0]
+            inverse = rotation @ np.diag(np.exp(-2.0 * field.log_scales[n].astype(float))) @ rotation.T
+            offset = origin - field.means[n]
+            nearest = -(direction @ inverse @ offset) / (direction @ inverse @ direction)
+            at = offset + nearest * direction
+            left *= 1.0 - min(field.opacities[n], MAX_OPACITY) * np.exp(-0.5 * at @ inverse @ at)
+        t = np.linspace(-4.0, 4.0, 16_001)[:-1] + 2.5e-4
+        sigma, rgb = field(
+            (origin + t[:, None] * direction).astype(np.float32),
+            np.tile(direction.astype(np.float32), (len(t), 1)),
+        )
+        sums = composite(sigma[None], rgb[None], t[None].astype(np.float32), np.float32(5e-4))
+        # 25 splats, each off by LEAST at most, few of them by that much
+        assert sums.opacity[0] == pytest.approx(1.0 - left, abs=4 * LEAST)
+
+
+def test_mean_sigma_is_the_root_mean_square_over_directions() -> None:
+    field = random_splats(1, 0, seed=7)
+    points = field.means + np.random.default_rng(8).normal(size=(20, 3)) * 0.03
+    along = unit(np.random.default_rng(9).normal(size=(4000, 3)))
+    every = field(np.repeat(points, 4000, axis=0), np.tile(along, (20, 1)))[0].reshape(20, 4000)
+    expected = np.sqrt((every.astype(float) ** 2).mean(axis=1))
+    assert (expected > 0).sum() > 10
+    # 4000 random directions: one part in sqrt(4000) times the spread of sigma^2, about its mean
+    np.testing.assert_allclose(field.mean_sigma(points), expected, rtol=0.05)
+
+
+def test_units_do_not_matter() -> None:
+    chance = np.random.default_rng(5)
+    field = random_splats(50, 1)
+    large = SplatField(
+        field.means * 100.0, field.log_scales + np.log(100.0), field.quaternions, field.opacities, field.sh
+    )
+    points = chance.uniform(-1.0, 1.0, (500, 3))
+    along = unit(chance.normal(size=(500, 3)))
+    sigma, rgb = field(points, along)
+    scaled, colour = large(100.0 * points, along)
+    np.testing.assert_allclose(scaled * 100.0, sigma, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(colour, rgb, atol=1e-3)
+
+
+def test_no_splats_and_splats_that_nobody_sees_are_nothing() -> None:
+    field = random_splats(20)
+    for empty in (field.take(np.zeros(20, bool)), replace(field, opacities=np.zeros(20))):
+        sigma, rgb = empty(field.means, np.tile([0.0, 0.0, 1.0], (20, 1)))
+        assert not sigma.any() and not rgb.any() and not empty.mean_sigma(field.means).any()
+
+
+def test_wrong_shapes_are_named() -> None:
+    field = random_splats(5)
+    with pytest.raises(FieldError, match=r"positions must be \[N,3\], got \[5, 2\]"):
+        field(np.zeros((5, 2)), np.zeros((5, 3)))
+    with pytest.raises(FieldError, match=r"viewdirs must be \[5, K, 3\], got \[4, 1, 3\]"):
+        field(np.zeros((5, 3)), np.zeros((4, 3)))
