@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from cagefield.datasets import features
+from cagefield.datasets import features, repeated_views
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError
@@ -113,8 +113,8 @@ def make_poses(
     features.match(
         database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7)
     )
-    models = _map(work, len(photos), seed, features.share(on_progress, 0.7, 0.99))
     shared_matches = _matches(database, len(photos))
+    models = _unfolded(work, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
     if not models:
         raise DatasetError(f"{source}: {_why_none(photos, shared_matches)}")
     model = models[0]
@@ -262,7 +262,42 @@ def _cameras(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     return cameras, numbers
 
 
-def _map(work: Path, count: int, seed: int, on_progress: OnProgress) -> list[Any]:
+def _unfolded(work: Path, matches: _Matches, seed: int, on_progress: OnProgress) -> list[Any]:
+    """The reconstructions, the one with the most photos first, without pairs that only look alike.
+
+    Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
+    these are left out, unless fewer photos, or with as many fewer points, come of it.
+    """
+    count, database = len(matches.counts), work / "database.db"
+    if not repeated_views.are_in_order(matches.counts):
+        return _map(work, database, count, seed, on_progress)
+    far = repeated_views.far_pairs(matches.counts)
+    chain = _map(work, _without(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
+    false: set[tuple[int, int]] = set()
+    if chain:
+        relative = repeated_views.relative_rotations(database, chain[0], far)
+        false = repeated_views.contradicting(repeated_views.rotations_of(chain[0]), relative)
+    plain = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
+    if not false:
+        return plain
+    pruned = _map(work, _without(database, false), count, seed, features.share(on_progress, 0.66, 1.0))
+    return pruned if _size(pruned) >= _size(plain) else plain
+
+
+def _size(models: Sequence[Any]) -> tuple[int, int]:
+    """Photos, then points, of the first of the reconstructions."""
+    return (models[0].num_reg_images(), models[0].num_points3D()) if models else (0, 0)
+
+
+def _without(database: Path, pairs: set[tuple[int, int]]) -> Path:
+    """A copy of the database without the verified matches of these pairs."""
+    copy = database.with_name("fewer_pairs.db")
+    shutil.copyfile(database, copy)
+    repeated_views.remove_pairs(copy, pairs)
+    return copy
+
+
+def _map(work: Path, database: Path, count: int, seed: int, on_progress: OnProgress) -> list[Any]:
     """The reconstructions, the one with the most photos first."""
     pycolmap = features.engine()
     options = pycolmap.IncrementalPipelineOptions(min_model_size=3, random_seed=seed, max_num_models=10)
@@ -285,7 +320,7 @@ def _map(work: Path, count: int, seed: int, on_progress: OnProgress) -> list[Any
 
     found = features.call(
         pycolmap.incremental_mapping,
-        work / "database.db",
+        database,
         work / "colmap",
         out,
         options=options,
