@@ -77,8 +77,9 @@ class _Running:
 class Desk:
     """See the module."""
 
-    def __init__(self, scene: str, device: str, office: Office) -> None:
-        self.scheduler = Scheduler(office.differing)
+    def __init__(self, scene: str, device: str, office: Office, *, whole_at_rest: bool = False) -> None:
+        """`whole_at_rest` as for `Scheduler`."""
+        self.scheduler = Scheduler(office.differing, whole_at_rest=whole_at_rest)
         self.worker = Worker(scene, device, self._from_thread(self._result), self._from_thread(self._lost))
         self._office = office
         self._loop: asyncio.AbstractEventLoop | None = None

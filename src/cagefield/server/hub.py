@@ -7,8 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
+from cagefield.fields.splat import SplatField
 from cagefield.server import from_server
 from cagefield.server.chores import Chores
 from cagefield.server.converting import state_of
@@ -18,6 +21,7 @@ from cagefield.server.outbox import Outbox
 from cagefield.server.pictures import Look, Request
 from cagefield.server.regions import WHOLE, Rect, seen
 from cagefield.server.session import Session
+from cagefield.server.splats import spread
 from cagefield.server.tasks import PictureDone, PictureTask, Shown, Task, values_of
 
 
@@ -44,7 +48,10 @@ class Hub:
         self.session = session
         self.keeper = keeper
         self.pages: dict[int, Page] = {}
-        self.desk = Desk(str(keeper.origin), device, self)
+        shown = keeper.scene.field
+        self._spread = spread(shown) if isinstance(shown, SplatField) else 0.0
+        """How far beside where an edit maps points its content shows, world units."""
+        self.desk = Desk(str(keeper.origin), device, self, whole_at_rest=self._spread > 0.0)
         self.chores = Chores(session, keeper, self._measured, self.broadcast)
         self.greeting: str | None = None
         """A line for the pages that come."""
@@ -188,7 +195,10 @@ class Hub:
         if camera is None or None in stacks:
             return WHOLE
         (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
-        return seen(camera, after.changed_boxes(before)) if opacity == other else WHOLE
+        if opacity != other:
+            return WHOLE
+        beside = np.array([[-self._spread], [self._spread]])
+        return seen(camera, after.changed_boxes(before) + beside)
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""

@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass, field
 
 from cagefield.server.pictures import Look, Region, Request
-from cagefield.server.regions import Differing, Rect, Showing, everywhere, pixels, tiles
+from cagefield.server.regions import WHOLE, Differing, Rect, Showing, everywhere, pixels, tiles
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
 """Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older
@@ -71,9 +71,13 @@ class _Page:
 class Scheduler:
     """See the module. Times are seconds of any one clock."""
 
-    def __init__(self, differing: Differing = everywhere) -> None:
-        """`differing` says what of a page's picture two revisions show differently."""
+    def __init__(self, differing: Differing = everywhere, *, whole_at_rest: bool = False) -> None:
+        """`differing` says what of a page's picture two revisions show differently.
+
+        Where it may miss a little, all of a picture is drawn anew at rest (`whole_at_rest`).
+        """
         self._differing = differing
+        self._whole_at_rest = whole_at_rest
         self._pages: dict[int, _Page] = {}
         self._numbers = 0
         self._rate = FIRST_RATE
@@ -290,6 +294,8 @@ class Scheduler:
         p = self._pages[page]
         view = p.camera, p.look
         rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
+        if exact and self._whole_at_rest and rect is not None:
+            rect = WHOLE
         part = pixels(rect, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)
         count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)

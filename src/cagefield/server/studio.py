@@ -12,6 +12,8 @@ import numpy as np
 from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.frame import Float32, Frame
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
@@ -54,6 +56,8 @@ class Studio:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.plain = renderer_of(scene.field)
+        self._is_sampled = isinstance(scene.field, VoxelField)
+        """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
         self._coarse: list[tuple[Edit, Edit]] = []
         self._exact: list[_Kept] = []
@@ -108,6 +112,9 @@ class Studio:
 
     def warm(self, stage: int) -> None:
         """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
+        if not self._is_sampled:
+            _warm_splats(stage)
+            return
         voxel = self.scene.field.sample_spacing
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
@@ -131,7 +138,7 @@ class Studio:
             if kept.shown == shown:
                 return kept.renderer
         edits = self.edits(shown.edits)
-        if not exact:
+        if not exact and self._is_sampled:
             ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
             edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
         # What the last ones share with these need not be looked at again.
@@ -202,6 +209,25 @@ class Studio:
         quick = edit.replace(lattice=QUICK_LATTICE)
         self._coarse = [*self._coarse[-31:], (edit, quick)]
         return quick
+
+
+def _warm_splats(stage: int) -> None:
+    """Makes the kernels of splats ready: of plain pictures, of moving ones, of those at rest, of normals."""
+    chance = np.random.default_rng(0)
+    count = 64
+    field = SplatField(
+        chance.random((count, 3), np.float32) - 0.5,
+        np.full((count, 3), -3.0, np.float32),
+        chance.standard_normal((count, 4), np.float32),
+        np.full(count, 0.5, np.float32),
+        np.zeros((count, 1, 3), np.float32),
+    )
+    inner = Cage.box((0.0, 0.0, 0.0), 0.5)
+    turned = Edit(inner, inner.grown(0.4)).rotate((0.0, 0.0, 0.3))
+    edits = EditStack([turned, turned, Edit.delete(inner)]) if stage else EditStack()
+    renderer = renderer_of(field).with_edits(edits, coarse=stage == 1)
+    camera = Camera.look_at((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), width=32, height=32, fov_x=0.5)
+    renderer.render(camera, normals=stage == 3)
 
 
 class GivenUpError(Exception):

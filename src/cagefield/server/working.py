@@ -9,11 +9,14 @@ import numpy as np
 
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.deformed_splats import deformed_splats
 from cagefield.server.encoding import picture_of, png
 from cagefield.server.grid_lines import grid_lines
 from cagefield.server.job_files import JobFiles
 from cagefield.server.pictures import Look
 from cagefield.server.placing import probes
+from cagefield.server.splats import dense
 from cagefield.server.studio import GivenUpError, Studio, giving_up
 from cagefield.server.tasks import (
     Answered,
@@ -75,7 +78,9 @@ class Working:
         return grid_lines(Edit(**task.edit))
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
-        """(max, mean) error of an edit's lattice, voxels."""
+        """(max, mean) error of an edit's lattice, voxels; none for splats, which take no lattice."""
+        if isinstance(self._studio.scene.field, SplatField):
+            return Answered(task.number, (0.0, 0.0))
         try:
             (edit,) = self._studio.edits((task.edit,))
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=giving_up(stop))
@@ -113,13 +118,16 @@ class Working:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
+        field = self._studio.scene.field
+        if isinstance(field, SplatField):
+            edits = EditStack(self._studio.edits(task.shown.edits))
+            return dense(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.warps.device_stack import DeviceStack
 
         points = probes(task.cage)
         stack = DeviceStack.from_stack(EditStack(self._studio.edits(task.shown.edits)))
         along = np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1))
         canonical, _, _, emptied = stack.to_canonical(points.astype(np.float32), along)
-        field = self._studio.scene.field
         sigma, _ = field(canonical.astype(np.float64), along)
-        dense = (np.asarray(sigma) * field.sample_spacing > DENSE) & ~emptied
-        return dense.tolist()
+        found = (np.asarray(sigma) * field.sample_spacing > DENSE) & ~emptied
+        return found.tolist()

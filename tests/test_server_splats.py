@@ -1,0 +1,233 @@
+"""The editor on a scene of splats: the rendering process' side, and what pages are sent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cagefield import devices
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import EditError
+from cagefield.fields.splat import SplatField
+from cagefield.keyframes import Still
+from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.metrics import psnr
+from cagefield.scene import Scene
+from cagefield.server.hub import Hub
+from cagefield.server.keeping import Keeper
+from cagefield.server.opening import hello_of, open_hub
+from cagefield.server.pictures import Look, Region
+from cagefield.server.placing import fitted
+from cagefield.server.regions import WHOLE, Showing
+from cagefield.server.scheduler import Scheduler
+from cagefield.server.session import Session
+from cagefield.server.splats import dense, spread
+from cagefield.server.studio import Studio
+from cagefield.server.tasks import (
+    WARM_STAGES,
+    Answered,
+    ErrorTask,
+    FitTask,
+    FrameTask,
+    PictureDone,
+    PictureTask,
+    Shown,
+    Stopped,
+    SurfaceTask,
+    WarmTask,
+    values_of,
+)
+from cagefield.server.working import Working
+from sent_pictures import pixels_of
+from splat_scenes import ball_of_splats, splat_scene
+
+SIDE = 48
+INNER = Cage.box((0, 0, 0), 1.2)
+MOVED = Edit(INNER, INNER.grown(0.4), name="ball", lattice=128).translate((0.25, 0, 0))
+COPY = Edit(INNER, adjustment="discrete", keep_source=True).translate((0, 0.6, 0.6))
+CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=SIDE, height=SIDE, fov_x=0.8)
+PART = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
+
+
+@pytest.fixture(scope="module")
+def studio() -> Studio:
+    devices.start("cpu")
+    return Studio(splat_scene())
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    splat_scene().save(tmp_path / "ball")
+    return tmp_path / "ball"
+
+
+def task(*edits: Edit, look: Look = Look(), moving: bool = False, exact: bool = True) -> PictureTask:  # noqa: B008
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, look, moving, exact, 0)
+
+
+def picture(studio: Studio, asked: PictureTask) -> np.ndarray[Any, Any]:
+    done = studio.picture(asked, lambda: False)
+    assert isinstance(done, PictureDone)
+    return pixels_of(done.picture, done.format, SIDE, SIDE).astype(float)
+
+
+@pytest.mark.parametrize("edits", [(), (MOVED,), (COPY,), (MOVED, COPY), (Edit.delete(INNER),)])
+def test_pictures_are_those_of_the_scene_at_rest_and_near_them_in_a_drag(
+    studio: Studio, edits: tuple[Edit, ...]
+) -> None:
+    frame = studio.scene.with_edits(EditStack(edits)).render(CAMERA)
+    assert np.array_equal(picture(studio, task(*edits)), frame.rgb8())
+    quick = picture(studio, task(*edits, moving=True, exact=False))
+    # Long steps of the flow, 1e-4 of the scene: a hundredth of a pixel.
+    assert psnr(quick / 255.0, frame.rgb8() / 255.0) > 45
+
+
+def test_views(studio: Studio) -> None:
+    depth, opacity, normals = (
+        picture(studio, task(MOVED, look=Look(view=view))) for view in ("depth", "opacity", "normals")
+    )
+    solid = opacity[..., 0] > 200
+    assert 300 < solid.sum() < 1500 and (opacity[0, 0] == 0).all()
+    assert depth[solid].min() > 30 and not depth[0, 0].any()
+    # The ball's left side looks left, its right side right, the top up.
+    row, column = np.nonzero(solid)
+    assert np.corrcoef(column, normals[solid][:, 0])[0, 1] > 0.7
+    assert np.corrcoef(row, normals[solid][:, 2])[0, 1] < -0.7
+
+
+def test_the_surface_under_the_mouse(studio: Studio) -> None:
+    working = Working(studio)
+
+    def surface(x: float, y: float, *edits: Edit) -> Any:
+        done = working.do(SurfaceTask(1, Shown(values_of(edits)), CAMERA, x, y), lambda _: False)
+        assert isinstance(done, Answered)
+        return done.value
+
+    x, y = CAMERA.project(np.zeros((1, 3)))[0][0] / SIDE
+    point, normal = surface(x, y)
+    # Splats have a thickness and a distance each: a twentieth of the ball's radius.
+    assert np.linalg.norm(point) == pytest.approx(0.5, abs=0.03)
+    assert abs(np.dot(point, normal)) / np.linalg.norm(point) > 0.9
+    assert surface(0.02, 0.02) is None
+    moved, _ = surface(x + 0.25 / 2.4, y, MOVED)
+    assert np.linalg.norm(np.subtract(moved, (0.25, 0, 0))) == pytest.approx(0.5, abs=0.05)
+    assert surface(x, y, Edit.delete(INNER)) is None
+
+
+def test_a_cage_is_fitted_to_the_splats_in_it(studio: Studio) -> None:
+    working = Working(studio)
+
+    def fit(cage: Cage, *edits: Edit) -> Cage:
+        done = working.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
+        assert isinstance(done, Answered)
+        return fitted(cage, np.array(done.value))
+
+    low, high = fit(Cage.box((0.1, 0, 0), 1.9)).aabb
+    # The ball's box, half a probe more and what the splats on it are wide.
+    np.testing.assert_allclose([low, high], [[-0.5] * 3, [0.5] * 3], atol=0.09)
+    assert (low < -0.46).all() and (high > 0.46).all()
+    aside = fit(Cage.box((0.5, 0, 0), 1.9), Edit(INNER, adjustment="discrete").translate((0.5, 0, 0)))
+    np.testing.assert_allclose(aside.corners.mean(axis=0), (0.5, 0, 0), atol=0.05)
+    with pytest.raises(EditError, match="nothing dense inside the inner cage"):
+        fit(Cage.box((0, 0, 0), 1.2), Edit.delete(INNER))
+
+
+def splats(*ones: tuple[tuple[float, float, float], tuple[float, float, float], float]) -> DeformedSplats:
+    """Splats of (mean, scales along the world's axes, opacity)."""
+    means, scales, opacities = (np.array([one[n] for one in ones]) for n in range(3))
+    field = SplatField(
+        means,
+        np.log(scales),
+        np.tile([1.0, 0, 0, 0], (len(means), 1)),
+        opacities,
+        np.zeros((len(means), 1, 3)),
+    )
+    return DeformedSplats.of_field(field)
+
+
+def test_fog_is_not_dense_and_many_faint_splats_are() -> None:
+    cage = Cage.box((0.5, 0.5, 0.5), 1.0)
+    fog = ((0.5, 0.5, 0.5), (0.1, 0.1, 0.01), 0.1)
+    assert not dense(cage, splats(fog)).any()
+    assert dense(cage, splats(*[fog] * 5)).any()
+    disc = dense(cage, splats(((0.5, 0.5, 0.5125), (0.06, 0.03, 0.001), 0.9))).reshape(40, 40, 40)
+    z, y, x = np.nonzero(disc)
+    assert np.array_equal(np.unique(z), [20])
+    # One and a half standard deviations, where .29 of the opacity is left: a bit less than .3 of it.
+    assert np.ptp(x) * 0.025 == pytest.approx(2 * 1.0 * 0.06, abs=0.06) and np.ptp(x) > 1.5 * np.ptp(y)
+    assert not dense(cage, splats(((5.0, 0.5, 0.5), (0.1, 0.1, 0.1), 1.0))).any()
+
+
+def test_lattices_have_no_error_and_warming_up_is_possible(studio: Studio) -> None:
+    working = Working(studio)
+    done = working.do(ErrorTask(7, values_of((MOVED,))[0], 0), lambda _: False)
+    assert done == Answered(7, (0.0, 0.0))
+    for stage in range(WARM_STAGES):
+        assert working.do(WarmTask(1, stage), lambda _: False) == Answered(1)
+
+
+def test_edits_in_a_drag_keep_their_lattices_and_are_given_up(studio: Studio) -> None:
+    renderer = studio.renderer(Shown(values_of((MOVED,))), exact=False)
+    assert renderer.edits[0].lattice == 128
+    far = MOVED.translate((0.01, 0, 0))
+    assert studio.picture(task(far), lambda: True) == Stopped(1)
+
+
+def test_jobs_write_their_pictures(studio: Studio, tmp_path: Path) -> None:
+    working = Working(studio)
+    asked = FrameTask(
+        1, 1, 0, 1, "test_views", str(tmp_path), 24.0, Shown(values_of((MOVED,))), Still(CAMERA, {}), 0
+    )
+    assert working.do(asked, lambda _: False) == Answered(1)
+    written = np.asarray(Image.open(tmp_path / "0000.png"))
+    assert np.array_equal(written, studio.scene.with_edits(EditStack([MOVED])).render(CAMERA).rgb8())
+
+
+def test_a_page_is_told_of_the_field_and_edits_are_saved(folder: Path) -> None:
+    _, hello = open_hub(folder)
+    field = ball_of_splats()
+    assert hello.voxel == pytest.approx(field.sample_spacing) and hello.bounds[1] == (1.0, 1.0, 1.0)
+    assert hello_of(Scene.open(folder), "ball").start.width == 24
+    keeper = Keeper(Scene.open(folder).with_edits(EditStack([MOVED])), folder)
+    session = Session(keeper.document(), field.bounds, field.sample_spacing)
+    assert [entry.edit.name for entry in session.document.entries] == ["ball"]
+    keeper.save(session)
+    again = Scene.open(folder)
+    assert isinstance(again.field, SplatField) and again.edits == EditStack([MOVED])
+    np.testing.assert_array_equal(again.field.means, field.means)
+
+
+def test_what_differs_is_as_much_larger_as_splats_reach(folder: Path) -> None:
+    scene = Scene.open(folder)
+    keeper = Keeper(scene, folder)
+    hub = Hub(Session(keeper.document(), scene.field.bounds, scene.field.sample_spacing), keeper)
+    reach = spread(scene.field)
+    size = 2.5 * 0.5 / np.sqrt(600)  # of the ball's discs
+    assert reach == pytest.approx(3.0 * size, rel=1e-3)
+    assert hub._spread == reach and hub.desk.scheduler._whole_at_rest
+    assert spread(scene.field.take(np.zeros(0, int))) == 0.0
+
+
+def test_all_of_a_picture_is_drawn_anew_at_rest() -> None:
+    part = (0.25, 0.25, 0.5, 0.5)
+
+    def region(whole_at_rest: bool) -> tuple[int, int]:
+        scheduler = Scheduler(lambda *_: part, whole_at_rest=whole_at_rest)
+        scheduler.join(1)
+        scheduler.camera(1, 1, 80, 80, False, 0.0)
+        page = scheduler._pages[1]
+        page.showing = Showing((page.camera, page.look), 0, True)
+        scheduler._revision = 1
+        scheduler._cut(1, exact=True)
+        assert page.tiles is not None
+        return sum(tile.width * tile.height for tile in page.tiles), page.whole
+
+    assert region(False) == (24 * 24, False)
+    assert region(True) == (80 * 80, True)
+    assert WHOLE == (0.0, 0.0, 1.0, 1.0)
