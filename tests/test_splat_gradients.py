@@ -148,8 +148,8 @@ def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Valu
     # that is clamped at 0, one far smaller than a pixel.
     values["logits"][0] = 6.0
     right = view.c2w[:3, 0]
-    values["means"][1] = 2.6 * right
-    values["log_scales"][1] = np.log((0.9, 0.5, 0.4))
+    values["means"][1] = 3.2 * right
+    values["log_scales"][1] = np.log((1.2, 0.7, 0.6))
     values["logits"][1] = 1.0
     values["sh"][2, 0] = (-3.0, 0.2, 0.1)
     values["log_scales"][3] = np.log(0.004)

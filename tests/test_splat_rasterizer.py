@@ -245,6 +245,19 @@ def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
             assert np.isfinite(before).all()
 
 
+def test_splats_whose_variance_is_not_finite_are_not_drawn() -> None:
+    view = camera()
+    splats = single(splats_of(parameters(20)))
+    # What float32 makes of log scales beyond 44.
+    for value in (np.inf, 1e35):
+        wide = replace(splats, covariances=splats.covariances.copy())
+        wide.covariances[::2, [0, 3, 5]] = value
+        rest = {name: getattr(splats, name)[1::2] for name in ("means", "covariances", "opacities", "sh")}
+        want = project(DeformedSplats(**rest), view, near=NEAR).picture()
+        got = project(wide, view, near=NEAR).picture()
+        np.testing.assert_array_equal(got, want)
+
+
 def test_threads_that_ask_at_once_get_their_own_pictures() -> None:
     view = camera()
     scenes = [all_kinds(view.origin, seed=seed) for seed in range(4)]
