@@ -135,8 +135,8 @@ class SplatRun:
             chain(
                 seen.order, seen.firsts, seen.slots, sums, seen.packed, state.means, state.log_scales,
                 state.quaternions, opacities, state.sh, world_to_camera(camera), camera.origin, lens.focal,
-                lens.limits, lens.model, lens.coefficients, config.antialiased, state.gradients,
-                state.curvatures,
+                lens.limits, lens.model, lens.coefficients, config.antialiased, False,
+                state.gradients, state.curvatures,
             )  # fmt: skip
             gauss_newton(
                 seen.order, state.gradients, state.curvatures, state.means, state.log_scales,

@@ -81,13 +81,14 @@ def chain(
     model,
     coefficients,
     antialiased,
+    directional,
     gradients,
     curvatures,
 ):
     """Writes gradients [N,GRADIENTS] and curvatures [N,CURVATURES] of the splats in `order`; others are left.
 
-    The colour's gradient is that before its clamp at 0, whose share in the mean's gradient is left out where
-    the clamp holds.
+    The colour's gradient is that before its clamp at 0. `directional` adds to the mean's gradient what comes from
+    the direction in which the colour is seen, where the clamp does not hold.
     """
     fx, fy = focal[0], focal[1]
     terms = sh.shape[1]
@@ -218,7 +219,7 @@ def chain(
             P[0, j] = fx * (d00 * px + d01 * py)
             P[1, j] = fy * (d10 * px + d11 * py)
             G[j] = cx * W[0, j] + cy * W[1, j] + cz * W[2, j] + s[1] * P[0, j] + s[2] * P[1, j]
-        if terms > 1:
+        if directional and terms > 1:
             add_direction(i, dx, dy, dz, s, packed, sh, terms, G)
         at = 0
         for m in range(3):
