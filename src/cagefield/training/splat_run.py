@@ -30,6 +30,7 @@ from cagefield.training.splat_seeds import (
     background_seeds,
     camera_scale,
     neighbour_distance,
+    swept_points,
 )
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
@@ -43,6 +44,7 @@ DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
 GROWTH = (0.02, 0.6)
 """Progress between which splats become more."""
 
+SURFACE = 10_000
 GROWTH_EVERY = 60
 """Steps between two growths."""
 
@@ -72,11 +74,13 @@ class SplatRun:
         dataset, config = self._dataset, self._config
         points = dataset.points
         assert points is not None
-        positions = points.positions
+        positions, rgb = points.positions, points.rgb
+        if SURFACE:
+            more, colours = swept_points(self.views, positions, SURFACE, config.seed)
+            positions, rgb = np.concatenate([positions, more]), np.concatenate([rgb, colours])
+        print("seeds", len(positions))
         sigma = neighbour_distance(positions)
-        state = SplatState.new(
-            positions, sigma, points.rgb.astype(np.float32) / 255.0, FIRST_OPACITY, config.sh_degree
-        )
+        state = SplatState.new(positions, sigma, rgb.astype(np.float32) / 255.0, FIRST_OPACITY, config.sh_degree)
         if dataset.unbounded and config.background != 0.0:
             share = 0.3 if config.background is None else config.background
             far = background_seeds(

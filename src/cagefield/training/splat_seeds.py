@@ -21,6 +21,9 @@ FAR = 10.0
 
 FIRST_OPACITY = 0.3
 
+SWEPT_SIDE = 150
+"""Least longer side of the photos that surface points are looked for in."""
+
 
 def neighbour_distance(positions: Array) -> Array:
     """Root mean square distance [N] to the three nearest other positions, extremes held back."""
@@ -87,3 +90,36 @@ def camera_scale(cameras: Sequence[Camera], bounds: Array) -> float:
     origins = np.stack([camera.origin for camera in cameras])
     median = float(np.median(np.linalg.norm(origins - bounds.mean(axis=0), axis=1)))
     return max(median, 0.1 * float(np.linalg.norm(bounds[1] - bounds[0])))
+
+
+def depths_seen(cameras: Sequence[Camera], positions: Array) -> list[tuple[float, float] | None]:
+    """(least, usual) depth of the positions [N,3] that each camera shows, None where it shows too few."""
+    found: list[tuple[float, float] | None] = []
+    for camera in cameras:
+        pixels, depth = camera.project(positions)
+        with np.errstate(invalid="ignore"):
+            seen = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
+        near, usual = np.quantile(depth[seen], (0.01, 0.5)) if seen.sum() >= 20 else (0.0, 0.0)
+        found.append((0.7 * float(near), float(usual)) if usual > 0 else None)
+    return found
+
+
+def swept_points(
+    views: Sequence[TrainingView], positions: Array, wanted: int, seed: int
+) -> tuple[Array, NDArray[np.uint8]]:
+    """Surface points (positions, rgb) by plane sweeping the photos, their depths guided by sparse points."""
+    from cagefield.rendering.splat_rasterizer import untiled
+    from cagefield.training.plane_sweep import surface_points
+
+    sides = [max(camera.width, camera.height) for camera in views[0].cameras]
+    level = max([level for level, side in enumerate(sides) if side >= SWEPT_SIDE], default=0)
+    cameras = [view.level(level)[0] for view in views]
+    depths = depths_seen(cameras, positions)
+    usable = [n for n, depth in enumerate(depths) if depth is not None]
+    size = (cameras[0].width, cameras[0].height)
+    usable = [n for n in usable if (cameras[n].width, cameras[n].height) == size]
+    images = [untiled(views[n].level(level)[1], *size) for n in usable]
+    known = [depth for depth in depths if depth is not None]
+    return surface_points(
+        images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], wanted, seed
+    )

@@ -31,9 +31,9 @@ Q_MAX = F(16)
 """Larger values of the quadratic form are this: alpha is then below ALPHA_MIN whatever the opacity."""
 E1, E2, E3, E4, E5 = F(0.99997018), F(0.49960978), F(0.16494888), F(0.03824679), F(0.00505834)
 """Of the polynomial 1 + E1 x + ... that has the least largest relative error to exp(x) on [-1, 0]: 8e-7."""
-ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8 = (U(AREA * k) for k in range(1, 9))
-ROWS = 9
-X, Y = ROW7, ROW8
+ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8, ROW9 = (U(AREA * k) for k in range(1, 10))
+ROWS = 10
+X, Y = ROW8, ROW9
 """Where the pixels' own coordinates lie in a tile's state."""
 
 SUMS = 20
@@ -163,6 +163,34 @@ def blend(packed, ids, starts, across, channels, stops, out):
 
 
 @njit(**FAST)
+def influence_tile(state, packed, ids, begin, end, x0, y0):
+    """Adds up |alpha dC/dalpha| of a tile's splats in row 7; uses up rows 0 (T) and 4-6 (colour to come)."""
+    for e in range(begin, end):
+        p = packed[ids[e]]
+        mx, my = p[0] - F(x0), p[1] - F(y0)
+        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        low, high = rows_of(p, y0)
+        for i in range(low, high):
+            dx = state[X + i] - mx
+            dy = state[Y + i] - my
+            a = min(o * exp_negative(-HALF * (dx * (A * dx + B * dy) + dy * (B * dx + C * dy))), MOST)
+            a = a if a >= LEAST else ZERO
+            w = a * state[i]
+            rr = state[ROW4 + i] - w * r
+            rg = state[ROW5 + i] - w * g
+            rb = state[ROW6 + i] - w * b
+            state[ROW4 + i] = rr
+            state[ROW5 + i] = rg
+            state[ROW6 + i] = rb
+            state[i] -= w
+            q = a / (ONE - a)
+            jr = w * r - q * rr
+            jg = w * g - q * rg
+            jb = w * b - q * rb
+            state[ROW7 + i] += np.sqrt(jr * jr + jg * jg + jb * jb)
+
+
+@njit(**FAST)
 def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
     """Sums of a tile's pairs. Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour to come, background too."""
     for e in range(begin, end):
@@ -198,7 +226,7 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
             jg = free * (w * g - q * rg)
             jb = free * (w * b - q * rb)
             v = jr * gr + jg * gg + jb * gb
-            h = jr * jr + jg * jg + jb * jb
+            h = np.sqrt(jr * jr + jg * jg + jb * jb) * state[ROW7 + i]
             vx = v * ex
             vy = v * ey
             s0 += v
@@ -241,8 +269,15 @@ def gradients(packed, ids, starts, stops, width, height, colour, slopes, sums):
             # Pixels outside the picture let nothing through, so that nothing there counts.
             inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
             state[i] = inside
+            state[7 * AREA + i] = ZERO
             for ch in range(3):
                 state[(1 + ch) * AREA + i] = inside * slopes[t, ch, i]
+                state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
+        influence_tile(state, packed, ids, starts[t], stops[t], x0, y0)
+        for i in range(AREA):
+            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
+            state[i] = inside
+            for ch in range(3):
                 state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
         gradient_tile(state, packed, ids, starts[t], stops[t], x0, y0, sums)
         for e in range(stops[t], starts[t + 1]):
