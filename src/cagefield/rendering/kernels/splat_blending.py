@@ -168,12 +168,13 @@ def influence_tile(state, packed, ids, begin, end, x0, y0):
     for e in range(begin, end):
         p = packed[ids[e]]
         mx, my = p[0] - F(x0), p[1] - F(y0)
-        A, B, C, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
+        A, k, D, o, r, g, b = p[2], p[3], p[4], p[5], p[6], p[7], p[8]
         low, high = rows_of(p, y0)
         for i in range(low, high):
             dx = state[X + i] - mx
             dy = state[Y + i] - my
-            a = min(o * exp_negative(-HALF * (dx * (A * dx + B * dy) + dy * (B * dx + C * dy))), MOST)
+            l = dx + k * dy
+            a = min(o * falloff(A * l * l + D * dy * dy), MOST)
             a = a if a >= LEAST else ZERO
             w = a * state[i]
             rr = state[ROW4 + i] - w * r

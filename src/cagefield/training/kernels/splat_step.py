@@ -18,6 +18,7 @@ from numba import prange
 from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import AREA, TILE, harmonics_at
 
+BOTH = 0.5
 MOMENTS, RUNNING = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
 
@@ -137,11 +138,14 @@ def gauss_newton(
         t = 1.0 / ticks[i]
         new1 = max(1.0 - memory[0], t)
         new2 = max(1.0 - memory[1], t)
-        H = running[i]
         g = momentum[i]
+        memory_H = running[i]
+        H = np.empty(17)
         for j in range(16):
-            H[j] += new2 * (curvatures[i, j] - H[j])
-        H[16] += new2 * (gradients[i, 14] - H[16])
+            memory_H[j] += new2 * (curvatures[i, j] - memory_H[j])
+            H[j] = memory_H[j] + BOTH * curvatures[i, j]
+        memory_H[16] += new2 * (gradients[i, 14] - memory_H[16])
+        H[16] = memory_H[16] + BOTH * gradients[i, 14]
         for j in range(13):
             g[j] += new1 * (gradients[i, j] - g[j])
         rel, tiny, cap = damping[0], damping[1], caps[0]
