@@ -1,19 +1,20 @@
-"""How well a VoxelField shows what photos show."""
+"""How well a field shows what photos show."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cagefield.datasets.views import View
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr, ssim
 
 
-def evaluate_views(field: VoxelField, views: tuple[View, ...]) -> tuple[float, float]:
+def evaluate_views(field: VoxelField | SplatField, views: tuple[View, ...]) -> tuple[float, float]:
     """(PSNR, SSIM) of the field's pictures against photos, means over views; alpha is composited on white."""
-    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.renderers import renderer_of
 
-    renderer = Renderer(field)
+    renderer = renderer_of(field)
     scores = []
     for view in views:
         photo = view.load().astype(np.float32) / 255.0

@@ -86,7 +86,9 @@ def surface_points(
         )
     step = inverse[:, 1]
     w = found[..., 0] * step[:, None, None]
-    sure = (found[..., 1] > LEAST_SCORE) & (found[..., 1] - found[..., 2] > LEAST_LEAD) & (w > 0.5 * step.min())
+    sure = (
+        (found[..., 1] > LEAST_SCORE) & (found[..., 1] - found[..., 2] > LEAST_LEAD) & (w > 0.5 * step.min())
+    )
     border = 3
     sure[:, :border] = sure[:, -border:] = False
     sure[:, :, :border] = sure[:, :, -border:] = False
@@ -103,7 +105,11 @@ def surface_points(
         positions.append(points[kept])
         colours.append(images[r].reshape(-1, images[r].shape[-1])[at[kept], :3])
         footprints.append(depth[kept] / cameras[r].fx)
-    everything, rgb, footprint = np.concatenate(positions), np.concatenate(colours), np.concatenate(footprints)
+    everything, rgb, footprint = (
+        np.concatenate(positions),
+        np.concatenate(colours),
+        np.concatenate(footprints),
+    )
     rows = _thinned(everything, footprint, wanted, seed)
     return everything[rows], rgb[rows]
 
@@ -129,7 +135,9 @@ def neighbours_of(cameras: Sequence[Camera], middle: Sequence[float]) -> NDArray
 def _directions(camera: Camera) -> Array:
     """(x, y) of the pixels' directions (x, y, 1) [H,W,2] in camera axes x right, y down, z forward."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    image = np.stack([(columns.ravel() - camera.cx) / camera.fx, (rows.ravel() - camera.cy) / camera.fy], axis=1)
+    image = np.stack(
+        [(columns.ravel() - camera.cx) / camera.fx, (rows.ravel() - camera.cy) / camera.fy], axis=1
+    )
     local = lenses.unproject(image, camera.model, camera.distortion)[0]
     return np.asarray((local[:, :2] / np.maximum(local[:, 2:], 0.05)).reshape(camera.height, camera.width, 2))
 
@@ -157,7 +165,12 @@ def _inside(camera: Camera, points: Array) -> NDArray[np.bool_]:
 
 
 def _agrees(
-    points: Array, camera: Camera, rotation: Array, w: NDArray[np.float64], sure: NDArray[np.bool_], step: float
+    points: Array,
+    camera: Camera,
+    rotation: Array,
+    w: NDArray[np.float64],
+    sure: NDArray[np.bool_],
+    step: float,
 ) -> NDArray[np.bool_]:
     """True [N] where the camera's own inverse depth is that of the point."""
     pixels, _ = camera.project(points)
@@ -170,7 +183,7 @@ def _agrees(
 
 
 def _thinned(points: Array, footprint: Array, wanted: int, seed: int) -> NDArray[np.int64]:
-    """Rows of about `wanted` points: one for each cell of a grid as coarse as needed, finer where photos are nearer."""
+    """Rows of about `wanted` points: one in each cell of a grid, finer where photos are nearer."""
     if len(points) <= wanted:
         return np.arange(len(points))
     order = np.random.default_rng(seed).permutation(len(points))

@@ -19,8 +19,7 @@ class SplatConfig:
         seed: of the photos' order, of splits and of random splats.
         antialiased: as SplatField.
         exposure: fit a colour gain to each photo; None does so for captures without alpha.
-        background: splats of the far background, in shares of those that a run begins with; None takes them
-            for unbounded captures.
+        background: splats far behind an unbounded capture, in shares of the others that a run begins with.
         rate: (first, last) rate of the steps.
         damping: (relative, absolute) damping of the blocks.
         cap: largest step of log scales and turns, and of means in sigmas.
@@ -36,10 +35,10 @@ class SplatConfig:
     seed: int = 0
     antialiased: bool = True
     exposure: bool | None = None
-    background: float | None = None
-    rate: tuple[float, float] = (0.1, 0.003)
+    background: float = 0.2
+    rate: tuple[float, float] = (0.8, 0.02)
     damping: tuple[float, float] = (0.1, 0.01)
-    cap: float = 0.03
+    cap: float = 0.15
     memory: tuple[float, float] = (0.5, 0.98)
     prune: float = 0.01
     refine_poses: bool = False

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import time
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,17 +24,12 @@ from cagefield.rendering.splat_rasterizer import (
     project,
     world_to_camera,
 )
+from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.splat_step import gauss_newton, residuals
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, split
-from cagefield.training.splat_seeds import (
-    FIRST_OPACITY,
-    background_seeds,
-    camera_scale,
-    neighbour_distance,
-    swept_points,
-)
+from cagefield.training.splat_seeds import camera_scale, first_splats
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
 
@@ -44,9 +42,14 @@ DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
 GROWTH = (0.02, 0.6)
 """Progress between which splats become more."""
 
-SURFACE = 10_000
 GROWTH_EVERY = 60
 """Steps between two growths."""
+
+PIXEL_SHARE = 0.15
+"""Most splats after five minutes, in shares of a photo's pixels."""
+
+STEPS_A_MINUTE = 800
+"""Steps that count as a minute where a run is limited by steps."""
 
 
 class SplatRun:
@@ -58,39 +61,24 @@ class SplatRun:
         self._rng = np.random.default_rng(config.seed)
         self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
-        self.state = self._seeds()
+        self._most = self._most_splats()
+        self.state = first_splats(dataset, self.views, config, self._most)
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fitted = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
-        self._gain_sums = np.zeros((len(self.views), 6))
         self._buffers = Buffers()
         self._queue: list[int] = []
         self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
-        self._most = self._most_splats()
         self._cold = True
 
-    def _seeds(self) -> SplatState:
-        dataset, config = self._dataset, self._config
-        points = dataset.points
-        assert points is not None
-        positions, rgb = points.positions, points.rgb
-        if SURFACE:
-            more, colours = swept_points(self.views, positions, SURFACE, config.seed)
-            positions, rgb = np.concatenate([positions, more]), np.concatenate([rgb, colours])
-        print("seeds", len(positions))
-        sigma = neighbour_distance(positions)
-        state = SplatState.new(positions, sigma, rgb.astype(np.float32) / 255.0, FIRST_OPACITY, config.sh_degree)
-        if dataset.unbounded and config.background != 0.0:
-            share = 0.3 if config.background is None else config.background
-            far = background_seeds(
-                self.views, dataset.bounds.mean(axis=0), self._scale, max(200, int(share * len(positions)))
-            )
-            state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
-        return state
-
     def _most_splats(self) -> int:
-        return self._config.splats or 20_000
+        """The most splats: what is asked for, else what the photos' detail and the time allow."""
+        if self._config.splats is not None:
+            return self._config.splats
+        pixels = float(np.median([view.cameras[0].width * view.cameras[0].height for view in self.views]))
+        minutes = self._config.minutes or self._config.steps / STEPS_A_MINUTE
+        return int(np.clip(PIXEL_SHARE * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
 
     @property
     def done(self) -> float:
@@ -166,7 +154,6 @@ class SplatRun:
         if not self._fitted:
             return
         sums = tile_sums[:, 1:].sum(axis=0, dtype=np.float64)
-        self._gain_sums[index] = sums
         if self.done > 0.05:
             fit = (sums[:3] + 0.02 * sums[3:].mean()) / (sums[3:] + 0.02 * sums[3:].mean())
             self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
@@ -188,3 +175,68 @@ class SplatRun:
     def field(self) -> SplatField:
         """The field as it is now."""
         return self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+
+    def progress(self) -> SplatProgress:
+        """Where the run stands."""
+        done = self.done
+        left = self.seconds * (1.0 - done) / done if done > 0 else float("nan")
+        if self._config.minutes is not None:
+            left = 60.0 * self._config.minutes - self.seconds
+        return SplatProgress(
+            done=done,
+            step=self.step,
+            loss=self.running_loss,
+            psnr=-10.0 * float(np.log10(max(self.running_loss, 1e-10))),
+            seconds=self.seconds,
+            seconds_left=max(left, 0.0),
+            splats=len(self.state),
+        )
+
+    def store(self, path: Path) -> None:
+        """Writes the run's state, atomically."""
+        scalars = {
+            "step": self.step,
+            "seconds": self.seconds,
+            "running_loss": self.running_loss,
+            "queue": self._queue,
+            "random": self._rng.bit_generator.state,
+        }
+        arrays = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        write_checkpoint(path, self._signature(), scalars, {**arrays, "gains": self.gains})
+
+    def restore(self, path: Path) -> None:
+        """Takes the run's state from a file written by `store`.
+
+        Raises:
+            CagefieldError: a file that cannot be read, or of other photos or settings.
+        """
+        scalars, arrays = read_checkpoint(path, self._signature())
+        self.gains = arrays.pop("gains")
+        self.state = SplatState(**arrays)
+        self.step, self.seconds = scalars["step"], scalars["seconds"]
+        self.running_loss, self._queue = scalars["running_loss"], scalars["queue"]
+        self._rng.bit_generator.state = scalars["random"]
+
+    def _signature(self) -> str:
+        """What a file must have been written for."""
+        sizes = [[view.cameras[0].width, view.cameras[0].height] for view in self.views]
+        settings = dataclasses.asdict(self._config)
+        return json.dumps(["splats", settings, [view.name for view in self.views], sizes])
+
+
+@dataclasses.dataclass(frozen=True)
+class SplatProgress:
+    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, seconds, splats."""
+
+    done: float
+    step: int
+    loss: float
+    psnr: float
+    seconds: float
+    seconds_left: float
+    splats: int
+
+    def __str__(self) -> str:
+        """Loss, PSNR, speed and number of splats."""
+        rate = self.step / max(self.seconds, 1e-9)
+        return f"loss {self.loss:.5f}, PSNR {self.psnr:.1f} dB, {rate:.0f} photos/s, {self.splats} splats"

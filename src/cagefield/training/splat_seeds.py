@@ -1,4 +1,4 @@
-"""The splats that a training begins with: round ones at sparse points, and a far background.
+"""The splats that a training begins with: round ones at sparse points and on surfaces, and a far background.
 
 Their size is the root mean square distance to the three nearest neighbours; background splats lie on a sphere
 far around the cameras and have the colour that the photos show in their direction.
@@ -12,6 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
+from cagefield.datasets.points import random_points
+from cagefield.datasets.views import Dataset
+from cagefield.rendering.splat_rasterizer import untiled
+from cagefield.training.plane_sweep import surface_points
+from cagefield.training.splat_config import SplatConfig
+from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import TrainingView
 
 Array = NDArray[np.float64]
@@ -21,8 +27,50 @@ FAR = 10.0
 
 FIRST_OPACITY = 0.3
 
+SURFACE_SHARE = 0.5
+"""Surface points that a training begins with, in shares of the most splats that it may have."""
+
+RANDOM = 4000
+"""Random points, where a data set has none, at most."""
+
 SWEPT_SIDE = 150
 """Least longer side of the photos that surface points are looked for in."""
+
+
+def first_splats(
+    dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, most: int
+) -> SplatState:
+    """The splats that a training begins with, at most `most`.
+
+    At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
+    capture, on a sphere far away. Where the data set has no points they are random ones.
+    """
+    points = dataset.points or random_points(dataset, min(most // 4, RANDOM), config.seed)
+    positions, rgb = points.positions, points.rgb
+    wanted = int(SURFACE_SHARE * most)
+    swept, colours = swept_points(views, positions, wanted, config.seed)
+    if dataset.points is None and len(swept) > len(positions):
+        # Random ones have done what they are for: to say how deep the photos may be.
+        positions, rgb = swept, colours
+    else:
+        positions, rgb = np.concatenate([positions, swept]), np.concatenate([rgb, colours])
+    positions, first = np.unique(positions.astype(np.float32), axis=0, return_index=True)
+    if len(positions) > most:
+        chosen = np.sort(np.random.default_rng(config.seed).permutation(len(positions))[:most])
+        positions, first = positions[chosen], first[chosen]
+    state = SplatState.new(
+        positions,
+        neighbour_distance(positions.astype(np.float64)),
+        rgb[first].astype(np.float32) / 255.0,
+        FIRST_OPACITY,
+        config.sh_degree,
+    )
+    if dataset.unbounded and config.background > 0.0:
+        unit = camera_scale([view.cameras[0] for view in views], dataset.bounds)
+        count = max(200, int(config.background * len(positions)))
+        far = background_seeds(views, dataset.bounds.mean(axis=0), unit, count)
+        state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
+    return state
 
 
 def neighbour_distance(positions: Array) -> Array:
@@ -85,20 +133,15 @@ def background_seeds(
     return positions[kept], np.full(int(kept.sum()), sigma), rgb[kept]
 
 
-def camera_scale(cameras: Sequence[Camera], bounds: Array) -> float:
-    """The median distance of the cameras from the middle of the bounds: the scene's own unit of length."""
-    origins = np.stack([camera.origin for camera in cameras])
-    median = float(np.median(np.linalg.norm(origins - bounds.mean(axis=0), axis=1)))
-    return max(median, 0.1 * float(np.linalg.norm(bounds[1] - bounds[0])))
-
-
 def depths_seen(cameras: Sequence[Camera], positions: Array) -> list[tuple[float, float] | None]:
     """(least, usual) depth of the positions [N,3] that each camera shows, None where it shows too few."""
     found: list[tuple[float, float] | None] = []
     for camera in cameras:
         pixels, depth = camera.project(positions)
         with np.errstate(invalid="ignore"):
-            seen = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
+            seen = (
+                (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
+            )
         near, usual = np.quantile(depth[seen], (0.01, 0.5)) if seen.sum() >= 20 else (0.0, 0.0)
         found.append((0.7 * float(near), float(usual)) if usual > 0 else None)
     return found
@@ -108,9 +151,6 @@ def swept_points(
     views: Sequence[TrainingView], positions: Array, wanted: int, seed: int
 ) -> tuple[Array, NDArray[np.uint8]]:
     """Surface points (positions, rgb) by plane sweeping the photos, their depths guided by sparse points."""
-    from cagefield.rendering.splat_rasterizer import untiled
-    from cagefield.training.plane_sweep import surface_points
-
     sides = [max(camera.width, camera.height) for camera in views[0].cameras]
     level = max([level for level, side in enumerate(sides) if side >= SWEPT_SIDE], default=0)
     cameras = [view.level(level)[0] for view in views]
@@ -118,8 +158,25 @@ def swept_points(
     usable = [n for n, depth in enumerate(depths) if depth is not None]
     size = (cameras[0].width, cameras[0].height)
     usable = [n for n in usable if (cameras[n].width, cameras[n].height) == size]
-    images = [untiled(views[n].level(level)[1], *size) for n in usable]
+    images = [_over_white(untiled(views[n].level(level)[1], *size)) for n in usable]
+    if len(usable) < 3 or wanted < 1:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
     known = [depth for depth in depths if depth is not None]
     return surface_points(
         images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], wanted, seed
     )
+
+
+def _over_white(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """rgb of pixels with straight alpha, as they are without it."""
+    if pixels.shape[2] == 3:
+        return pixels
+    alpha = pixels[..., 3:].astype(np.float32) / 255.0
+    return (pixels[..., :3] * alpha + 255.0 * (1.0 - alpha) + 0.5).astype(np.uint8)
+
+
+def camera_scale(cameras: Sequence[Camera], bounds: Array) -> float:
+    """The median distance of the cameras from the middle of the bounds: the scene's own unit of length."""
+    origins = np.stack([camera.origin for camera in cameras])
+    median = float(np.median(np.linalg.norm(origins - bounds.mean(axis=0), axis=1)))
+    return max(median, 0.1 * float(np.linalg.norm(bounds[1] - bounds[0])))

@@ -1,9 +1,10 @@
 """Inverse depths of photos by plane sweeping: how well neighbours agree at each of many depths (Numba).
 
 Notation: w is the inverse depth 1/z of a reference pixel with direction (x, y, 1) in its camera's axes. A
-neighbour sees it at q = A (x, y, 1) + w b, A and b the relative rotation and translation. The score of w is the
-zero-mean normalised cross-correlation of windows of (2 RADIUS + 1)^2 pixels, the mean of the two best neighbours:
-what one of them does not see counts for nothing.
+neighbour sees it at q = A (x, y, 1) + w b, A and b the relative rotation and translation. The score of w is
+the
+zero-mean normalised cross-correlation of windows of (2 RADIUS + 1)^2 pixels, the mean of the two best
+neighbours: what one of them does not see counts for nothing.
 
 Source: Collins, "A space-sweep approach to true multi-image matching" (1996); Gallup et al. (2007).
 """
@@ -11,9 +12,10 @@ Source: Collins, "A space-sweep approach to true multi-image matching" (1996); G
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
-from cagefield.rendering.kernels.splat_projection import FAST, distort
+from cagefield.compiling import FAST, njit
+from cagefield.rendering.kernels.splat_projection import distort
 
 RADIUS = 2
 """Pixels on each side of a window's centre."""
@@ -67,8 +69,11 @@ def warp(image, directions, A, b, w, focal, centre, model, coefficients, out, se
 
 
 @njit(parallel=True, **FAST)
-def sweep(images, directions, rotations, origins, focals, centres, models, coefficients, neighbours, inverse, out):
-    """Writes out [V,H,W,3]: the best inverse depth's (fractional) number, its score, the best score elsewhere.
+def sweep(
+    images, directions, rotations, origins, focals, centres, models, coefficients, neighbours, inverse, out
+):
+    """Writes out [V,H,W,3]: the best inverse depth's (fractional) number, its score, the best score
+    elsewhere.
 
     images [V,H,W] float32; directions [V,H,W,2]; rotations [V,3,3] world to camera; origins [V,3]; neighbours
     [V,K]; inverse [V,D] inverse depths of each reference view, even and growing.

@@ -87,8 +87,8 @@ def chain(
 ):
     """Writes gradients [N,GRADIENTS] and curvatures [N,CURVATURES] of the splats in `order`; others are left.
 
-    The colour's gradient is that before its clamp at 0. `directional` adds to the mean's gradient what comes from
-    the direction in which the colour is seen, where the clamp does not hold.
+    The colour's gradient is that before its clamp at 0. `directional` adds to the mean's gradient what
+    comes from the direction in which the colour is seen, where the clamp does not hold.
     """
     fx, fy = focal[0], focal[1]
     terms = sh.shape[1]

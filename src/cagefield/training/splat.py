@@ -1,0 +1,84 @@
+"""Training of a SplatField: from points on surfaces, coarse to fine, by damped Gauss-Newton steps.
+
+A run begins with splats at the data set's points and at points that the photos agree on (`splat_seeds`,
+`plane_sweep`). Each step takes one photo: the splats are drawn (`rendering.splat_rasterizer`), its error goes
+back to every splat that it shows (`kernels.splat_chain`), and each takes a Gauss-Newton step of its own
+(`kernels.splat_step`). Photos are small at first and grow, and so do the harmonics. Between steps, splats
+with much error are split and those that show nothing are taken out (`splat_growth`).
+
+On a CPU a run of given `steps` gives the same field for the same seed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.datasets.points import points_cache, points_of
+from cagefield.datasets.views import Dataset
+from cagefield.fields.splat import SplatField
+from cagefield.training.evaluation import evaluate_views
+from cagefield.training.running import run_to_end
+from cagefield.training.splat_config import SplatConfig
+
+
+@dataclass(frozen=True, eq=False)
+class SplatTrainResult:
+    """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none."""
+
+    field: SplatField
+    steps: int
+    seconds: float
+    train_psnr: float
+    test_psnr: float
+    test_ssim: float
+    gains: NDArray[np.float32]
+    finished: bool
+
+
+def train_splat(
+    dataset: Dataset,
+    config: SplatConfig | None = None,
+    *,
+    checkpoint: Path | str | None = None,
+    resume: bool = False,
+    on_progress: Callable[[object], None] | None = None,
+    on_points: Callable[[float, str], None] | None = None,
+    evaluate: bool = True,
+) -> SplatTrainResult:
+    """The splats trained on the data set's photos, with PSNR and SSIM on its test views.
+
+    A capture without points gets them from its poses first (`points_of`; `on_points` is told how far that
+    is),
+    and keeps them in the user's cache. With `checkpoint`, the state of the run is written there every
+    minute and
+    at its end, which may be early (Ctrl-C; `finished` is then False); `resume` goes on from it. On a CPU a
+    resumed run of given `steps` ends in the same field as an uninterrupted one.
+
+    Raises:
+        DatasetError: no photos, or photos that cannot be read.
+        CagefieldError: a checkpoint that cannot be read or was written with another configuration.
+    """
+    from cagefield.training.splat_run import SplatRun
+
+    config = config or SplatConfig()
+    points = None
+    if dataset.unbounded or dataset.points is not None:
+        points = points_of(dataset, points_cache(), on_progress=on_points, seed=config.seed)
+    run = SplatRun(dataclasses.replace(dataset, points=points), config)
+    finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
+    field = run.field()
+    train_psnr = test_psnr = test_ssim = float("nan")
+    if evaluate and len(field):
+        some = dataset.train[:: max(1, len(dataset.train) // 10)]
+        train_psnr, _ = evaluate_views(field, some)
+        if dataset.test:
+            test_psnr, test_ssim = evaluate_views(field, dataset.test)
+    return SplatTrainResult(
+        field, run.step, run.seconds, train_psnr, test_psnr, test_ssim, run.gains, finished
+    )
