@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -156,6 +159,30 @@ def test_an_interrupted_run_goes_on(photos, tmp_path, monkeypatch, capfd):
     assert is_made_of(target, source)
     (source / "00.png").touch()
     assert not is_made_of(target, source)
+
+
+def test_ctrl_c_ends_a_call_of_pycolmap_s_and_waits_for_its_end():
+    order = []
+
+    def endless(cancellation_token):
+        while not cancellation_token.is_cancelled:
+            time.sleep(0.01)
+        time.sleep(0.3)
+        order.append("ended")
+
+    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
+    with pytest.raises(KeyboardInterrupt):
+        features.call(endless)
+    assert order == ["ended"]
+    assert features.engine().logging.minloglevel == 0
+
+
+def test_a_failure_of_colmap_s_is_one_line(tmp_path):
+    def fails(cancellation_token):
+        raise RuntimeError("[file.cc:12] Check failed:\n  a == b")
+
+    with pytest.raises(DatasetError, match=r"COLMAP stopped at fails: \[file.cc:12\] Check failed: a == b"):
+        features.call(fails)
 
 
 def test_the_work_of_other_photos_is_not_used(photos, tmp_path):

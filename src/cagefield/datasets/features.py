@@ -81,18 +81,20 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
             result.append(function(*args, **kw, cancellation_token=token))
         except BaseException as error:
             failure.append(error)
+        finally:
+            ended.set()  # a join that Ctrl-C interrupts takes the thread for ended
 
+    ended = threading.Event()
     thread = threading.Thread(target=work, name="colmap", daemon=True)
     with quiet():
         thread.start()
         try:
-            while thread.is_alive():
-                thread.join(0.2)
+            while not ended.wait(0.2):
                 if poll is not None:
                     poll()
         except BaseException:
             token.cancel()
-            thread.join()
+            ended.wait()
             raise
     if failure:
         reason = " ".join(str(failure[0]).split())
