@@ -62,7 +62,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.bench import Bench
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
-    from cagefield.cli.import_nerf import ImportNerf
+    from cagefield.cli.import_field import ImportField
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
     from cagefield.cli.poses import Poses
@@ -75,7 +75,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[MakeScene, tyro.conf.subcommand("make-scene")]
         | Annotated[Poses, tyro.conf.subcommand("poses")]
         | Annotated[Train, tyro.conf.subcommand("train")]
-        | Annotated[ImportNerf, tyro.conf.subcommand("import")]
+        | Annotated[ImportField, tyro.conf.subcommand("import")]
         | Annotated[Bake, tyro.conf.subcommand("bake")]
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]

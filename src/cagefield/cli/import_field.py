@@ -1,0 +1,117 @@
+"""`cagefield import`: what another program trained, as a scene: splats, or a NeRF."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import tyro
+
+from cagefield.cli.options import Baking, BakingOptions, Device, Flag, Output
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.datasets import Dataset
+    from cagefield.scene import Scene
+
+Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
+Unbounded = Literal["auto", "on", "off"]
+
+
+@dataclass(frozen=True)
+class ImportField:
+    """Read a splat file (.ply, .compressed.ply) or a nerf-pytorch checkpoint (.tar, .ckpt): a scene.
+
+    Splats stay splats and keep the file's coordinates; a NeRF is baked into voxels.
+    """
+
+    file: tyro.conf.Positional[Path]
+    """Splats in 3DGS' or PlayCanvas' layout, or a checkpoint of yenchenlin's or krrish94's nerf-pytorch."""
+    out: Output
+    """Scene folder."""
+    data: Path | None = None
+    """Data set it was trained on: its cameras become the scene's; cameras all around if left out."""
+    up: Up = "y-down"
+    """Which way splats are turned, where --data is left out: most files have y pointing down."""
+    unbounded: Unbounded = "auto"
+    """Splats far away are surroundings: auto where they are much farther than most."""
+    config: Path | None = None
+    """Config of a NeRF's training; args.txt, config.txt or config.yml beside the checkpoint if left out."""
+    fov_deg: float | None = None
+    """Horizontal field of view of a NeRF's forward-facing photos, where --data is left out."""
+    downscale: int | None = None
+    """Shrink the data set's photos by this factor; left out, until their longer side is 800 or less."""
+    baking: Baking = field(default_factory=BakingOptions)
+    device: Device = "auto"
+    overwrite: Flag = False
+    """Replace the scene that is there."""
+
+    def run(self) -> None:
+        """Reads, bakes where it must, and writes; prints what it found."""
+        from cagefield.scene_files import check_destination
+
+        check_destination(self.out, self.overwrite)
+        if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:
+            raise CagefieldError(f"--fov-deg is {self.fov_deg}; it must be from 1 to 170")
+        if self.file.suffix.lower() == ".ply":
+            scene, lines = self._splats()
+        else:
+            scene, lines = self._nerf()
+        scene.save(self.out, overwrite=self.overwrite)
+        print(f"{lines}\nscene written to {self.out}")
+
+    def _splats(self) -> tuple[Scene, str]:
+        """The scene of a splat file, and lines that say what it holds."""
+        from cagefield.formats.splat_import import import_splats
+        from cagefield.formats.splat_ply import read_splat_ply
+        from cagefield.scene import Scene
+
+        if self.config is not None or self.fov_deg is not None:
+            raise CagefieldError("--config and --fov-deg are for NeRFs; leave them out for splats")
+        imported = import_splats(
+            read_splat_ply(self.file),
+            self.up,
+            dataset=self._dataset(),
+            unbounded={"auto": None, "on": True, "off": False}[self.unbounded],
+        )
+        splats = imported.field
+        size = " x ".join(f"{edge:.4g}" for edge in splats.bounds[1] - splats.bounds[0])
+        around = " and surroundings" if splats.unbounded else ""
+        trained = ", trained antialiased" if splats.antialiased else ""
+        count = sum(len(group) for group in imported.cameras.values())
+        cameras = f"{count} cameras" + ("" if self.data else f" all around, {self.up}")
+        line = f"{len(splats)} splats, SH degree {splats.sh_degree}{trained}; box {size}{around}; {cameras}"
+        return Scene(splats, cameras=imported.cameras, background=imported.background), line
+
+    def _nerf(self) -> tuple[Scene, str]:
+        """The baked scene of a checkpoint, and lines that say what it holds."""
+        from cagefield import devices
+        from cagefield.cli.bake import bake_scene
+        from cagefield.formats.nerf_pytorch import read_checkpoint
+        from cagefield.formats.nerf_pytorch_config import Settings, find_config, read_config
+        from cagefield.formats.nerf_pytorch_import import import_nerf
+
+        if self.up != "y-down" or self.unbounded != "auto":
+            raise CagefieldError("--up and --unbounded are for splats; leave them out for a NeRF")
+        found = read_checkpoint(self.file)
+        config = self.config or find_config(self.file)
+        settings = Settings() if config is None else read_config(config)
+        fov = None if self.fov_deg is None else math.radians(self.fov_deg)
+        imported = import_nerf(found, settings, self._dataset(), fov)
+        devices.start(self.device)
+        scene, figures = bake_scene(
+            imported.field,
+            imported.cameras,
+            imported.background,
+            self.baking,
+            unbounded=imported.field.ndc is not None,
+        )
+        sampling = f"sampling: {config if config else 'no config found, as for Blender scenes'}"
+        return scene, f"{found}\n{sampling}\n{figures}"
+
+    def _dataset(self) -> Dataset | None:
+        from cagefield.datasets import load_dataset
+
+        return None if self.data is None else load_dataset(self.data, downscale=self.downscale)
