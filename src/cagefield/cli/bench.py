@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from cagefield.cli.bench_captures import BenchCaptures
 from cagefield.cli.bench_maps import BenchAblation, BenchGrids
 from cagefield.cli.options import (
     Device,
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
     from cagefield.benchmarking.cases import Case
     from cagefield.benchmarking.workbench import Workbench
 
-_SILENT = ("workdir", "out", "pictures", "picture_size", "error_panel", "overwrite", "scene_out")
+_SILENT = (
+    "workdir", "out", "pictures", "picture_size", "picture_views", "error_panel", "overwrite", "scene_out",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ class BenchEdits:
             self.compared_views,
             self.discrete_views,
         )
-        with _work_folder(self.workdir) as folder:
+        with work_folder(self.workdir) as folder:
             bench = Workbench(settings, folder, progress_bar, self.retrain)
             if not self.only_pictures:
                 self._measure(cases, bench)
@@ -308,7 +311,7 @@ class BenchTraining:
 
 @dataclass(frozen=True)
 class Bench:
-    """Measurements: edits against ground truth, frame times, test PSNR against training time."""
+    """Measurements: edits against ground truth, frame times, training curves, captures of real places."""
 
     what: tyro.conf.OmitSubcommandPrefixes[
         tyro.conf.OmitArgPrefixes[
@@ -317,6 +320,7 @@ class Bench:
             | Annotated[BenchAblation, tyro.conf.subcommand("ablation")]
             | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
             | Annotated[BenchTraining, tyro.conf.subcommand("training")]
+            | Annotated[BenchCaptures, tyro.conf.subcommand("captures")]
         ]
     ]
 
@@ -339,7 +343,7 @@ def _words(options: Any, silent: Collection[str]) -> Iterator[str]:
             yield from _words(value, silent)
             continue
         if option.default is dataclasses.MISSING:
-            yield str(value)
+            yield from map(str, value) if isinstance(value, tuple) else [str(value)]
             continue
         yield "--" + option.name.replace("_", "-")
         if isinstance(value, tuple):
@@ -354,7 +358,7 @@ def _evenly(count: int, chosen: int) -> list[int]:
 
 
 @contextmanager
-def _work_folder(path: Path | None) -> Iterator[Path]:
+def work_folder(path: Path | None) -> Iterator[Path]:
     """The folder, or one that is removed afterwards."""
     if path is not None:
         yield path.resolve()

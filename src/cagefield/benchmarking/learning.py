@@ -1,0 +1,145 @@
+"""Fields trained on captures, whatever their kind, and how the benchmarks look at them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera
+from cagefield.datasets import Dataset
+from cagefield.errors import CagefieldError
+from cagefield.rendering.frame import Frame
+
+Float32 = NDArray[np.float32]
+CaptureField = Literal["splat", "voxel"]
+
+SAMPLES = 256
+"""Samples along a ray whose opacity is summed up."""
+
+_CHUNK = 1 << 19
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """A trained field: its kind, its number of splats or voxels, how long it took, and its pictures.
+
+    `opacity_before(camera, pixels, distances)` is the opacity [K] gathered along the rays through the centres
+    of pixels [K,2] (column, row) before distances [K].
+    """
+
+    kind: str
+    elements: int
+    seconds: float
+    steps: int
+    show: Callable[[Camera], Frame]
+    opacity_before: Callable[[Camera, NDArray[Any], NDArray[Any]], NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How long and how large: minutes, or `steps` where they are given; None takes the trainer's own."""
+
+    minutes: float = 5.0
+    steps: int | None = None
+    splats: int | None = None
+    resolution: int = 256
+    sh_degree: int | None = None
+    seed: int = 0
+
+
+def learn(dataset: Dataset, kind: str, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
+    """The field of that kind trained on the data set.
+
+    Raises CagefieldError for another kind, KeyboardInterrupt where the training was interrupted.
+    """
+    trainers = {"splat": _splats, "voxel": _voxels}
+    if kind not in trainers:
+        raise CagefieldError(f"fields of captures are {', '.join(trainers)}, not {kind!r}")
+    return trainers[kind](dataset, budget, on_progress)
+
+
+def _splats(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
+    from cagefield.rendering.splat_renderer import SplatRenderer
+    from cagefield.training.splat import train_splat
+
+    result = train_splat(dataset, splat_config(budget), on_progress=on_progress, evaluate=False)
+    if not result.finished:
+        raise KeyboardInterrupt
+    renderer = SplatRenderer(result.field)
+    behind = tuple(float(value) for value in result.background)
+
+    def show(camera: Camera) -> Frame:
+        return renderer.render(camera, background=behind)
+
+    def before(camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> NDArray[Any]:
+        return renderer.opacity_before(camera, pixels + 0.5, distances)
+
+    return Learnt("splat", len(result.field), result.seconds, result.steps, show, before)
+
+
+def splat_config(budget: Budget) -> Any:
+    """The configuration of the splats' trainer for a budget."""
+    from cagefield.training.splat_config import SplatConfig
+
+    return SplatConfig(
+        steps=SplatConfig.steps if budget.steps is None else budget.steps,
+        minutes=budget.minutes if budget.steps is None else None,
+        splats=budget.splats,
+        sh_degree=SplatConfig.sh_degree if budget.sh_degree is None else budget.sh_degree,
+        seed=budget.seed,
+    )
+
+
+def _voxels(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
+    from cagefield.training.voxel import train_voxel
+    from cagefield.training.voxel_config import VoxelConfig
+
+    config = VoxelConfig(
+        steps=VoxelConfig.steps if budget.steps is None else budget.steps,
+        minutes=budget.minutes if budget.steps is None else None,
+        resolution=budget.resolution,
+        sh_degree=VoxelConfig.sh_degree if budget.sh_degree is None else budget.sh_degree,
+        seed=budget.seed,
+    )
+    result = train_voxel(dataset, config, on_progress=on_progress, evaluate=False)
+    if not result.finished:
+        raise KeyboardInterrupt
+    from cagefield.rendering.renderer import Renderer
+
+    renderer = Renderer(result.field)
+
+    def show(camera: Camera) -> Frame:
+        frame = renderer.render(camera, background="white" if dataset.white_background else "black")
+        assert frame is not None  # nobody stops it
+        return frame
+
+    def before(camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> NDArray[Any]:
+        return sampled_opacity(result.field, camera, pixels, distances)
+
+    return Learnt("voxel", len(result.field.vertices), result.seconds, result.steps, show, before)
+
+
+def sampled_opacity(
+    field: Callable[[Float32, Float32], tuple[Any, Any]],
+    camera: Camera,
+    pixels: NDArray[Any],
+    distances: NDArray[Any],
+    samples: int = SAMPLES,
+) -> NDArray[np.float64]:
+    """Opacity [K] of a field before distances [K] along the rays of pixels [K,2]: 1 - exp(-sum sigma delta)."""
+    origins, directions = camera.rays(pixels)
+    depth = np.zeros(len(pixels))
+    middles = (np.arange(samples) + 0.5) / samples
+    rows = max(1, _CHUNK // samples)
+    for start in range(0, len(pixels), rows):
+        some = slice(start, start + rows)
+        t = (np.asarray(distances)[some, None] * middles).astype(np.float32)
+        points = origins[some, None] + t[..., None] * directions[some, None]
+        along = np.broadcast_to(directions[some, None], points.shape)
+        sigma, _ = field(points.reshape(-1, 3), np.ascontiguousarray(along).reshape(-1, 3))
+        depth[some] = np.asarray(sigma, np.float64).reshape(t.shape).sum(axis=1)
+    return 1.0 - np.exp(-depth * np.asarray(distances, np.float64) / samples)

@@ -1,0 +1,143 @@
+"""`cagefield bench captures`: fields trained on real captures and on the built-in rooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import tyro
+
+from cagefield.cli.options import Device, Flag, Output, check_file, progress_bar
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.benchmarking.captures import CaptureScore
+    from cagefield.benchmarking.learning import Budget
+    from cagefield.datasets import Dataset
+
+
+@dataclass(frozen=True)
+class BenchCaptures:
+    """Held-out PSNR, depth errors and fog of fields trained on captures; writes a Markdown table."""
+
+    data: tyro.conf.Positional[tuple[str, ...]]
+    """Data sets: folders, their camera files, or names of built-in rooms: room-digger, room-chair,
+    room-microphone, room-plant."""
+    out: Output = Path("benchmarks/results/captures.md")
+    """Markdown file for the table."""
+    fields: tuple[Literal["splat", "voxel"], ...] = ("splat",)
+    """What is trained on each capture."""
+    minutes: float = 5.0
+    """How long to train each."""
+    steps: int | None = None
+    """Train this many steps instead."""
+    splats: int | None = None
+    """Most splats; left out, as many as photos and time allow."""
+    resolution: int = 256
+    """Voxels along the longest axis."""
+    sh_degree: int | None = None
+    """Degree of the colour's spherical harmonics; left out, the trainer's own."""
+    seed: int = 0
+    """Of the training."""
+    downscale: int | None = None
+    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
+    holdout: int = 8
+    """Keep every so-many-th photo for testing where the data set has no test views."""
+    room_size: int | None = None
+    """Longer side of the photos of built-in rooms, 640 if left out."""
+    room_views: int | None = None
+    """Number of their photos; left out, as the room asks."""
+    workdir: Path | None = None
+    """Folder that keeps the photos of built-in rooms for the next call."""
+    pictures: Path | None = None
+    """Folder for pictures of held-out views: photo, picture, difference, depth, true depth where known."""
+    picture_views: int = 4
+    """Number of pictures for each capture and field."""
+    device: Device = "auto"
+    overwrite: Flag = False
+    """Replace the table that is there."""
+
+    def run(self) -> None:
+        """Makes the photos that are missing, trains, measures, shows the table, says where the files are."""
+        from cagefield import devices
+        from cagefield.benchmarking.captures import table
+        from cagefield.benchmarking.learning import Budget
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.tables import write_text
+        from cagefield.cli.bench import command_line, work_folder
+
+        if not self.data:
+            raise CagefieldError("no capture to measure; give folders, or names of built-in rooms")
+        if not self.fields:
+            raise CagefieldError("no field to train; give --fields splat, voxel or both")
+        if self.picture_views < 1:
+            raise CagefieldError(f"--picture-views is {self.picture_views}; it must be at least 1")
+        if self.holdout == 0:
+            raise CagefieldError("--holdout 0 keeps no photo to measure on; give 2 or more")
+        check_file(self.out, self.overwrite)
+        budget = Budget(self.minutes, self.steps, self.splats, self.resolution, self.sh_degree, self.seed)
+        devices.start(self.device)
+        scores = []
+        with work_folder(self.workdir) as folder:
+            for name in self.data:
+                dataset = self._open(name, folder)
+                for field in self.fields:
+                    scores.append(self._measure(dataset, field, budget))
+        notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench captures', self)}`")
+        result = table(scores, notes)
+        result.show()
+        write_text(self.out, result.markdown())
+        print(f"table written to {self.out}")
+
+    def _open(self, name: str, folder: Path) -> Dataset:
+        """The data set of that name; a built-in room is photographed where the work folder lacks it."""
+        from cagefield.benchmarking.workbench import digest
+        from cagefield.datasets import load_dataset
+        from cagefield.datasets.procedural import CAPTURES, make_capture
+
+        path = Path(name)
+        if name in CAPTURES and not path.exists():
+            key = digest([name, self.room_views, self.room_size], ("datasets/procedural", "cameras.py"))
+            path = folder / f"photos-{key}" / name
+            if not path.is_dir():
+                with progress_bar(f"{name}: photos") as move:
+                    make_capture(
+                        name,
+                        path,
+                        views=self.room_views,
+                        size=self.room_size,
+                        progress=lambda i, n: move(i, n, f"{i}/{n}"),
+                    )
+        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
+        if not dataset.test:
+            raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
+        return dataset
+
+    def _measure(self, dataset: Dataset, field: str, budget: Budget) -> CaptureScore:
+        import dataclasses
+
+        from cagefield.benchmarking import captures
+        from cagefield.benchmarking.learning import learn
+
+        points = captures.sighted_points(dataset)
+        captures.forget_memory()
+        with progress_bar(f"{dataset.name}: training {field}") as move:
+            learnt = learn(
+                captures.for_training(dataset, points),
+                field,
+                budget,
+                lambda progress: move(progress.done, 1.0, str(progress)),
+            )
+        score = captures.measure(dataset, learnt, points)
+        score = dataclasses.replace(score, memory=captures.peak_memory())
+        print(
+            f"{score.name}, {field}: PSNR {score.test[0]:.2f} dB ({score.test[1]:.2f} exposed) on held-out "
+            f"photos, {score.train[0]:.2f} on training photos; fog {100 * score.points.fog:.1f}%, depth error "
+            f"{100 * score.points.median:.1f}%",
+            flush=True,
+        )
+        if self.pictures is not None:
+            for path in captures.write_pictures(dataset, learnt, self.pictures, self.picture_views):
+                print(f"picture written to {path}", flush=True)
+        return score

@@ -1,0 +1,196 @@
+"""The captures' benchmark, held against fields whose depth errors and fog are known."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cagefield.benchmarking import captures
+from cagefield.benchmarking.captures import CaptureScore, DepthFigures, for_training, sighted_points, table
+from cagefield.benchmarking.learning import Budget, Learnt, learn, sampled_opacity
+from cagefield.cameras import Camera
+from cagefield.datasets import load_dataset
+from cagefield.datasets.procedural import capture, make_capture
+from cagefield.datasets.procedural.hand_held import picture
+from cagefield.datasets.views import SparsePoints
+from cagefield.errors import CagefieldError
+from cagefield.rendering.frame import Frame
+from cagefield.rendering.images import read_image
+from commands import printed, refused
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    return make_capture("room-digger", tmp_path_factory.mktemp("captures") / "room", views=16, size=160)
+
+
+def exact(further: float = 1.0, veil: float = 0.0, gain: float = 1.0) -> Learnt:
+    """The room itself as a field: `further` times as far, behind a veil half way, in another exposure."""
+    scene = capture("room-digger").scene
+
+    def show(camera: Camera) -> Frame:
+        rgb, depth = picture(scene, camera)
+        return Frame(np.minimum(rgb, 1) * gain, np.ones_like(depth), depth * np.float32(further))
+
+    def before(camera: Camera, pixels: np.ndarray, distances: np.ndarray) -> np.ndarray:
+        depth = show(camera).depth[pixels[:, 1], pixels[:, 0]] / further
+        assert (np.abs(distances / depth - captures.NEARER) < 0.5).all()
+        return np.full(len(pixels), veil)
+
+    return Learnt("exact", 7, 1.0, 1, show, before)
+
+
+def test_the_scene_itself_has_no_depth_error_and_no_fog(room):
+    data = load_dataset(room)
+    points = sighted_points(data)
+    assert points is not None
+    score = captures.measure(data, exact(), points)
+    assert (score.photos, score.held_out, score.size) == (14, 2, (90, 160))
+    # noise of about 42 dB, exposures of some percent; these are fitted
+    assert 24 < score.test[0] < score.test[1] and 33 < score.test[1] < 48
+    assert 33 < score.train[1] < 48 and score.ssim > 0.9
+    # the true depth is the photo's own; points are as far off as .7 pixels make them
+    assert score.truth == DepthFigures(score.truth.rays, 0.0, 0.0, 0.0)
+    assert 1000 < score.truth.rays <= 2 * captures.TRUE_RAYS
+    assert score.points.rays > 15 and score.points.median < 0.02 and score.points.fog == 0.0
+
+
+def test_depth_errors_fog_and_exposures_are_what_they_are_made(room):
+    data = load_dataset(room)
+    points = sighted_points(data)
+    score = captures.measure(data, exact(1.25, veil=0.11, gain=0.5), points)
+    assert score.truth.median == pytest.approx(0.25, abs=1e-5)
+    assert score.truth.high == pytest.approx(0.25, abs=1e-5)
+    assert score.points.median == pytest.approx(0.25, abs=0.03)
+    assert (score.truth.fog, score.points.fog) == (1.0, 1.0)
+    plain = captures.measure(data, exact(), points)
+    # a gain for each channel takes the halved exposure out
+    assert score.test[1] == pytest.approx(plain.test[1], abs=0.01) and score.test[0] < 15
+    assert captures.measure(data, exact(veil=0.09), points).points.fog == 0.0
+    assert captures.measure(data, exact(), None).points.rays == 0
+
+
+def test_points_that_held_out_photos_alone_see_are_not_trained_with(room):
+    data = load_dataset(room)
+    train, test = [v.name for v in data.train], [v.name for v in data.test]
+    sets = (frozenset(test), frozenset([*test, train[0]]), frozenset(train[:2]), frozenset([*train, *test]))
+    points = SparsePoints(np.arange(12.0).reshape(4, 3), np.zeros((4, 3), np.uint8), sets)
+    kept = for_training(data, points).points
+    assert kept is not None and kept.positions[:, 0].tolist() == [6.0, 9.0]
+    assert for_training(data, points.take(np.array([0]))).points is None
+    assert for_training(data, None) is data
+
+
+def test_sightings_of_the_colmap_model_beside_a_transforms_file_are_found(room):
+    pytest.importorskip("pycolmap")
+    data = load_dataset(room)
+    assert data.points is not None and not data.points.seen_by
+    points = sighted_points(data)
+    assert points is not None
+    np.testing.assert_allclose(points.positions, data.points.positions, atol=1e-5)
+    names = {view.name for view in (*data.train, *data.test)}
+    assert all(len(those) >= 3 and those <= names for those in points.seen_by)
+    model = load_dataset(room / "colmap/sparse/0/cameras.txt")
+    assert sighted_points(model) is model.points
+
+
+def test_the_true_depth_follows_the_photo_when_it_is_shrunk(room):
+    whole, half = load_dataset(room), load_dataset(room, downscale=2)
+    large, small = (captures.true_depth(data, data.test[0]) for data in (whole, half))
+    assert large is not None and small is not None and small.shape == (80, 45)
+    np.testing.assert_array_equal(small, large[1::2, 1::2])
+    assert captures.true_depth(whole, whole.train[0]) is None
+    other = dataclasses.replace(half.test[0], downscale=4)
+    with pytest.raises(CagefieldError, match="its photo shrunk by 4 is 45x80"):
+        captures.true_depth(whole, other)
+
+
+def test_sampled_opacity_is_beers_law():
+    def field(positions: np.ndarray, viewdirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.where(positions[:, 1] < 0, 0.5, 0.0).astype(np.float32), np.zeros((len(positions), 3))
+
+    camera = Camera.look_at((0, -4, 0), (0, 0, 0), width=9, height=9, fov_x=0.3)
+    pixels = np.array([[4, 4], [0, 4]])
+    _, directions = camera.rays(pixels)
+    found = sampled_opacity(field, camera, pixels, np.array([3.0, 6.0]))
+    # the fog ends at y = 0; half a sample of 6 / 256 is left at its edge
+    expected = 1 - np.exp(-0.5 * np.minimum([3.0, 6.0], 4 / directions[:, 1]))
+    np.testing.assert_allclose(found, expected, atol=0.5 * 6 / 256)
+    many = sampled_opacity(field, camera, np.tile(pixels, (3000, 1)), np.tile([3.0, 6.0], 3000))
+    np.testing.assert_allclose(many.reshape(-1, 2), np.tile(found, (3000, 1)), atol=1e-12)
+
+
+def test_unknown_fields_and_captures_without_held_out_photos_are_refused(room):
+    data = load_dataset(room)
+    with pytest.raises(CagefieldError, match="fields of captures are splat, voxel, not 'mesh'"):
+        learn(data, "mesh", Budget(), print)
+    with pytest.raises(CagefieldError, match="no held-out photos"):
+        captures.measure(dataclasses.replace(data, test=()), exact())
+
+
+def test_the_table_has_a_row_for_each_score_and_dashes_for_what_is_not_known():
+    figures = DepthFigures(120, 0.0123, 0.2, 0.031)
+    score = CaptureScore(
+        "beer", "splat", 62, 9, (360, 640), 300.4, 20000, (29.0, 30.0), (25.5, 26.5), 0.8123, figures,
+        DepthFigures(), 3.21,
+    )  # fmt: skip
+    text = table([score], ["Machine: mine"]).markdown()
+    row = next(line for line in text.splitlines() if line.startswith("| beer"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells == [
+        "beer", "splat", "62", "9", "360x640", "300", "20000", "29.00", "25.50", "30.00", "26.50", "0.8123",
+        "120", "1.2%", "20.0%", "3.1%", "-", "-", "-", "3.2 GiB",
+    ]  # fmt: skip
+    assert "- Machine: mine" in text
+
+
+def test_memory_is_that_of_this_process():
+    captures.forget_memory()
+    before = captures.peak_memory()
+    block = np.ones(1 << 25)
+    assert before + 0.2 < captures.peak_memory() < before + 2
+    assert block[0] == 1
+
+
+def test_the_command_measures_rooms_and_folders(room, tmp_path, capsys):
+    """Voxels, 20 steps: their figures are poor, and they are there; the room's photos are made once."""
+    out, pictures = tmp_path / "table.md", tmp_path / "pictures"
+    argv = ["bench", "captures", room, "room-chair", "--fields", "voxel", "--steps", 20, "--resolution", 16,
+            "--room-size", 64, "--room-views", 9, "--workdir", tmp_path / "work", "-o", out,
+            "--pictures", pictures, "--picture-views", 1]  # fmt: skip
+    text = printed(capsys, *argv)
+    assert "room, voxel: PSNR " in text and "room-chair, voxel: PSNR " in text
+    lines = out.read_text().splitlines()
+    assert [line.split("|")[1].strip() for line in lines if "| voxel" in line] == ["room", "room-chair"]
+    command = next(line for line in lines if line.startswith("- Command"))
+    assert (
+        "--steps 20 --resolution 16 --room-size 64 --room-views 9`" in command and "table.md" not in command
+    )
+    (made,) = (tmp_path / "work").glob("photos-*/room-chair")
+    stamp = (made / "transforms.json").stat().st_mtime_ns
+    shown = read_image(pictures / "room_voxel_frame_00001.png")
+    # photo, picture, difference, depth, true depth: five of 90 pixels with gaps of 4
+    assert shown.shape == (160, 5 * 90 + 4 * 4, 3)
+    photo = read_image(room / "images/frame_00001.jpg")
+    np.testing.assert_array_equal(shown[:, :90], photo)
+    assert "exists already" in refused(capsys, *argv)
+    printed(capsys, *argv, "--overwrite")
+    assert (made / "transforms.json").stat().st_mtime_ns == stamp
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "no capture to measure"),
+        (("room-chair", "--holdout", 0), "--holdout 0 keeps no photo to measure on"),
+        (("room-chair", "--picture-views", 0), "--picture-views is 0; it must be at least 1"),
+        (("no-such-folder",), "no-such-folder does not exist"),
+    ],
+)
+def test_impossible_commands_are_refused(tmp_path, capsys, options, message):
+    out = Path(tmp_path) / "table.md"
+    assert message in refused(capsys, "bench", "captures", *options, "-o", out)
+    assert not out.exists()
