@@ -1,4 +1,4 @@
-"""Real captures, and the built-in rooms: pictures, depth and fog of fields trained on them, in held-out photos.
+"""Real captures and the built-in rooms: pictures, depth and fog of trained fields in held-out photos.
 
 A held-out photo sees sparse points; a point at the distance t* along the ray of its pixel has the depth error
 |t - t*| / t*, t the picture's expected distance there, and is in fog where more than FOGGY of opacity lies
@@ -51,7 +51,7 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class DepthFigures:
-    """Of some rays: median and 90 % of the relative depth error, the share in fog; NaN where there are none."""
+    """Of some rays: median and 90 % of the relative depth error, the share in fog; NaN where none are."""
 
     rays: int = 0
     median: float = float("nan")
@@ -174,10 +174,15 @@ def _photo(view: View) -> Float32:
     return photo
 
 
+def gains_to(picture: NDArray[Any], photo: NDArray[Any]) -> Float32:
+    """Gain [3] of each channel of a picture [H,W,3] that takes it closest to the photo (least squares)."""
+    square = (picture * picture).sum((0, 1))
+    return np.asarray((picture * photo).sum((0, 1)) / np.maximum(square, 1e-12), np.float32)
+
+
 def exposed(picture: NDArray[Any], photo: Float32) -> Float32:
-    """The picture [H,W,3] times the gain of each channel that takes it closest to the photo."""
-    gains = (picture * photo).sum((0, 1)) / np.maximum((picture * picture).sum((0, 1)), 1e-12)
-    return np.clip(picture * gains, 0, 1).astype(np.float32)
+    """The picture [H,W,3] times its gains to the photo."""
+    return np.clip(picture * gains_to(picture, photo), 0, 1).astype(np.float32)
 
 
 def _likeness(view: View, frame: Frame) -> tuple[float, float, float]:

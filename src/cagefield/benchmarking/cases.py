@@ -24,7 +24,10 @@ PINECONE_CENTER = (0.419, -0.3, -0.211)
 
 @dataclass(frozen=True)
 class Case:
-    """An edit of a built-in scene: examples/`file` in the package; `moved` is None for continuous edits."""
+    """An edit of a built-in scene: examples/`file` in the package.
+
+    `moved` is the truth of the edit, None where that is the scene seen through the exact map.
+    """
 
     scene: str
     name: str
@@ -92,6 +95,24 @@ CASES = (
     ),
     Case("plant", "delete_flower", lambda s: s.remove("flower")),
 )
+
+_STRETCHED = ("tracks", "body", "cabin", "boom", "stick", "bucket", "cone")
+
+ROOM_CASES = (
+    Case(
+        "room-digger",
+        "taller",
+        lambda s: s.move(_STRETCHED, scale=(1, 1, 2), pivot=(0, 0, -0.408)),
+        "room_digger_taller.yaml",
+    ),
+    Case(
+        "room-digger",
+        "move_cone",
+        lambda s: s.move("cone", translate=(-0.25, -1.5, -0.092)),
+        "room_digger_move_cone.yaml",
+    ),
+)
+"""Edits of fields trained on the built-in rooms; the continuous one scales whole parts, which has a truth."""
 
 
 def chosen(scenes: Sequence[str] = (), names: Sequence[str] = ()) -> tuple[Case, ...]:

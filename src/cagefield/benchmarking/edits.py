@@ -24,6 +24,7 @@ from cagefield.datasets.procedural.writer import FOV_X
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
+from cagefield.training.splat_config import SplatConfig
 from cagefield.training.voxel_config import VoxelConfig
 
 _TIMED_VIEWS, _ROUNDS = 2, 3
@@ -150,12 +151,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
     length = f"{config.steps} steps" if config.minutes is None else f"{config.minutes:g} minutes"
     explained = [
         f"Fields: {settings.views} photos of {settings.size}x{settings.size} pixels, trained for {length}"
-        + (
-            f" at {config.resolution} voxels along the longest axis."
-            if isinstance(config, VoxelConfig)
-            else f": the original NeRF, networks of {config.depth} x {config.width}, "
-            f"{config.samples[0]} + {config.samples[1]} samples a ray{_shown(config)}, rendered exactly."
-        ),
+        + _described(config),
         "PSNR (dB) and SSIM: mean over test views, never trained on; unedited: the trained field against "
         "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
         "Truth: photos of the scene whose part was really moved, with the light as it then falls "
@@ -168,7 +164,7 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "Unseen: pixels that show a surface that no training photo showed, or only through a gap under a "
         "voxel, such as the ground under a part that is moved; lost, seen: the PSNR lost on all others.",
         "Frame time: edited over unedited, median of frames taken in turn"
-        + ("." if isinstance(config, VoxelConfig) else f", {_TIMED_EXACTLY}x{_TIMED_EXACTLY} pixels."),
+        + (f", {_TIMED_EXACTLY}x{_TIMED_EXACTLY} pixels." if isinstance(config, NerfConfig) else "."),
         "Min det J: least volume ratio over the shell of a continuous edit, of its map or the inverse; max "
         "stretch: largest factor by which a length grows or shrinks; map time: for a million points, in the "
         "renderer's kernel.",
@@ -186,6 +182,19 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
     )
 
 
+def _described(config: VoxelConfig | NerfConfig | SplatConfig) -> str:
+    """What the fields are, after how long they were trained."""
+    if isinstance(config, SplatConfig):
+        most = "" if config.splats is None else f", {config.splats} at most"
+        return f": splats of degree {config.sh_degree}{most}."
+    if isinstance(config, VoxelConfig):
+        return f" at {config.resolution} voxels along the longest axis."
+    return (
+        f": the original NeRF, networks of {config.depth} x {config.width}, {config.samples[0]} + "
+        f"{config.samples[1]} samples a ray{_shown(config)}, rendered exactly."
+    )
+
+
 def _shown(config: NerfConfig) -> str:
     """How many samples the pictures have, if others than the training."""
     shown = config.shown_samples
@@ -193,9 +202,13 @@ def _shown(config: NerfConfig) -> str:
 
 
 def _means(scores: Sequence[Score]) -> Iterator[str]:
-    """The mean of the PSNR lost by continuous edits, and by discrete ones."""
-    for what in ("continuous", "discrete"):
-        chosen = [score for score in scores if (score.case.kind == "continuous") == (what == "continuous")]
+    """The mean of the PSNR lost by continuous edits, by discrete ones, and by all."""
+    for what in ("continuous", "discrete", "all"):
+        chosen = [
+            score
+            for score in scores
+            if what == "all" or (score.case.kind == "continuous") == (what == "continuous")
+        ]
         if not chosen:
             continue
         lost = float(np.mean([score.figures.lost for score in chosen]))

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset
+from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.frame import Frame
+from cagefield.rendering.frame import Background, Frame
+from cagefield.training.splat_config import SplatConfig
 
 Float32 = NDArray[np.float32]
+Show = Callable[[Camera], Frame]
 CaptureField = Literal["splat", "voxel"]
 
 SAMPLES = 256
@@ -28,15 +31,16 @@ class Learnt:
     """A trained field: its kind, its number of splats or voxels, how long it took, and its pictures.
 
     `opacity_before(camera, pixels, distances)` is the opacity [K] gathered along the rays through the centres
-    of pixels [K,2] (column, row) before distances [K].
+    of pixels [K,2] (column, row) before distances [K]; `edited(edits)` shows the field under an edit stack.
     """
 
     kind: str
     elements: int
     seconds: float
     steps: int
-    show: Callable[[Camera], Frame]
+    show: Show
     opacity_before: Callable[[Camera, NDArray[Any], NDArray[Any]], NDArray[Any]]
+    edited: Callable[[EditStack], Show]
 
 
 @dataclass(frozen=True)
@@ -70,21 +74,29 @@ def _splats(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
     if not result.finished:
         raise KeyboardInterrupt
     renderer = SplatRenderer(result.field)
-    behind = tuple(float(value) for value in result.background)
-
-    def show(camera: Camera) -> Frame:
-        return renderer.render(camera, background=behind)
+    show = _show(renderer, tuple(float(value) for value in result.background))
 
     def before(camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> NDArray[Any]:
         return renderer.opacity_before(camera, pixels + 0.5, distances)
 
-    return Learnt("splat", len(result.field), result.seconds, result.steps, show, before)
+    def edited(edits: EditStack) -> Show:
+        return _show(renderer.with_edits(edits), tuple(float(value) for value in result.background))
+
+    return Learnt("splat", len(result.field), result.seconds, result.steps, show, before, edited)
 
 
-def splat_config(budget: Budget) -> Any:
+def _show(renderer: Any, background: Background) -> Show:
+    """Pictures of a renderer over a background."""
+
+    def show(camera: Camera) -> Frame:
+        frame: Frame = renderer.render(camera, background=background)
+        return frame
+
+    return show
+
+
+def splat_config(budget: Budget) -> SplatConfig:
     """The configuration of the splats' trainer for a budget."""
-    from cagefield.training.splat_config import SplatConfig
-
     return SplatConfig(
         steps=SplatConfig.steps if budget.steps is None else budget.steps,
         minutes=budget.minutes if budget.steps is None else None,
@@ -112,15 +124,16 @@ def _voxels(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
 
     renderer = Renderer(result.field)
 
-    def show(camera: Camera) -> Frame:
-        frame = renderer.render(camera, background="white" if dataset.white_background else "black")
-        assert frame is not None  # nobody stops it
-        return frame
+    behind = "white" if dataset.white_background else "black"
 
     def before(camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> NDArray[Any]:
         return sampled_opacity(result.field, camera, pixels, distances)
 
-    return Learnt("voxel", len(result.field.vertices), result.seconds, result.steps, show, before)
+    def edited(edits: EditStack) -> Show:
+        return _show(renderer.with_edits(edits), behind)
+
+    shown = _show(renderer, behind)
+    return Learnt("voxel", len(result.field.vertices), result.seconds, result.steps, shown, before, edited)
 
 
 def sampled_opacity(
@@ -130,7 +143,10 @@ def sampled_opacity(
     distances: NDArray[Any],
     samples: int = SAMPLES,
 ) -> NDArray[np.float64]:
-    """Opacity [K] of a field before distances [K] along the rays of pixels [K,2]: 1 - exp(-sum sigma delta)."""
+    """Opacity [K] of a field before distances [K] along the rays of pixels [K,2].
+
+    1 - exp(-sum sigma delta), of samples in the middle of equal steps.
+    """
     origins, directions = camera.rays(pixels)
     depth = np.zeros(len(pixels))
     middles = (np.arange(samples) + 0.5) / samples

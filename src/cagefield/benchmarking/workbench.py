@@ -36,6 +36,7 @@ from cagefield.rendering.images import replaced_whole
 from cagefield.rendering.sampled import render_sampled
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
+from cagefield.training.splat_config import SplatConfig
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
 
@@ -73,7 +74,7 @@ class Settings:
     views: int = 100
     size: int = 400
     test_views: int = 20
-    config: VoxelConfig | NerfConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
+    config: VoxelConfig | NerfConfig | SplatConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
     exact_size: int = 128
     exact_views: int = 6
     exact_samples: int = 768
@@ -238,8 +239,17 @@ class Workbench:
         return np.stack(made)
 
 
-def trained(dataset: Dataset, config: VoxelConfig | NerfConfig, on_progress: Callable[[Any], None]) -> Scene:
+def trained(
+    dataset: Dataset, config: VoxelConfig | NerfConfig | SplatConfig, on_progress: Callable[[Any], None]
+) -> Scene:
     """The scene trained on a bounded data set; a NeRF's holds its voxels too."""
+    if isinstance(config, SplatConfig):
+        from cagefield.training.splat import train_splat
+
+        splats = train_splat(dataset, config, on_progress=on_progress, evaluate=False)
+        if not splats.finished:
+            raise KeyboardInterrupt
+        return Scene.trained(splats, dataset)
     if isinstance(config, VoxelConfig):
         result = train_voxel(dataset, config, on_progress=on_progress, evaluate=False)
         if not result.finished:

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -27,15 +27,19 @@ from cagefield.cli.options import (
     parse_size,
     progress_bar,
 )
-from cagefield.cli.train import FieldKind, Preset, nerf_config
+from cagefield.cli.train import Preset, nerf_config
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.cases import Case
     from cagefield.benchmarking.workbench import Workbench
+    from cagefield.training.nerf_config import NerfConfig
+    from cagefield.training.splat_config import SplatConfig
+    from cagefield.training.voxel_config import VoxelConfig
 
 _SILENT = (
-    "workdir", "out", "pictures", "picture_size", "picture_views", "error_panel", "overwrite", "scene_out",
+    "workdir", "out", "pictures", "picture_size", "picture_views", "edit_pictures", "error_panel",
+    "overwrite", "scene_out",
 )  # fmt: skip
 
 
@@ -55,8 +59,8 @@ class BenchEdits:
     """Width and height of the photos in pixels."""
     test_views: int = 20
     """Number of test photos."""
-    field: FieldKind = "voxel"
-    """nerf is the original NeRF, rendered exactly: needs PyTorch, and --no-methods."""
+    field: Literal["voxel", "nerf", "splat"] = "voxel"
+    """nerf is the original NeRF, rendered exactly: needs PyTorch. nerf and splat need --no-methods."""
     preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
     training: Training = dataclasses.field(default_factory=TrainingOptions)
@@ -105,8 +109,10 @@ class BenchEdits:
         check_known(self.methods)
         if self.field != "nerf" and self.preset != "auto":
             raise CagefieldError("--preset is for the original NeRF; give --field nerf too")
-        if self.field == "nerf" and not self.no_methods:
-            raise CagefieldError("methods are compared on voxels only; give --no-methods with --field nerf")
+        if self.field != "voxel" and not self.no_methods:
+            raise CagefieldError(
+                f"methods are compared on voxels only; give --no-methods with --field {self.field}"
+            )
         if self.only_pictures and self.pictures is None:
             raise CagefieldError("--only-pictures needs a folder for them; give --pictures FOLDER")
         if self.picture_size < 1:
@@ -119,12 +125,11 @@ class BenchEdits:
             for case in cases:
                 check_file(picture_path(self.pictures, case), self.overwrite)
         devices.start(self.device)
-        nerf = self.field == "nerf"
         settings = Settings(
             self.views,
             self.size,
             self.test_views,
-            nerf_config(self.training, self.preset) if nerf else self.training.config(),
+            self._config(),
             self.exact_size,
             self.exact_views,
             self.exact_samples,
@@ -140,6 +145,19 @@ class BenchEdits:
                     self._compare(cases, bench)
             if self.pictures is not None:
                 self._draw(cases, bench, self.pictures)
+
+    def _config(self) -> VoxelConfig | NerfConfig | SplatConfig:
+        """The trainer's configuration."""
+        if self.field == "nerf":
+            return nerf_config(self.training, self.preset)
+        if self.field == "voxel":
+            return self.training.config()
+        from cagefield.benchmarking.learning import Budget, splat_config
+
+        chosen = self.training
+        return splat_config(
+            Budget(chosen.minutes, chosen.steps, sh_degree=chosen.sh_degree, seed=chosen.seed)
+        )
 
     def _measure(self, cases: tuple[Case, ...], bench: Workbench) -> None:
         from cagefield.benchmarking.edits import measure, table

@@ -13,7 +13,8 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.captures import CaptureScore
-    from cagefield.benchmarking.learning import Budget
+    from cagefield.benchmarking.learning import Budget, Learnt
+    from cagefield.benchmarking.room_edits import RoomScore
     from cagefield.datasets import Dataset
 
 
@@ -54,6 +55,11 @@ class BenchCaptures:
     """Folder for pictures of held-out views: photo, picture, difference, depth, true depth where known."""
     picture_views: int = 4
     """Number of pictures for each capture and field."""
+    edits: Flag = False
+    """Measure the edits of built-in rooms too (examples/room_*.yaml); their table goes beside, its name
+    ending _edits.md."""
+    edit_pictures: Path | None = None
+    """Folder for pictures of those edits: the field as trained, edited, the truth."""
     device: Device = "auto"
     overwrite: Flag = False
     """Replace the table that is there."""
@@ -61,6 +67,7 @@ class BenchCaptures:
     def run(self) -> None:
         """Makes the photos that are missing, trains, measures, shows the table, says where the files are."""
         from cagefield import devices
+        from cagefield.benchmarking import room_edits
         from cagefield.benchmarking.captures import table
         from cagefield.benchmarking.learning import Budget
         from cagefield.benchmarking.machine import Machine
@@ -75,20 +82,42 @@ class BenchCaptures:
             raise CagefieldError(f"--picture-views is {self.picture_views}; it must be at least 1")
         if self.holdout == 0:
             raise CagefieldError("--holdout 0 keeps no photo to measure on; give 2 or more")
-        check_file(self.out, self.overwrite)
+        for path in (self.out, self._beside()) if self.edits else (self.out,):
+            check_file(path, self.overwrite)
         budget = Budget(self.minutes, self.steps, self.splats, self.resolution, self.sh_degree, self.seed)
         devices.start(self.device)
-        scores = []
+        scores: list[CaptureScore] = []
+        edited: list[RoomScore] = []
         with work_folder(self.workdir) as folder:
             for name in self.data:
                 dataset = self._open(name, folder)
                 for field in self.fields:
-                    scores.append(self._measure(dataset, field, budget))
+                    score, learnt = self._measure(dataset, field, budget)
+                    scores.append(score)
+                    edited += self._edit(name, dataset, learnt)
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench captures', self)}`")
         result = table(scores, notes)
         result.show()
         write_text(self.out, result.markdown())
         print(f"table written to {self.out}")
+        if edited:
+            beside = room_edits.table(edited, notes)
+            beside.show()
+            write_text(self._beside(), beside.markdown())
+            print(f"table written to {self._beside()}")
+
+    def _beside(self) -> Path:
+        return self.out.with_name(f"{self.out.stem}_edits{self.out.suffix}")
+
+    def _edit(self, name: str, dataset: Dataset, learnt: Learnt) -> list[RoomScore]:
+        """The scores of a room's edits, and their pictures, where they are asked for."""
+        from cagefield.benchmarking import room_edits
+
+        cases = room_edits.cases_of(name)
+        if self.edit_pictures is not None:
+            for case in cases:
+                print(f"picture written to {room_edits.write_picture(learnt, case, self.edit_pictures)}")
+        return room_edits.measure(dataset, learnt, cases) if self.edits else []
 
     def _open(self, name: str, folder: Path) -> Dataset:
         """The data set of that name; a built-in room is photographed where the work folder lacks it."""
@@ -114,7 +143,8 @@ class BenchCaptures:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
         return dataset
 
-    def _measure(self, dataset: Dataset, field: str, budget: Budget) -> CaptureScore:
+    def _measure(self, dataset: Dataset, field: str, budget: Budget) -> tuple[CaptureScore, Learnt]:
+        """The score of a field trained on the data set, and the field; writes pictures if asked."""
         import dataclasses
 
         from cagefield.benchmarking import captures
@@ -133,11 +163,11 @@ class BenchCaptures:
         score = dataclasses.replace(score, memory=captures.peak_memory())
         print(
             f"{score.name}, {field}: PSNR {score.test[0]:.2f} dB ({score.test[1]:.2f} exposed) on held-out "
-            f"photos, {score.train[0]:.2f} on training photos; fog {100 * score.points.fog:.1f}%, depth error "
-            f"{100 * score.points.median:.1f}%",
+            f"photos, {score.train[0]:.2f} on training photos; fog {100 * score.points.fog:.1f}%, "
+            f"depth error {100 * score.points.median:.1f}%",
             flush=True,
         )
         if self.pictures is not None:
             for path in captures.write_pictures(dataset, learnt, self.pictures, self.picture_views):
                 print(f"picture written to {path}", flush=True)
-        return score
+        return score, learnt

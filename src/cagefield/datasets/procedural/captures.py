@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.hand_held import Phone, around, outwards
@@ -23,8 +24,13 @@ class Capture:
 
     @property
     def scene(self) -> ProceduralScene:
-        """The room and what stands in it."""
-        return ROOMS[self.name]()
+        """The room and what stands in it; always the same object, whose light is computed once."""
+        return _room(self.name)
+
+
+@cache
+def _room(name: str) -> ProceduralScene:
+    return ROOMS[name]()
 
 
 def _circle(phone: Phone, count: int, seed: int) -> tuple[Camera, ...]:

@@ -2,8 +2,8 @@
 
 A candidate is a corner of a photo (the smaller eigenvalue of the structure tensor is large). It is a point
 where other photos see it too: not hidden, by the true depth, from no very different side, and alike, by the
-correlation of small patches of the surface, which reflections and highlights fail. Every sighting is off by some
-pixels; the point is where the sightings' rays come closest, so its place has the error that follows.
+correlation of small patches of the surface, which reflections and highlights fail. Every sighting is off
+by some pixels; the point is where the sightings' rays come closest, so its place has the error that follows.
 """
 
 from __future__ import annotations
