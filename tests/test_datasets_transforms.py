@@ -376,8 +376,10 @@ def test_truncated_json(tmp_path):
 def test_wrong_paths(tmp_path):
     with pytest.raises(DatasetError, match="nowhere does not exist; give the folder"):
         load_dataset(tmp_path / "nowhere")
-    with pytest.raises(DatasetError, match=r"no camera file; looked for transforms.json.*there are no photos
-    either"): load_dataset(tmp_path)
+    with pytest.raises(
+        DatasetError, match=r"no camera file; looked for transforms.json.*there are no photos either"
+    ):
+        load_dataset(tmp_path)
     (tmp_path / "notes.txt").write_text("")
     with pytest.raises(DatasetError, match=r"notes.txt is no camera file; give transforms.json"):
         load_dataset(tmp_path / "notes.txt")

@@ -39,14 +39,11 @@ TRUE_RAYS = 2000
 """Rays of a photo, evenly spread, on which the true depth is compared."""
 
 _COLUMNS = (
-    "capture", "field", "photos", "held out", "size", "seconds", "splats or voxels", "train PSNR", "PSNR",
+    "capture", "field", "photos", "held out", "size", "seconds", "elements", "train PSNR", "PSNR",
     "train, exposed", "exposed", "SSIM", "points", "depth error", "90 %", "fog", "true depth", "true 90 %",
     "true fog", "memory",
 )  # fmt: skip
-_SHOWN = (
-    "capture", "field", "seconds", "splats or voxels", "train PSNR", "PSNR", "exposed", "SSIM",
-    "depth error", "fog", "true depth", "true fog",
-)  # fmt: skip
+_SHOWN = ("capture", "field", "train PSNR", "PSNR", "exposed", "SSIM", "depth error", "fog", "true depth")
 
 
 @dataclass(frozen=True)
@@ -244,7 +241,7 @@ def table(scores: Sequence[CaptureScore], notes: Sequence[str] = ()) -> Table:
         f"ray, median and 90 %; fog: the share of those rays with more than {FOGGY:g} opacity before "
         f"{NEARER:g} t*. Points that fewer than two training photos see are not trained with.",
         "True: the same on pixels all over the held-out photos, where the true depth is known.",
-        "Memory: the most that the process held, trained and measured.",
+        "Elements: splats or voxels. Memory: the most that the process held, trained and measured.",
     )
     return Table(
         "Captures", _COLUMNS, tuple(_row(score) for score in scores), (*explained, *notes), 2, _SHOWN
