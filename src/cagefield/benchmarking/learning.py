@@ -74,13 +74,14 @@ def _splats(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
     if not result.finished:
         raise KeyboardInterrupt
     renderer = SplatRenderer(result.field)
-    show = _show(renderer, tuple(float(value) for value in result.background))
+    behind = "white" if dataset.white_background else "black"
+    show = _show(renderer, behind)
 
     def before(camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> NDArray[Any]:
         return renderer.opacity_before(camera, pixels + 0.5, distances)
 
     def edited(edits: EditStack) -> Show:
-        return _show(renderer.with_edits(edits), tuple(float(value) for value in result.background))
+        return _show(renderer.with_edits(edits), behind)
 
     return Learnt("splat", len(result.field), result.seconds, result.steps, show, before, edited)
 
