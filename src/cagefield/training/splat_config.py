@@ -36,7 +36,7 @@ class SplatConfig:
     antialiased: bool = True
     exposure: bool | None = None
     background: float = 0.2
-    rate: tuple[float, float] = (0.8, 0.02)
+    rate: tuple[float, float] = (1.2, 0.025)
     damping: tuple[float, float] = (0.1, 0.01)
     cap: float = 0.15
     memory: tuple[float, float] = (0.5, 0.98)

@@ -37,7 +37,8 @@ X, Y = ROW8, ROW9
 """Where the pixels' own coordinates lie in a tile's state."""
 
 SUMS = 20
-"""Floats a pair's sums have. With v = alpha dL/dalpha, e = Q d, g = dL/dC, h = |alpha dC/dalpha|^2:
+"""Floats a pair's sums have. With v = alpha dL/dalpha, e = Q d, g = dL/dC, h_k = |J_k| sum_j |J_j|, J = alpha
+dC/dalpha:
 0 v, 1-2 v e, 3-5 v e e^T, 6-8 w g, 9 w, 10 h, 11-13 h e e^T, 14-18 h e e e e (xxxx xxxy xxyy xyyy yyyy),
 19 w |g|^2."""
 

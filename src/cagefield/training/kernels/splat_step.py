@@ -1,13 +1,17 @@
 """Damped Gauss-Newton steps of splats, each by its own blocks, and what becomes of a picture's error (Numba).
 
-A splat's blocks are 3 x 3 for its mean and for its log scales, diagonal for its turn and its logit; its
-colour's
-curvature is majorised by the sum of its weights, for those of a pixel add up to at most 1. Gradients and
+A photo's curvature at a pixel is |J_k| sum_j |J_j| in place of |J_k|^2, J_k the derivative of its colour by
+splat
+k's log alpha: what majorises the sum over overlapping splats (separable surrogates). A splat's blocks are 3
+x 3 for its mean and for its log scales, diagonal for its turn and its logit; its colour's
+curvature is the sum of its weights, for those of a pixel add up to at most 1. Gradients and
 curvatures
 are running means over the views that see the splat. No step is longer than a cap: overlapping splats break
-the block-diagonal model.
+the block-diagonal model where steps are long.
 
-Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping as in Levenberg-Marquardt.
+Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping as in Levenberg-Marquardt;
+separable surrogates as in De Pierro, "A modified expectation maximization algorithm for penalized likelihood
+estimation in emission tomography" (1995).
 """
 
 from __future__ import annotations
@@ -18,9 +22,12 @@ from numba import prange
 from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import AREA, TILE, harmonics_at
 
-BOTH = 0.5
 MOMENTS, RUNNING = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
+
+PRESENT = 0.5
+"""Share of this photo's own curvature that is added to the running one: a photo that sees a splat from close
+by would otherwise take steps that are too long for it."""
 
 
 @njit(parallel=True, **FAST)
@@ -143,9 +150,9 @@ def gauss_newton(
         H = np.empty(17)
         for j in range(16):
             memory_H[j] += new2 * (curvatures[i, j] - memory_H[j])
-            H[j] = memory_H[j] + BOTH * curvatures[i, j]
+            H[j] = memory_H[j] + PRESENT * curvatures[i, j]
         memory_H[16] += new2 * (gradients[i, 14] - memory_H[16])
-        H[16] = memory_H[16] + BOTH * gradients[i, 14]
+        H[16] = memory_H[16] + PRESENT * gradients[i, 14]
         for j in range(13):
             g[j] += new1 * (gradients[i, j] - g[j])
         rel, tiny, cap = damping[0], damping[1], caps[0]
