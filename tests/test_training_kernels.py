@@ -48,7 +48,7 @@ def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
     # Optical depth about 0.3 a voxel: rays see several voxels, none is hidden altogether.
     density = (rng.uniform(0.05, 0.5, len(vertices)) / cell).astype(np.float32)
     sh = rng.normal(0, 0.08, (len(vertices), (degree + 1) ** 2, 3)).astype(np.float32)
-    return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, workers=workers)
+    return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, threads=workers)
 
 
 def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 0.0) -> np.ndarray:

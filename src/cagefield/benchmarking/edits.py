@@ -187,6 +187,8 @@ def _described(config: VoxelConfig | NerfConfig | SplatConfig) -> str:
     if isinstance(config, SplatConfig):
         most = "" if config.splats is None else f", {config.splats} at most"
         return f": splats of degree {config.sh_degree}{most}."
+    if isinstance(config, VoxelConfig) and config.resolution is None:
+        return " at the resolution that photos and time allow."
     if isinstance(config, VoxelConfig):
         return f" at {config.resolution} voxels along the longest axis."
     return (

@@ -104,7 +104,9 @@ class Demo:
 
         devices.start(self.device)
         dataset = load_dataset(folder / "photos")
-        scene, result = train_scene(dataset, VoxelConfig(steps=self.steps, resolution=self.resolution))
+        scene, result = train_scene(
+            dataset, VoxelConfig(steps=self.steps, resolution=self.resolution, sh_degree=1)
+        )
         scene.save(folder / "scene")
         return scene, summary(result)
 

@@ -55,11 +55,11 @@ class TrainingOptions:
     """How long to train."""
     steps: int | None = None
     """Train this many steps instead: on a CPU the same seed then gives the same field."""
-    resolution: int = 256
-    """Voxels along the longest axis at the end."""
+    resolution: int | None = None
+    """Voxels along the longest axis at the end; left out, as many as the photos' size and the time allow."""
     sh_degree: int | None = None
-    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view; left out,
-    1, and 2 for voxels baked from a NeRF."""
+    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view; left out, 2,
+    and 1 for voxels trained on an unbounded capture."""
     seed: int = 0
     """Of the order of the photos' pixels and of all other chance."""
 
@@ -71,7 +71,7 @@ class TrainingOptions:
             steps=VoxelConfig.steps if self.steps is None else self.steps,
             minutes=self.minutes if self.steps is None else None,
             resolution=self.resolution,
-            sh_degree=VoxelConfig.sh_degree if self.sh_degree is None else self.sh_degree,
+            sh_degree=self.sh_degree,
             seed=self.seed,
         )
 

@@ -107,7 +107,9 @@ class Train:
                 cameras,
                 (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0),
                 BakingOptions(
-                    self.training.resolution,
+                    BakingOptions.resolution
+                    if self.training.resolution is None
+                    else self.training.resolution,
                     BakingOptions.sh_degree if self.training.sh_degree is None else self.training.sh_degree,
                 ),
                 unbounded=dataset.unbounded,

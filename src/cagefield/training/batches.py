@@ -17,19 +17,15 @@ from cagefield.training.march_kernel import MOST_SAMPLES, SAMPLE, march_batch
 from cagefield.training.photos import Photos
 from cagefield.training.update_kernels import gauss_newton, laplacian
 from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.voxel_defaults import Settings
 from cagefield.training.voxel_space import VoxelSpace
-
-SMOOTH, SMOOTH_UNBOUNDED = 2e-4, 2e-3
-"""Weights of the Laplacian regularisation where the configuration names none."""
 
 
 class Batches:
     """Batches of the patches of `photos`, and the device memory that they share."""
 
-    def __init__(self, config: VoxelConfig, photos: Photos, space: VoxelSpace) -> None:
-        self._config, self._photos, self._space = config, photos, space
-        preset = SMOOTH_UNBOUNDED if space.contracted else SMOOTH
-        self._smooth = preset if config.smooth is None else config.smooth
+    def __init__(self, config: VoxelConfig, settings: Settings, photos: Photos, space: VoxelSpace) -> None:
+        self._config, self._settings, self._photos, self._space = config, settings, photos, space
         self._buffers: dict[int, tuple[Any, Any, Any, Any]] = {}
         self._notes: tuple[int, Any] | None = None
 
@@ -41,7 +37,7 @@ class Batches:
         The step decides jitter and backgrounds, the progress `done` of the run the learning rate.
         """
         losses, sums = self._march(grid, patches, exposure.gains, step)
-        if self._smooth > 0:
+        if self._settings.smooth > 0:
             self._regularise(grid)
         self._descend(grid, done)
         if exposure.fitted:
@@ -105,15 +101,16 @@ class Batches:
             grid.accumulator,
             grid.slots,
             ints(grid.resolution),
-            self._smooth,
-            self._smooth,
+            self._settings.smooth,
+            self._settings.smooth,
             grid.terms,
         )
 
     def _descend(self, grid: GridState, done: float) -> None:
         """Updates the grid from its accumulator, which is empty then."""
         config = self._config
-        rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
+        first, last = self._settings.rate
+        rate = first * (last / first) ** done
         gauss_newton(
             grid.density,
             grid.sh,

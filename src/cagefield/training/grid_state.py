@@ -18,6 +18,9 @@ from cagefield.rendering import occupancy
 from cagefield.rendering.grid import brick_order, to_device
 from cagefield.training.records import HEAD
 
+MOST_BYTES = 2 * 1024**3
+"""Memory of all accumulators together, at most: of a large grid many threads have fewer."""
+
 
 @dataclass(eq=False)
 class GridState:
@@ -28,13 +31,14 @@ class GridState:
         contracted: as VoxelField. degree: SH degree.
         density, sh, state, weight, accumulator, index, codes: device arrays; see
             `march_kernel`, `update_kernels` and `records`.
-        workers: number of accumulators.
+        threads: of the CPU that may take part. workers: number of accumulators, at most as many.
     """
 
     bounds: NDArray[np.float64]
     resolution: tuple[int, int, int]
     contracted: bool
     degree: int
+    threads: int
     workers: int
     vertices: NDArray[np.int64]
     density: Any
@@ -59,7 +63,7 @@ class GridState:
         state: NDArray[np.float32] | None = None,
         *,
         contracted: bool,
-        workers: int,
+        threads: int,
     ) -> "GridState":
         """The state with these vertices (any order), density [M], sh [M,K,3] and running curvatures [M,2]."""
         order = brick_order(vertices, resolution)
@@ -73,6 +77,8 @@ class GridState:
         full = np.zeros(resolution, bool)
         full.reshape(-1)[vertices] = True
         bricks = occupancy.of_vertices(full)
+        record = 4 * (count + 1) * (HEAD + 3 * terms)
+        workers = max(1, min(threads, MOST_BYTES // record))
         accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEAD + 3 * terms),))
         accumulator.fill(0.0)
         return cls(
@@ -80,6 +86,7 @@ class GridState:
             resolution=resolution,
             contracted=contracted,
             degree={1: 0, 4: 1, 9: 2}[terms],
+            threads=threads,
             workers=workers,
             vertices=vertices,
             density=to_device(np.concatenate([np.zeros(1, np.float32), density[order]])),
@@ -105,7 +112,7 @@ class GridState:
         opacity: float,
         degree: int,
         contracted: bool,
-        workers: int,
+        threads: int,
         keep: NDArray[np.bool_] | None = None,
     ) -> "GridState":
         """Every vertex (of those in `keep` [nx*ny*nz]) stored, grey, each voxel `opacity` deep optically."""
@@ -118,7 +125,7 @@ class GridState:
             (opacity / cell_sizes(bounds, resolution, vertices, contracted)).astype(np.float32),
             np.zeros((count, (degree + 1) ** 2, 3), np.float32),
             contracted=contracted,
-            workers=workers,
+            threads=threads,
         )
 
     @property
@@ -175,11 +182,15 @@ class GridState:
             sh[keep],
             state[keep],
             contracted=self.contracted,
-            workers=self.workers,
+            threads=self.threads,
         )
 
-    def refined(self, bounds: NDArray[np.float64], resolution: tuple[int, int, int]) -> "GridState":
+    def refined(
+        self, bounds: NDArray[np.float64], resolution: tuple[int, int, int], degree: int
+    ) -> "GridState":
         """The same field on another grid, over other bounds: values and curvatures interpolated trilinearly.
+
+        The SH degree is at least the grid's own; new coefficients are 0.
 
         A new vertex is stored where its cell of the old grid has a stored corner. Curvatures, sums over
         the rays that meet a voxel, are scaled by the ratio of the voxels' volumes.
@@ -223,15 +234,17 @@ class GridState:
         out[:, 1:] /= np.maximum(stored, 1e-6)[:, None]
         volume = float(np.prod(new_cell / old_cell))
         terms = self.terms
+        colours = np.zeros((count, (degree + 1) ** 2, 3), np.float32)
+        colours[:, :terms] = out[:, 1 : 1 + 3 * terms].reshape(count, terms, 3)
         return GridState.build(
             bounds,
             resolution,
             vertices,
             out[:, 0],
-            out[:, 1 : 1 + 3 * terms].reshape(count, terms, 3),
+            colours,
             out[:, 1 + 3 * terms :] * volume,
             contracted=self.contracted,
-            workers=self.workers,
+            threads=self.threads,
         )
 
     def support(self) -> NDArray[np.float64]:

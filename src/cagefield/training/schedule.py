@@ -6,10 +6,13 @@ is pruned and refined, and somewhere within it is pruned once more.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 STAGES = ((0.25, 0.0), (0.4375, 0.06), (0.75, 0.18), (1.0, 0.4))
-"""(fraction of the final resolution, progress at which the stage starts)."""
+"""(fraction of the final resolution, progress at which the stage starts); see `stages`."""
+
+LARGEST_FIRST = 80
+"""Vertices along the longest axis of the first grid, at most: it is full."""
 
 PRUNE_WITHIN = 0.4
 """A stage is pruned once more after this share of it."""
@@ -21,41 +24,67 @@ LEAST_RESOLUTION = 16
 """Vertices along the longest axis of any grid, at least."""
 
 
+def stages(final: int) -> tuple[tuple[int, float], ...]:
+    """(vertices along the longest axis, progress at which it starts) of each stage of a run.
+
+    Where the first of STAGES is larger than LARGEST_FIRST, stages of half the resolution and a third of the
+    time come before it.
+    """
+    found = list(STAGES)
+    while found[0][0] * final > LARGEST_FIRST:
+        share, end = found[0][0], found[1][1]
+        found[:1] = [(share / 2, 0.0), (share, end / 3)]
+    return tuple((max(LEAST_RESOLUTION, round(share * final)), start) for share, start in found)
+
+
 @dataclass
 class Schedule:
     """Which stage a run is in.
 
     Attributes:
+        final: vertices along the longest axis at the end. degree: SH degree at the end.
         by_clock: whether the run is limited by time.
         stage: number of the stage. began: the step at which it did.
         pruned: whether it was pruned within; the first stage is not.
     """
 
+    final: int
+    degree: int
     by_clock: bool
     stage: int = 0
     began: int = 0
     pruned: bool = True
+    _stages: tuple[tuple[int, float], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._stages = stages(self.final)
 
     @property
     def last(self) -> bool:
         """Whether no other stage comes."""
-        return self.stage + 1 == len(STAGES)
+        return self.stage + 1 == len(self._stages)
 
-    def resolution(self, final: int) -> int:
-        """Vertices along the longest axis in this stage of a run that ends with `final`."""
-        return max(LEAST_RESOLUTION, round(STAGES[self.stage][0] * final))
+    @property
+    def resolution(self) -> int:
+        """Vertices along the longest axis in this stage."""
+        return self._stages[self.stage][0]
+
+    @property
+    def sh_degree(self) -> int:
+        """SH degree in this stage: at most 1 in the first, whose grid is full."""
+        return min(self.degree, 1) if self.stage == 0 else self.degree
 
     def is_over(self, done: float, step: int) -> bool:
         """Whether the next stage is due at this progress and step."""
-        if self.last or done < STAGES[self.stage + 1][1]:
+        if self.last or done < self._stages[self.stage + 1][1]:
             return False
         # By the clock, a slow machine could reach a stage's end before its grid has learnt anything.
         return not self.by_clock or step - self.began >= LEAST_STEPS
 
     def prunes(self, done: float) -> bool:
         """Whether the pruning within this stage is due at this progress."""
-        start = STAGES[self.stage][1]
-        end = 1.0 if self.last else STAGES[self.stage + 1][1]
+        start = self._stages[self.stage][1]
+        end = 1.0 if self.last else self._stages[self.stage + 1][1]
         return not self.pruned and done >= start + PRUNE_WITHIN * (end - start)
 
     def enter_next(self, step: int) -> None:

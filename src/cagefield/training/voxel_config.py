@@ -14,16 +14,18 @@ class VoxelConfig:
     Attributes:
         steps: number of batches.
         minutes: train for this long instead of `steps`; the result then depends on the machine's speed.
-        resolution: vertices along the longest axis at the end.
-        sh_degree: degree of the colour's spherical harmonics, 0 to 2.
+        resolution: vertices along the longest axis at the end; None takes as many as the photos show and
+            the training has time for (`voxel_defaults`).
+        sh_degree: degree of the colour's spherical harmonics, 0 to 2; None takes 2, or 1 for an unbounded
+            capture.
         seed: of the batches, jitter and random backgrounds.
         batch_rays: rays a batch; doubled for the last stage.
         patch: edge of a pixel patch.
-        rate: (first, last) learning rate.
+        rate: (first, last) learning rate; None takes (8, 0.8), or (4, 0.4) for an unbounded capture.
         decay: of the running curvatures, for each touch of a voxel.
         damping: added to every curvature.
         largest_step: largest change of a voxel's optical depth in one step.
-        smooth: weight of the Laplacian regularisation; None takes 2e-4, or 2e-3 for an unbounded capture.
+        smooth: weight of the Laplacian regularisation; None takes 2e-5, or 2e-3 for an unbounded capture.
         plain: weight of a penalty on the colour's dependence on the view, relative to what the photos say:
             what was seen from one side alone keeps its colour on the others, where it would take a wild one.
         prune: vertices whose largest weight stayed under this are dropped.
@@ -36,12 +38,12 @@ class VoxelConfig:
 
     steps: int = 8000
     minutes: float | None = None
-    resolution: int = 256
-    sh_degree: int = 1
+    resolution: int | None = None
+    sh_degree: int | None = None
     seed: int = 0
     batch_rays: int = 4096
     patch: int = 4
-    rate: tuple[float, float] = (4.0, 0.4)
+    rate: tuple[float, float] | None = None
     decay: float = 0.95
     damping: float = 0.05
     largest_step: float = 0.3
@@ -63,7 +65,7 @@ class VoxelConfig:
         }
         for name, (low, high) in limits.items():
             value = getattr(self, name)
-            if not low <= value <= high:
+            if value is not None and not low <= value <= high:
                 raise CagefieldError(f"{name} is {value}; it must be from {low} to {high}")
         if self.minutes is not None and not 0 < self.minutes < 1e5:
             raise CagefieldError(f"minutes is {self.minutes}; it must be above 0")

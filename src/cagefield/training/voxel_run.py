@@ -24,6 +24,7 @@ from cagefield.training.progress import Progress
 from cagefield.training.schedule import Schedule
 from cagefield.training.specks import without_specks
 from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.voxel_defaults import settings
 from cagefield.training.voxel_space import VoxelSpace
 
 EXPOSURE_FROM = 0.05
@@ -44,18 +45,27 @@ class VoxelRun:
     def __init__(self, dataset: Dataset, config: VoxelConfig) -> None:
         self._config, self._photos = config, Photos.load(dataset.train)
         self._space = VoxelSpace.of(dataset, config.near)
-        self._workers = 1 if devices.is_gpu() else devices.threads()
-        self._schedule = Schedule(by_clock=config.minutes is not None)
+        self._threads = 1 if devices.is_gpu() else devices.threads()
+        self._settings = settings(
+            config,
+            self._photos.sizes,
+            unbounded=dataset.unbounded,
+            threads=None if devices.is_gpu() else self._threads,
+        )
+        self._schedule = self._new_schedule(self._settings.resolution)
         self._patches = Patches(self._photos, config.patch, config.seed)
-        self._batches = Batches(config, self._photos, self._space)
+        self._batches = Batches(config, self._settings, self._photos, self._space)
         fitted = (not self._photos.has_alpha) if config.exposure is None else config.exposure
         self.exposure = Exposure(len(dataset.train), fitted)
         self._grid = self._space.first_grid(
-            dataset.train, self._schedule.resolution(config.resolution), config.sh_degree, self._workers
+            dataset.train, self._schedule.resolution, self._schedule.sh_degree, self._threads
         )
         self.step, self.rays = 0, 0
         self.seconds, self.running_loss = 0.0, float("nan")
-        self._cold = True
+        self._compiled: set[int] = set()
+
+    def _new_schedule(self, resolution: int) -> Schedule:
+        return Schedule(resolution, self._settings.sh_degree, by_clock=self._config.minutes is not None)
 
     @property
     def done(self) -> float:
@@ -75,17 +85,19 @@ class VoxelRun:
         if schedule.is_over(done, self.step):
             schedule.enter_next(self.step)
             self._grid = self._pruned()
-            self._grid = self._space.refined(self._grid, schedule.resolution(self._config.resolution))
+            self._grid = self._space.refined(self._grid, schedule.resolution, schedule.sh_degree)
             self._patches.choose(self._space, self._grid)
         elif schedule.prunes(done):
             schedule.pruned = True
             self._grid = self._pruned()
             self._patches.choose(self._space, self._grid)
+        prepared = time.perf_counter()
         self._batch(done)
         self.step += 1
-        # The first batch of a process compiles the kernels, which is no training.
-        self.seconds += 0.0 if self._cold else time.perf_counter() - began
-        self._cold = False
+        # A process's first batch of each SH degree compiles the kernels, which is no training.
+        compiles = self._grid.degree not in self._compiled
+        self._compiled.add(self._grid.degree)
+        self.seconds += (prepared if compiles else time.perf_counter()) - began
 
     def _batch(self, done: float) -> None:
         config = self._config
@@ -135,6 +147,7 @@ class VoxelRun:
         density, sh, state, weight = grid.arrays()
         scalars = {
             "step": self.step,
+            "resolution": schedule.final,
             "stage": schedule.stage,
             "stage_began": schedule.began,
             "pruned": schedule.pruned,
@@ -173,13 +186,14 @@ class VoxelRun:
             arrays["sh"],
             arrays["state"],
             contracted=self._space.contracted,
-            workers=self._workers,
+            threads=self._threads,
         )
         self._grid.weight.from_numpy(np.concatenate([np.zeros(1, np.float32), arrays["weight"]]))
         self.step, self.rays = scalars["step"], scalars["rays"]
         self.seconds, self.running_loss = scalars["seconds"], scalars["running_loss"]
+        # By the clock a machine with other threads might have chosen another resolution.
         self._schedule = dataclasses.replace(
-            self._schedule,
+            self._new_schedule(scalars["resolution"]),
             stage=scalars["stage"],
             began=scalars["stage_began"],
             pruned=scalars["pruned"],

@@ -49,7 +49,7 @@ class VoxelSpace:
             )
         return cls(bounds, dataset.unbounded, distance, float((bounds[1] - bounds[0]).max()) / 2)
 
-    def first_grid(self, views: tuple[View, ...], resolution: int, degree: int, workers: int) -> GridState:
+    def first_grid(self, views: tuple[View, ...], resolution: int, degree: int, threads: int) -> GridState:
         """A grey grid of this resolution and SH degree, FIRST_DEPTH deep optically.
 
         Of an unbounded scene's, the vertices that the views show are stored.
@@ -65,15 +65,15 @@ class VoxelSpace:
             opacity=FIRST_DEPTH / resolution,
             degree=degree,
             contracted=self.contracted,
-            workers=workers,
+            threads=threads,
             keep=keep,
         )
 
-    def refined(self, grid: GridState, resolution: int) -> GridState:
-        """What a grid stores, on one with this resolution along its longest axis."""
+    def refined(self, grid: GridState, resolution: int, degree: int) -> GridState:
+        """What a grid stores, on one with this resolution along its longest axis and this SH degree."""
         if self.contracted:
-            return grid.refined(self.bounds, (resolution,) * 3)
-        return grid.refined(*_cubic_voxels(grid.support(), resolution))
+            return grid.refined(self.bounds, (resolution,) * 3, degree)
+        return grid.refined(*_cubic_voxels(grid.support(), resolution), degree)
 
     def to_grid(self, grid: GridState) -> tuple[list[float], list[float]]:
         """(lower, scale), each 3 numbers: a world position p has the grid coordinates (p - lower) * scale.

@@ -1,0 +1,65 @@
+"""What a voxel training chooses itself: resolution, harmonics, rates, and the stages on the way."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from cagefield.training.schedule import LARGEST_FIRST, Schedule, stages
+from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.voxel_defaults import LARGEST, SMALLEST, Settings, settings
+
+
+def chosen(config: VoxelConfig, side: int, threads: int | None = 2, *, unbounded: bool = False) -> Settings:
+    """The choices for 20 photos, upright and lying, with this longer side."""
+    sizes = np.array([[side, side // 2], [side // 3, side]] * 10)
+    return settings(config, sizes, unbounded=unbounded, threads=threads)
+
+
+def test_the_resolution_grows_with_the_photos_as_far_as_there_is_time():
+    long = [chosen(VoxelConfig(minutes=60.0), side).resolution for side in (32, 100, 200, 400, 800)]
+    assert long == [SMALLEST, 96, 200, 400, LARGEST]
+    assert chosen(VoxelConfig(minutes=1e4), 4000, threads=None).resolution == LARGEST
+
+
+def test_the_resolution_grows_with_the_root_of_the_time_and_of_the_threads():
+    short = chosen(VoxelConfig(minutes=0.5), 800).resolution
+    assert SMALLEST < short < LARGEST / 2
+    # Rounded to multiples of 8.
+    assert chosen(VoxelConfig(minutes=2.0), 800).resolution == pytest.approx(2 * short, abs=12)
+    assert chosen(VoxelConfig(minutes=0.5), 800, threads=8).resolution == pytest.approx(2 * short, abs=12)
+
+
+def test_a_run_of_given_steps_chooses_the_same_on_every_machine():
+    found = {chosen(VoxelConfig(steps=4000), 800, threads) for threads in (1, 2, 64, None)}
+    assert len(found) == 1
+    assert chosen(VoxelConfig(steps=16000), 800).resolution > found.pop().resolution
+
+
+def test_what_is_named_is_taken():
+    named = VoxelConfig(resolution=90, sh_degree=0, rate=(3.0, 1.0), smooth=0.0)
+    for unbounded in (False, True):
+        assert chosen(named, 400, unbounded=unbounded) == Settings(90, 0, (3.0, 1.0), 0.0)
+
+
+@pytest.mark.parametrize("final", [16, 48, 256, 400, 512, 1024])
+def test_stages_begin_coarse_and_end_at_the_resolution(final):
+    found = stages(final)
+    resolutions, starts = zip(*found, strict=True)
+    assert resolutions[0] <= LARGEST_FIRST + 1 and resolutions[-1] == final
+    assert starts[0] == 0.0 and starts[-1] == 0.4
+    assert all(a < b for a, b in itertools.pairwise(starts))
+    # A grid at most doubles at once: each new vertex lies within a cell of the grid before.
+    assert all(a <= b <= 2 * a + 1 for a, b in itertools.pairwise(resolutions))
+
+
+def test_only_the_first_stage_has_fewer_harmonics():
+    schedule = Schedule(96, 2, by_clock=False)
+    degrees = [schedule.sh_degree]
+    while not schedule.last:
+        schedule.enter_next(0)
+        degrees.append(schedule.sh_degree)
+    assert degrees == [1, 2, 2, 2]
+    assert Schedule(96, 0, by_clock=False).sh_degree == 0
