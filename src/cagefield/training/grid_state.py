@@ -18,6 +18,9 @@ from cagefield.rendering import occupancy
 from cagefield.rendering.grid import brick_order, to_device
 from cagefield.training.records import HEAD
 
+CHUNK = 2**18
+"""Vertices that are interpolated at once."""
+
 MOST_BYTES = 2 * 1024**3
 """Memory of all accumulators together, at most: of a large grid many threads have fewer."""
 
@@ -69,14 +72,16 @@ class GridState:
         order = brick_order(vertices, resolution)
         vertices = vertices[order]
         count, terms = len(vertices), sh.shape[1]
+        # Each array is on the device before the next is copied: a large grid's take most of the memory.
+        densities, colours = _slots(density, order), _slots(sh, order)
+        curvatures = _slots(np.zeros((count, 2), np.float32) if state is None else state, order)
         index = np.zeros(int(np.prod(resolution)), np.int32)
         index[vertices] = np.arange(1, count + 1, dtype=np.int32)
-        curvature = np.zeros((count + 1, 2), np.float32)
-        if state is not None:
-            curvature[1:] = state[order]
+        indices = to_device(index)
         full = np.zeros(resolution, bool)
         full.reshape(-1)[vertices] = True
         bricks = occupancy.of_vertices(full)
+        del index, full
         record = 4 * (count + 1) * (HEAD + 3 * terms)
         workers = max(1, min(threads, MOST_BYTES // record))
         accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEAD + 3 * terms),))
@@ -89,12 +94,12 @@ class GridState:
             threads=threads,
             workers=workers,
             vertices=vertices,
-            density=to_device(np.concatenate([np.zeros(1, np.float32), density[order]])),
-            sh=to_device(np.concatenate([np.zeros((1, terms, 3), np.float32), sh[order]])),
-            state=to_device(curvature),
+            density=densities,
+            sh=colours,
+            state=curvatures,
             weight=to_device(np.zeros(count + 1, np.float32)),
             accumulator=accumulator,
-            index=to_device(index),
+            index=indices,
             codes=to_device(bricks.codes),
             brick_dims=tuple(bricks.codes.shape),
             vertex_at=to_device(np.concatenate([np.zeros(1, np.int32), vertices.astype(np.int32)])),
@@ -214,35 +219,42 @@ class GridState:
         for a in range(3):
             near = np.take(near, lows[a], axis=a) | np.take(near, lows[a] + 1, axis=a)
         vertices = np.flatnonzero(near)
-        x, y, z = np.unravel_index(vertices, resolution)
-        count = len(vertices)
+        del near
+        vertices = vertices[brick_order(vertices, resolution)]
+        count, terms = len(vertices), self.terms
         values = np.concatenate([density[:, None], sh.reshape(len(density), -1), state], axis=1)
         values = np.concatenate([np.zeros((1, values.shape[1]), np.float32), values])
-        out = np.zeros((count, values.shape[1]), np.float32)
-        stored = np.zeros(count, np.float32)
-        for corner in range(8):
-            weight = np.ones(count, np.float32)
-            at = []
-            for a, v in enumerate((x, y, z)):
-                up = corner >> a & 1
-                f = fractions[a][v]
-                weight *= f if up else 1 - f
-                at.append(lows[a][v] + up)
-            slot = index[at[0], at[1], at[2]]
-            out += weight[:, None] * values[slot]
-            stored += weight * (slot > 0)
-        out[:, 1:] /= np.maximum(stored, 1e-6)[:, None]
         volume = float(np.prod(new_cell / old_cell))
-        terms = self.terms
+        densities = np.empty(count, np.float32)
         colours = np.zeros((count, (degree + 1) ** 2, 3), np.float32)
-        colours[:, :terms] = out[:, 1 : 1 + 3 * terms].reshape(count, terms, 3)
+        curvatures = np.empty((count, 2), np.float32)
+        for begin in range(0, count, CHUNK):
+            part = slice(begin, min(begin + CHUNK, count))
+            xyz = np.unravel_index(vertices[part], resolution)
+            out = np.zeros((part.stop - begin, values.shape[1]), np.float32)
+            stored = np.zeros(len(out), np.float32)
+            for corner in range(8):
+                weight = np.ones(len(out), np.float32)
+                at = []
+                for a, v in enumerate(xyz):
+                    up = corner >> a & 1
+                    f = fractions[a][v]
+                    weight *= f if up else 1 - f
+                    at.append(lows[a][v] + up)
+                slot = index[at[0], at[1], at[2]]
+                out += weight[:, None] * values[slot]
+                stored += weight * (slot > 0)
+            out[:, 1:] /= np.maximum(stored, 1e-6)[:, None]
+            densities[part] = out[:, 0]
+            colours[part, :terms] = out[:, 1 : 1 + 3 * terms].reshape(-1, terms, 3)
+            curvatures[part] = out[:, 1 + 3 * terms :] * volume
         return GridState.build(
             bounds,
             resolution,
             vertices,
-            out[:, 0],
+            densities,
             colours,
-            out[:, 1 + 3 * terms :] * volume,
+            curvatures,
             contracted=self.contracted,
             threads=self.threads,
         )
@@ -254,6 +266,13 @@ class GridState:
         lower = self.bounds[0] + (at.min(axis=0) - 1) * cell
         upper = self.bounds[0] + (at.max(axis=0) + 1) * cell
         return np.array([np.maximum(lower, self.bounds[0]), np.minimum(upper, self.bounds[1])])
+
+
+def _slots(values: NDArray[np.float32], order: NDArray[np.int64]) -> Any:
+    """A device array of the values [M,...] in this order, after those of the empty slot, which are 0."""
+    padded = np.zeros((len(values) + 1, *values.shape[1:]), np.float32)
+    np.take(values, order, axis=0, out=padded[1:])
+    return to_device(padded)
 
 
 def cell_sizes(

@@ -85,6 +85,8 @@ class VoxelRun:
         if schedule.is_over(done, self.step):
             schedule.enter_next(self.step)
             self._grid = self._pruned()
+            # Empty after every batch, and the refined grid has its own.
+            self._grid.accumulator = None
             self._grid = self._space.refined(self._grid, schedule.resolution, schedule.sh_degree)
             self._patches.choose(self._space, self._grid)
         elif schedule.prunes(done):
