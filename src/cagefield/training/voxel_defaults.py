@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from cagefield.training.voxel_config import VoxelConfig
 
-VOXELS_PER_PIXEL = 1.0
+VOXELS_PER_PIXEL = 1.25
 """Vertices along the longest axis for each pixel of the photos' longer side, at most."""
 
 RAYS_PER_VOXEL = 340.0
 """Rays that a training takes for each vertex of a square of the grid's longest axis, at least."""
 
-RAYS_PER_SECOND = 150_000.0
-"""Rays that one thread of a CPU takes a second, about; a run by the clock chooses its resolution by it."""
+RAYS_PER_SECOND = 75_000.0
+"""Rays that one thread of a slow CPU takes a second; a run by the clock chooses its resolution by it."""
 
 SMALLEST, LARGEST = 64, 512
 """Limits of the resolution that is chosen; a larger grid may need more than 6 GiB of memory."""
