@@ -24,8 +24,8 @@ class SplatConfig:
         damping: (relative, absolute) damping of the blocks.
         cap: largest step of log scales and turns, and of means in sigmas.
         memory: decay of the running gradients and curvatures.
+        opaque: pull on each opacity's logit towards 1, as a gradient: surfaces in place of fog.
         prune: splats whose opacity falls below this are taken out.
-        refine_poses: correct the training cameras' poses while training.
     """
 
     steps: int = 6000
@@ -40,8 +40,8 @@ class SplatConfig:
     damping: tuple[float, float] = (0.1, 0.01)
     cap: float = 0.15
     memory: tuple[float, float] = (0.5, 0.98)
+    opaque: float = 0.002
     prune: float = 0.01
-    refine_poses: bool = False
 
     def __post_init__(self) -> None:
         limits = {"steps": (1, 10**8), "sh_degree": (0, 3), "splats": (100, 10**8)}

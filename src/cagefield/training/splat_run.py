@@ -29,7 +29,7 @@ from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.splat_step import gauss_newton, residuals
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, split
-from cagefield.training.splat_seeds import camera_scale, first_splats
+from cagefield.training.splat_seeds import camera_scale, depths_seen, first_splats, in_front_of
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
 
@@ -44,6 +44,12 @@ GROWTH = (0.02, 0.6)
 
 GROWTH_EVERY = 60
 """Steps between two growths."""
+
+CLEAR = 0.7
+"""Share of a photo's least depth within which no splat may stand in its picture: such ones are fog."""
+
+CARVE_EVERY = 120
+"""Steps between two removals of those."""
 
 PIXEL_SHARE = 0.15
 """Most splats after five minutes, in shares of a photo's pixels."""
@@ -63,6 +69,7 @@ class SplatRun:
         self._near = near_depth(dataset.bounds)
         self._most = self._most_splats()
         self.state = first_splats(dataset, self.views, config, self._most)
+        self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fitted = (not alpha) if config.exposure is None else config.exposure
@@ -93,6 +100,8 @@ class SplatRun:
         done = self.done
         if self.step % GROWTH_EVERY == GROWTH_EVERY - 1 and GROWTH[0] <= done < GROWTH[1]:
             self._grow(done)
+        if self.step % CARVE_EVERY == CARVE_EVERY - 1 and done < 0.95:
+            self._carve()
         if not self._queue:
             self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
         self._photo(self._queue.pop(), done)
@@ -135,7 +144,7 @@ class SplatRun:
                 state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
                 state.ticks, np.array(config.memory), np.array([rate, rate, rate, rate, 0.5 * rate]),
                 np.array(config.damping), np.array([config.cap, config.cap]), (degree + 1) ** 2,
-                np.array([1e-5, 1e3]) * self._scale, 0.0,
+                np.array([1e-5, 1e3]) * self._scale, -config.opaque,
             )  # fmt: skip
         state.error[seen.order] += state.gradients[seen.order, 15]
         state.hits[seen.order] += 1
@@ -158,6 +167,16 @@ class SplatRun:
             fit = (sums[:3] + 0.02 * sums[3:].mean()) / (sums[3:] + 0.02 * sums[3:].mean())
             self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
             self.gains /= self.gains.mean(axis=0)
+
+    def _carve(self) -> None:
+        """Takes out splats that stand nearer to a camera, in its picture, than anything it shows can be."""
+        state = self.state
+        close = np.zeros(len(state), bool)
+        for view, depth in zip(self.views, self._depths, strict=True):
+            if depth is not None:
+                close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
+        if close.any():
+            state.take(np.flatnonzero(~close))
 
     def _grow(self, done: float) -> None:
         """Takes out what shows nothing, and splits what has the most error."""

@@ -7,6 +7,7 @@ far around the cameras and have the colour that the photos show in their directi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +145,18 @@ def depths_seen(cameras: Sequence[Camera], positions: Array) -> list[tuple[float
             )
         near, usual = np.quantile(depth[seen], (0.01, 0.5)) if seen.sum() >= 20 else (0.0, 0.0)
         found.append((0.7 * float(near), float(usual)) if usual > 0 else None)
+    return found
+
+
+def in_front_of(camera: Camera, positions: NDArray[Any], depth: float) -> NDArray[np.bool_]:
+    """True [N] where a position [N,3] is pictured by the camera at less than a depth."""
+    local = (positions - camera.origin) @ camera.c2w[:3, :3]
+    rows = np.flatnonzero((-local[:, 2] > 0) & (-local[:, 2] < depth))
+    pixels, _ = camera.project(positions[rows])
+    with np.errstate(invalid="ignore"):
+        inside = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1)
+    found = np.zeros(len(positions), bool)
+    found[rows[inside]] = True
     return found
 
 

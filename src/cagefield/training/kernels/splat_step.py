@@ -130,7 +130,7 @@ def gauss_newton(
     caps,
     terms,
     scale_range,
-    shrink,
+    pull,
 ):
     """One step of the splats in `order`.
 
@@ -178,7 +178,7 @@ def gauss_newton(
             at_most(-rates[2] * g[7] / (H[13] + damp), cap),
             at_most(-rates[2] * g[8] / (H[14] + damp), cap),
         )
-        step = -rates[3] * (g[9] + shrink) / (H[15] * (1.0 + rel) + tiny)
+        step = -rates[3] * (g[9] + pull) / (H[15] * (1.0 + rel) + tiny)
         logits[i] = at_most(logits[i] + at_most(step, 4.0 * cap), 7.0)
         dx = np.float64(means[i, 0]) - origin[0]
         dy = np.float64(means[i, 1]) - origin[1]
