@@ -85,7 +85,8 @@ def _unpickled(path: Path) -> dict[str, Any]:
         import torch
     except ImportError as error:
         raise FieldError(
-            f"{path}: reading a checkpoint needs PyTorch, which is not installed; pip install 'cagefield[nerf]'"
+            f"{path}: reading a checkpoint needs PyTorch, which is not installed; "
+            "pip install 'cagefield[nerf]'"
         ) from error
     try:
         with warnings.catch_warnings():

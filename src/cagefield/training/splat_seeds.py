@@ -134,7 +134,7 @@ def background_seeds(
     return positions[kept], np.full(int(kept.sum()), sigma), rgb[kept]
 
 
-def depths_seen(cameras: Sequence[Camera], positions: Array) -> list[tuple[float, float] | None]:
+def depths_seen(cameras: Sequence[Camera], positions: NDArray[Any]) -> list[tuple[float, float] | None]:
     """(least, usual) depth of the positions [N,3] that each camera shows, None where it shows too few."""
     found: list[tuple[float, float] | None] = []
     for camera in cameras:

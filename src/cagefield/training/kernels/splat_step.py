@@ -136,8 +136,8 @@ def gauss_newton(
 
     memory: decay of the running gradient and of the running curvature. rates: mean, log scales, turn, logit,
     colour. damping: relative to the block, and absolute. caps: log scales and turns; mean, in largest sigmas.
-    terms: harmonics in use. scale_range: (least, largest) sigma. shrink: pull on the logit and log scales
-    that lets splats nobody needs fade.
+    terms: harmonics in use. scale_range: (least, largest) sigma. pull: added to the
+    logit's gradient.
     """
     for q in prange(order.size):
         i = order[q]
