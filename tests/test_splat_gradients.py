@@ -70,6 +70,7 @@ def analytic(
             lens.model,
             lens.coefficients,
             antialiased,
+            True,
             gradients,
             curvatures,
         )

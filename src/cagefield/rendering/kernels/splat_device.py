@@ -316,9 +316,27 @@ def gradients(
             at = 3 * t * AREA + pixel
             g = vec3(slopes[at], slopes[at + AREA], slopes[at + 2 * AREA])
             rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
+            # The pixel's sum of |alpha dC/dalpha| first: it is part of every curvature.
+            influence = 0.0
             T = 1.0
             e = starts[t]
             end = starts[t + 1]
+            while e < end and T >= T_MIN:
+                row = PACKED * ids[e]
+                dy = y - packed[row + 1]
+                l = x - packed[row] + packed[row + 3] * dy
+                q = packed[row + 2] * l * l + packed[row + 4] * dy * dy
+                a = qd.min(packed[row + 5] * qd.exp(-0.5 * q), ALPHA_MAX)
+                if a >= ALPHA_MIN:
+                    w = a * T
+                    c = vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                    rest -= w * c
+                    T -= w
+                    influence += (w * c - a / (1.0 - a) * rest).norm()
+                e += 1
+            rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
+            T = 1.0
+            e = starts[t]
             while e < end and T >= T_MIN:
                 row = PACKED * ids[e]
                 dx = x - packed[row]
@@ -343,7 +361,7 @@ def gradients(
                     if full <= ALPHA_MAX:
                         slope = w * c - a / (1.0 - a) * rest
                         v = slope.dot(g)
-                        h = slope.dot(slope)
+                        h = slope.norm() * influence
                         xx = ex * ex
                         xy = ex * ey
                         yy = ey * ey
