@@ -56,8 +56,14 @@ def first_splats(
     else:
         positions, rgb = np.concatenate([positions, swept]), np.concatenate([rgb, colours])
     positions, first = np.unique(positions.astype(np.float32), axis=0, return_index=True)
-    if len(positions) > most:
-        chosen = np.sort(np.random.default_rng(config.seed).permutation(len(positions))[:most])
+    far = None
+    if dataset.unbounded and config.background > 0.0:
+        unit = camera_scale([view.cameras[0] for view in views], dataset.bounds)
+        count = max(200, int(config.background * min(len(positions), most)))
+        far = background_seeds(views, dataset.bounds.mean(axis=0), unit, min(count, most // 4))
+    left = most if far is None else most - len(far[0])
+    if len(positions) > left:
+        chosen = np.sort(np.random.default_rng(config.seed).permutation(len(positions))[:left])
         positions, first = positions[chosen], first[chosen]
     state = SplatState.new(
         positions,
@@ -66,10 +72,7 @@ def first_splats(
         FIRST_OPACITY,
         config.sh_degree,
     )
-    if dataset.unbounded and config.background > 0.0:
-        unit = camera_scale([view.cameras[0] for view in views], dataset.bounds)
-        count = max(200, int(config.background * len(positions)))
-        far = background_seeds(views, dataset.bounds.mean(axis=0), unit, count)
+    if far is not None:
         state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
     return state
 
@@ -174,7 +177,7 @@ def swept_points(
     images = [_over_white(untiled(views[n].level(level)[1], *size)) for n in usable]
     if len(usable) < 3 or wanted < 1:
         return np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
-    known = [depth for depth in depths if depth is not None]
+    known = [depth for n in usable if (depth := depths[n]) is not None]
     return surface_points(
         images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], wanted, seed
     )

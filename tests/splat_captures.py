@@ -1,0 +1,81 @@
+"""Captures with a known answer: photos of a field of splats, as data sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras import Camera, turntable
+from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.images import write_png
+from cagefield.rendering.splat_renderer import SplatRenderer
+from scenes import SH_C0
+from splat_scenes import ball_of_splats
+
+BOX = np.array([[-1.0] * 3, [1.0] * 3])
+
+
+def painted_ball(count: int = 250) -> SplatField:
+    """A ball of splats of random colours."""
+    ball = ball_of_splats(count)
+    colours = np.random.default_rng(5).uniform(0.05, 0.95, (count, 1, 3))
+    return SplatField(
+        ball.means,
+        ball.log_scales,
+        ball.quaternions,
+        np.full(count, 0.95),
+        (colours - 0.5) / SH_C0,
+        bounds=BOX,
+    )
+
+
+def around(count: int, elevation: float, size: int = 64) -> list[Camera]:
+    """Cameras on a ring around the origin."""
+    return turntable((0, 0, 0), 2.2, count, elevation=elevation, width=size, height=size, fov_x=0.6)
+
+
+def photos_of(field: SplatField, cameras: Sequence[Camera], cut_out: bool = False) -> list[NDArray[np.uint8]]:
+    """uint8 pictures of the field over black, or with straight alpha."""
+    renderer, pictures = SplatRenderer(field), []
+    for camera in cameras:
+        frame = renderer.render(camera, background=None if cut_out else "black")
+        assert frame is not None
+        picture = np.dstack([frame.rgb, frame.opacity]) if cut_out else frame.rgb
+        pictures.append(np.rint(255 * picture.clip(0, 1)).astype(np.uint8))
+    return pictures
+
+
+def write_views(
+    folder: Path, cameras: Sequence[Camera], photos: Sequence[NDArray[np.uint8]]
+) -> tuple[View, ...]:
+    """Views of photos written to a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    views = []
+    for n, (camera, photo) in enumerate(zip(cameras, photos, strict=True)):
+        path = folder / f"{n:02}.png"
+        write_png(path, photo)
+        views.append(View(f"{folder.name}/{n:02}", camera, path))
+    return tuple(views)
+
+
+def as_dataset(
+    folder: Path,
+    train: tuple[View, ...],
+    test: tuple[View, ...] = (),
+    points: SparsePoints | None = None,
+    white: bool = False,
+    unbounded: bool = False,
+) -> Dataset:
+    """A data set in the box [-1, 1]^3."""
+    return Dataset(folder.name, folder, train, test, (), unbounded, BOX, white, points=points)
+
+
+def points_near(field: SplatField, far: float = 0.03, count: int = 120) -> SparsePoints:
+    """Grey points at some of the field's splats, each off by about `far` along each axis."""
+    chance = np.random.default_rng(2)
+    means = field.means[:: max(1, len(field) // count)]
+    return SparsePoints(means + far * chance.normal(size=means.shape), np.full(means.shape, 128, np.uint8))
