@@ -163,7 +163,7 @@ class SplatRun:
         if not self._fitted:
             return
         sums = tile_sums[:, 1:].sum(axis=0, dtype=np.float64)
-        if self.done > 0.05:
+        if self.done > 0.05 and sums[3:].mean() > 0:
             fit = (sums[:3] + 0.02 * sums[3:].mean()) / (sums[3:] + 0.02 * sums[3:].mean())
             self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
             self.gains /= self.gains.mean(axis=0)
@@ -175,13 +175,14 @@ class SplatRun:
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
                 close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
-        if close.any():
+        if close.any() and not close.all():
             state.take(np.flatnonzero(~close))
 
     def _grow(self, done: float) -> None:
         """Takes out what shows nothing, and splits what has the most error."""
         state, config = self.state, self._config
-        state.take(np.flatnonzero(~fading(state, config.prune, 20.0 * self._scale)))
+        kept = np.flatnonzero(~fading(state, config.prune, 20.0 * self._scale))
+        state.take(kept if len(kept) else np.arange(1))
         rounds = max(1.0, (GROWTH[1] - done) / max(done / max(self.step, 1), 1e-9) / GROWTH_EVERY)
         if len(state) < self._most:
             want = int(len(state) * ((self._most / len(state)) ** (1.0 / rounds) - 1.0))
