@@ -170,9 +170,14 @@ def test_ctrl_c_ends_a_call_of_pycolmap_s_and_waits_for_its_end():
         time.sleep(0.3)
         order.append("ended")
 
-    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
-    with pytest.raises(KeyboardInterrupt):
-        features.call(endless)
+    # A process that was started in the background ignores Ctrl-C unless it is told otherwise.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
+        with pytest.raises(KeyboardInterrupt):
+            features.call(endless)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert order == ["ended"]
     assert features.engine().logging.minloglevel == 0
 
