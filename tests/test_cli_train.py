@@ -129,3 +129,13 @@ def test_missing_photos_are_one_line_of_warning(
     warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
     assert len(warned) == 1 and warned[0].startswith("cagefield: warning: ") and "r_3" in warned[0]
     assert len(Scene.open(tmp_path / "scene").cameras["train"]) == 7
+
+
+def test_auto_takes_voxels_for_a_bounded_scene_and_says_so(
+    photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith("Training voxels, the scene is bounded (--field splat trains splats)\n")
+    assert main(["train", str(photos), "-o", str(tmp_path / "told"), *QUICK, "--field", "voxel"]) == 0
+    assert "the scene is bounded" not in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +13,13 @@ from cagefield import Cage, Edit, EditStack, Scene, load_dataset
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import FieldError
-from cagefield.fields.baking import widened
-from cagefield.fields.splat import SplatField
+from cagefield.fields.baking import _Grid, widened
+from cagefield.fields.splat import SplatField, rotation_matrices
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr
 from cagefield.rendering.renderers import renderer_of
 from scenes import ball_field, ball_scene
-from splat_scenes import assert_same_splats, random_splats, splat_scene
+from splat_scenes import assert_same_splats, ball_of_splats, random_splats, splat_scene
 
 LIFT = Edit(Cage.box((0, 0, 0), 1.2), adjustment="discrete").translate((0, 0, 0.4))
 
@@ -114,23 +114,72 @@ def test_voxels_of_splats_show_what_the_splats_show() -> None:
         # the silhouette. (Pictures of a few pixels differ: every splat gets the rasteriser's filter there.)
         assert psnr(np.clip(shown.rgb, 0, 1), np.clip(expected.rgb, 0, 1)) > 31.0
         assert shown.opacity.mean() == pytest.approx(expected.opacity.mean(), rel=0.02)
-        assert shown.opacity[80, 120] > 0.85
-        assert shown.depth[80, 120] == pytest.approx(2.5, abs=0.12)
+        # Single splats between which little is left stand in the way: some of the far side shines through.
+        middle = (slice(65, 95), slice(105, 135))
+        assert shown.opacity[middle].mean() > 0.95
+        assert np.median(shown.depth[middle]) == pytest.approx(np.median(expected.depth[middle]), abs=0.1)
+
+
+def test_voxels_of_unbounded_splats_reach_beyond_their_box() -> None:
+    ball = ball_of_splats()
+    far = SplatField(
+        np.concatenate([ball.means, 8.0 * ball.means / 0.5]),
+        np.concatenate([ball.log_scales, ball.log_scales + np.log(16.0)]),
+        np.concatenate([ball.quaternions] * 2),
+        np.concatenate([ball.opacities] * 2),
+        np.concatenate([ball.sh, -ball.sh]),
+        bounds=ball.bounds,
+        unbounded=True,
+    )
+    scene = replace(splat_scene(), field=far)
+    baked = Scene.baked(far, scene.cameras, resolution=112, unbounded=True)
+    assert baked.field.contracted
+    camera = scene.cameras["test"][0].resized(240, 160)
+    shown, expected = baked.render(camera), scene.render(camera)
+    # The wall around the ball, 8 away from the middle, is of the opposite colour.
+    corner = (slice(0, 40), slice(0, 40))
+    assert np.median(expected.depth[corner]) > 8.0 and expected.opacity[corner].mean() > 0.9
+    assert shown.opacity[corner].mean() > 0.9
+    means = [np.median(frame.rgb[corner], axis=(0, 1)) for frame in (shown, expected)]
+    np.testing.assert_allclose(*means, atol=0.1)
+    assert psnr(np.clip(shown.rgb, 0, 1), np.clip(expected.rgb, 0, 1)) > 20.0
 
 
 def test_wider_splats_cover_more_with_less() -> None:
     field = SplatField(
         np.zeros((2, 3)),
-        np.log([[0.3, 0.4, 0.01], [0.02, 0.03, 0.01]]),
-        np.tile([1.0, 0, 0, 0], (2, 1)),
+        np.log([[0.3, 0.4, 0.01], [0.02, 0.01, 0.03]]),
+        np.array([[1.0, 0, 0, 0], [1.0, 0.2, -0.4, 0.7]]),
         np.array([0.8, 0.6]),
         np.zeros((2, 1, 3)),
     )
-    wide = widened(field, np.array([0.0, 0.04]))
-    assert_same_splats(wide.take(np.array([0])), field.take(np.array([0])), atol=1e-6)
-    np.testing.assert_allclose(np.exp(wide.log_scales[1]), np.hypot([0.02, 0.03, 0.01], 0.04), rtol=1e-6)
-    area = np.hypot(0.02, 0.04) * np.hypot(0.03, 0.04)
-    assert wide.opacities[1] == pytest.approx(0.6 * 0.02 * 0.03 / area, rel=1e-5)
+    widths = np.stack([np.zeros((3, 3)), np.diag([0.04, 0.02, 0.1]) @ np.ones((3, 3))])
+    wide = widened(field, widths)
+    plain, blurred = covariances_of(field), covariances_of(wide)
+    np.testing.assert_allclose(blurred, plain + widths @ widths.transpose(0, 2, 1), rtol=1e-4, atol=1e-8)
+    assert wide.opacities[0] == pytest.approx(0.8, rel=1e-5)
+    # Shadows along the thinnest axis, by projection onto the other two.
+    axes = rotation_matrices(field.quaternions.astype(float))[1][:, [0, 2]]
+    shadows = [np.sqrt(np.linalg.det(axes.T @ C @ axes)) for C in (plain[1], blurred[1])]
+    assert wide.opacities[1] == pytest.approx(0.6 * shadows[0] / shadows[1], rel=1e-4)
+
+
+def covariances_of(field: SplatField) -> np.ndarray:
+    axes = (
+        rotation_matrices(field.quaternions.astype(float)) * np.exp(field.log_scales.astype(float))[:, None]
+    )
+    return axes @ axes.transpose(0, 2, 1)
+
+
+def test_steps_of_a_contracted_grid_are_the_derivative_of_its_positions() -> None:
+    grid = _Grid.contracting(np.array([[-1.0, -2.0, 0.0], [1.0, 2.0, 3.0]]), 65)
+    vertices = np.array([[32.0, 30.0, 33.0], [60.3, 20.0, 40.0], [10.0, 3.2, 50.0], [20.0, 30.0, 62.5]])
+    steps = grid.steps_at(grid.positions(vertices).astype(float))
+    for axis in range(3):
+        h = 1e-2 * np.eye(3)[axis]
+        slope = (grid.positions(vertices + h).astype(float) - grid.positions(vertices - h)) / 2e-2
+        # float32 positions up to 20, differences of a hundredth of a step
+        np.testing.assert_allclose(steps[:, :, axis], slope, rtol=2e-3, atol=1e-3)
 
 
 def test_a_scene_of_voxels_is_rendered_as_before() -> None:

@@ -15,6 +15,7 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
+    from cagefield.training.splat_config import SplatConfig
     from cagefield.training.voxel_config import VoxelConfig
 
 Device = Annotated[
@@ -58,13 +59,13 @@ class TrainingOptions:
     resolution: int | None = None
     """Voxels along the longest axis at the end; left out, as many as the photos' size and the time allow."""
     sh_degree: int | None = None
-    """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view; left out, 2,
-    and 1 for voxels trained on an unbounded capture."""
+    """Degree of the colour's spherical harmonics, 0 to 2, of splats to 3: how much it changes with the view;
+    left out, 2, and 1 for voxels trained on an unbounded capture."""
     seed: int = 0
     """Of the order of the photos' pixels and of all other chance."""
 
     def config(self) -> VoxelConfig:
-        """The trainer's configuration."""
+        """The configuration of the voxels' trainer."""
         from cagefield.training.voxel_config import VoxelConfig
 
         return VoxelConfig(
@@ -72,6 +73,18 @@ class TrainingOptions:
             minutes=self.minutes if self.steps is None else None,
             resolution=self.resolution,
             sh_degree=self.sh_degree,
+            seed=self.seed,
+        )
+
+    def splat_config(self, splats: int | None = None) -> SplatConfig:
+        """The configuration of the splats' trainer; at most so many `splats`, None for its own choice."""
+        from cagefield.training.splat_config import SplatConfig
+
+        return SplatConfig(
+            steps=SplatConfig.steps if self.steps is None else self.steps,
+            minutes=self.minutes if self.steps is None else None,
+            splats=splats,
+            sh_degree=SplatConfig.sh_degree if self.sh_degree is None else self.sh_degree,
             seed=self.seed,
         )
 

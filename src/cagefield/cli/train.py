@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
-from contextlib import contextmanager
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from cagefield.cli.options import (
     BakingOptions,
@@ -25,12 +27,21 @@ if TYPE_CHECKING:
     from cagefield.datasets import Dataset
     from cagefield.scene import Scene
     from cagefield.training.nerf_config import NerfConfig
+    from cagefield.training.splat import SplatTrainResult
+    from cagefield.training.splat_config import SplatConfig
     from cagefield.training.voxel import TrainResult
     from cagefield.training.voxel_config import VoxelConfig
 
 FieldKind = Literal["voxel", "nerf"]
+AnyKind = Literal["auto", "splat", "voxel", "nerf"]
 Preset = Literal["auto", "paper", "small"]
 Ndc = Literal["auto", "on", "off"]
+
+FOG = (
+    "voxels explain what has no texture in a capture (walls, floors, tables) by fog in front of the cameras; "
+    "--field splat is made for it"
+)
+"""What is said before voxels are trained on an unbounded capture."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +51,12 @@ class Train:
     photos: Photos
     out: Output
     """Scene folder."""
-    field: FieldKind = "voxel"
-    """voxel is what the editor shows; nerf is the original NeRF, needs PyTorch, and is baked at the end."""
+    field: AnyKind = "auto"
+    """splat are 3D Gaussians, made for captures of real places; voxel is a grid, made for things on a plain
+    background; auto takes splats where a capture is unbounded, else voxels. nerf is the original NeRF, needs
+    PyTorch, and is baked into voxels at the end."""
+    splats: int | None = None
+    """Most splats at the end; left out, as many as the photos and the time allow."""
     preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
     ndc: Ndc = "auto"
@@ -60,21 +75,32 @@ class Train:
 
         if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
             raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
+        if self.splats is not None and self.field not in ("splat", "auto"):
+            raise CagefieldError("--splats is for splats; give --field splat too")
         target = check_destination(self.out, self.overwrite or self.resume)
         checkpoint = target.with_name(target.name + ".training")
         if checkpoint.exists() and not (self.resume or self.overwrite):
             raise CagefieldError(
                 f"{checkpoint} is an interrupted training; give --resume to go on, or --overwrite"
             )
-        config = self.training.config()
+        if self.resume and not checkpoint.is_file():
+            raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
+        self._check_options()
         dataset = self.photos.load(posed_in=target.with_name(target.name + ".poses"))
+        kind = self._kind(dataset)
         devices.start(self.device)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if self.field == "nerf":
+        if kind == "nerf":
             scene, figures, finished = self._train_nerf(dataset, checkpoint)
+        elif kind == "splat":
+            options = self.training.splat_config(self.splats)
+            scene, splats = train_splats(dataset, options, checkpoint, resume=self.resume)
+            figures, finished = summary(splats), splats.finished
         else:
-            scene, result = train_scene(dataset, config, checkpoint, resume=self.resume)
-            figures, finished = summary(result), result.finished
+            if dataset.unbounded:
+                warnings.warn(FOG, stacklevel=2)
+            scene, voxels = train_scene(dataset, self.training.config(), checkpoint, resume=self.resume)
+            figures, finished = summary(voxels), voxels.finished
         with self._kept(finished):
             scene.save(self.out, overwrite=self.overwrite or self.resume)
         print(f"{figures}\nscene written to {self.out}")
@@ -82,6 +108,29 @@ class Train:
             print("stopped early; the same command with --resume goes on")
             raise KeyboardInterrupt
         checkpoint.unlink(missing_ok=True)
+
+    def _check_options(self) -> None:
+        """Refuses, before photos are looked at, options that no trainer in question takes."""
+        if self.field in ("auto", "splat"):
+            self.training.splat_config(self.splats)
+        # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.
+        if self.field != "splat" and (self.field != "auto" or self.training.sh_degree != 3):
+            self.training.config()
+
+    def _kind(self, dataset: Dataset) -> AnyKind:
+        """What is trained; where that was left open, a line on stderr says so."""
+        if self.field != "auto":
+            return self.field
+        kind: AnyKind = "splat" if dataset.unbounded else "voxel"
+        if kind == "voxel" and self.splats is not None:
+            raise CagefieldError("--splats is for splats, these photos get voxels; give --field splat too")
+        what = (
+            "splats, the capture is unbounded (--field voxel trains voxels)"
+            if dataset.unbounded
+            else "voxels, the scene is bounded (--field splat trains splats)"
+        )
+        print(f"Training {what}", file=sys.stderr)
+        return kind
 
     def _train_nerf(self, dataset: Dataset, checkpoint: Path) -> tuple[Scene, str, bool]:
         """(scene, lines of figures, whether the training got to its end) of the original NeRF, baked."""
@@ -178,10 +227,58 @@ def train_scene(
     return Scene.trained(result, dataset), result
 
 
-def summary(result: TrainResult) -> str:
-    """One line of figures: time, steps, voxels, PSNR and SSIM."""
+class _Stages:
+    """Progress bars on stderr, one for each stage, one at a time."""
+
+    def __init__(self) -> None:
+        self._stage, self._bar = "", ExitStack()
+        self._move: Callable[[float, float, str], None]
+
+    def __enter__(self) -> _Stages:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def move(self, stage: str, done: float, note: str) -> None:
+        """Moves the bar of a stage; another stage's is closed first."""
+        if stage != self._stage:
+            self._bar.close()
+            self._stage, self._move = stage, self._bar.enter_context(progress_bar(stage))
+        self._move(done, 1.0, note)
+
+
+def train_splats(
+    dataset: Dataset, config: SplatConfig, checkpoint: Path | None = None, *, resume: bool = False
+) -> tuple[Scene, SplatTrainResult]:
+    """The trained scene of splats, with progress bars on stderr, and the figures of the training."""
+    from cagefield.scene import Scene
+    from cagefield.training.splat import train_splat
+
+    with _Stages() as stages:
+
+        def on_progress(progress: Any) -> None:
+            stages.move("Training", progress.done, str(progress))
+
+        result = train_splat(
+            dataset,
+            config,
+            checkpoint=checkpoint,
+            resume=resume,
+            on_progress=on_progress,
+            on_points=lambda done, note: stages.move("Finding points", done, note),
+        )
+    return Scene.trained(result, dataset), result
+
+
+def summary(result: TrainResult | SplatTrainResult) -> str:
+    """One line of figures: time, steps, voxels or splats, PSNR and SSIM."""
+    from cagefield.fields.voxel import VoxelField
+
+    field = result.field
+    size = f"{len(field.vertices)} voxels" if isinstance(field, VoxelField) else f"{len(field)} splats"
     parts = [
-        f"trained {result.seconds:.0f} s, {result.steps} steps, {len(result.field.vertices)} voxels",
+        f"trained {result.seconds:.0f} s, {result.steps} steps, {size}",
         f"train PSNR {result.train_psnr:.2f} dB",
     ]
     if result.test_psnr == result.test_psnr:

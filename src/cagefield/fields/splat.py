@@ -143,9 +143,9 @@ class SplatField:
         sigma, rgb = self.mixture.along(np.asarray(positions), np.asarray(viewdirs))
         return sigma.mean(axis=1), np.clip(rgb, 0.0, 1.0)
 
-    def mean_sigma(self, positions: ArrayLike) -> Float32:
-        """The density [N] at positions [N,3], as it is on average over directions."""
-        return self.mixture.mean_sigma(np.asarray(positions))
+    def grid_sigma(self, positions: ArrayLike) -> Float32:
+        """The density [N] at positions [N,3] for grids: smoother, the same for all directions."""
+        return self.mixture.grid_sigma(np.asarray(positions))
 
     @cached_property
     def mixture(self) -> SplatMixture:

@@ -17,8 +17,16 @@ at the mean alone, and too wide around it: by half at o = .9.) Densities of seve
 transmittances multiply: a ray loses the same in both, whatever their order. The colour at a point is that of
 the splats there, weighted by their densities.
 
-That sigma depends on d only through s_d. `mean_sigma` leaves d out and takes for 1 / s_d its root mean square
-over all directions, sqrt((1/s_1^2 + 1/s_2^2 + 1/s_3^2) / 3).
+For grids, which sample and interpolate, `grid_sigma` differs in two ways. Li_1/2 has a sharp peak where o is
+near 1; along the thinnest axis, with u the position on it in units of its scale, the profile is normal
+instead, with the same integral,
+
+    sigma_n(p) = -ln(1 - o g) exp(-u^2 / 2) / (sqrt(2 pi) s_d),    g = G(p) exp(u^2 / 2),
+
+whose samples a distance of 2 scales apart sum up to that integral within 2 %. And it depends on no direction:
+1 / s_d is its root mean square over all, sqrt((1/s_1^2 + 1/s_2^2 + 1/s_3^2) / 3). On a layer of flat splats
+that is .58 of what it is face on. There a ray at an angle loses as much as one that is face on, but in a grid
+1 / cos as much: half is right on average over what is seen.
 
 A splat counts where o G is at least `LEAST`; its opacity is at most `MAX_OPACITY`, as in pictures.
 """
@@ -60,13 +68,13 @@ class SplatMixture:
     """The splats of a field in a hash table of cells, level by level: large splats in large cells.
 
     A splat whose box has the largest half extent r is in all the cells of size 2^l in [r, 2r) that it
-    overlaps, 27 at most. A point looks into one cell of each level. `packed`, `steepness` (1 / s_d of
-    `mean_sigma`) and `harmonics` have a row for each splat that is seen; `cells` are the arrays of the table,
-    as `cagefield.fields.kernels.splat_mixture` takes them.
+    overlaps, 27 at most. A point looks into one cell of each level. `packed`, `layers` (for `grid_sigma`: the
+    thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d)) and `harmonics` have a row for each splat that is
+    seen; `cells` are the arrays of the table, as `cagefield.fields.kernels.splat_mixture` takes them.
     """
 
     packed: Float32
-    steepness: Float32
+    layers: Float32
     harmonics: Float32
     cells: tuple[NDArray[Any], ...]
 
@@ -87,6 +95,10 @@ class SplatMixture:
         packed[:, 9:12] = field.means[seen]
         packed[:, 12] = -np.log(opacity)
         packed[:, 13] = end
+        thinnest = np.argmin(scales, axis=1)
+        layers = np.empty((len(seen), 4), np.float32)
+        layers[:, :3] = packed[:, :9].reshape(-1, 3, 3)[np.arange(len(seen)), thinnest]
+        layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
         largest = np.maximum(half.max(axis=1), FINEST * _extent(field.means[seen]))
         exponents, levels = np.unique(np.ceil(np.log2(largest)), return_inverse=True)
         sizes = np.exp2(exponents)
@@ -106,20 +118,20 @@ class SplatMixture:
         starts[slots], ends[slots] = first, first + counts
         return cls(
             packed,
-            np.sqrt((scales**-2.0).mean(axis=1))[order].astype(np.float32),
+            layers[order],
             np.ascontiguousarray(field.sh[seen[order]]),
             (sizes, table, starts, ends, ids[by_key]),
         )
 
-    def mean_sigma(self, positions: NDArray[Any]) -> Float32:
-        """The density [N] at positions [N,3], as it is on average over directions."""
+    def grid_sigma(self, positions: NDArray[Any]) -> Float32:
+        """The density for grids [N] at positions [N,3], per world unit."""
         from cagefield.fields.kernels import splat_mixture as kernels
 
         points = _three(positions, "positions")
         sigma = np.empty(len(points), np.float32)
 
         def ask(rows: slice) -> None:
-            kernels.densities(self.packed, self.steepness, *self.cells, points[rows], sigma[rows])
+            kernels.densities(self.packed, self.layers, *self.cells, points[rows], sigma[rows])
 
         _in_blocks(len(points), ask)
         return sigma

@@ -130,8 +130,11 @@ def mahalanobis(packed, i, x, y, z):
 
 
 @njit(**FAST)
-def densities(packed, steepness, sizes, table, starts, ends, ids, points, sigma):
-    """sigma [P] at points [P,3], each splat with 1 / s_d = steepness [N]."""
+def densities(packed, layers, sizes, table, starts, ends, ids, points, sigma):
+    """`grid_sigma` [P] at points [P,3].
+
+    layers [N,4]: the thinnest axis over its scale, and 1 / (sqrt(2 pi) s_d).
+    """
     for p in range(len(points)):
         x, y, z = np.float64(points[p, 0]), np.float64(points[p, 1]), np.float64(points[p, 2])
         total = 0.0
@@ -147,8 +150,11 @@ def densities(packed, steepness, sizes, table, starts, ends, ids, points, sigma)
                 i = ids[e]
                 q = mahalanobis(packed, i, x, y, z)
                 if q < packed[i, 13]:
-                    total += steepness[i] * polylog_half(packed[i, 12] + 0.5 * q)
-        sigma[p] = INVERSE_ROOT_TAU * total
+                    dx, dy, dz = x - packed[i, 9], y - packed[i, 10], z - packed[i, 11]
+                    u = layers[i, 0] * dx + layers[i, 1] * dy + layers[i, 2] * dz
+                    across = np.exp(-packed[i, 12] - 0.5 * max(q - u * u, 0.0))
+                    total -= layers[i, 3] * np.log(1.0 - across) * np.exp(-0.5 * u * u)
+        sigma[p] = total
 
 
 @njit(**FAST)
