@@ -2,9 +2,10 @@
 
     python benchmarks/splat_speed.py [--ply FILE] [--out benchmarks/results/splat_speed.md]
 
-Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of random
-splats. A training step is everything that a photo costs: splats drawn, gradients and curvatures, the step. Times
-are the least of the rounds, by the wall; kernels are compiled before.
+Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
+random
+splats. A training step is everything that a photo costs: splats drawn, gradients and curvatures, the step.
+Times are the least of the rounds, by the wall; kernels are compiled before.
 """
 
 from __future__ import annotations

@@ -124,6 +124,8 @@ class Train:
         kind: AnyKind = "splat" if dataset.unbounded else "voxel"
         if kind == "voxel" and self.splats is not None:
             raise CagefieldError("--splats is for splats, these photos get voxels; give --field splat too")
+        if kind == "voxel":
+            self.training.config()
         what = (
             "splats, the capture is unbounded (--field voxel trains voxels)"
             if dataset.unbounded
