@@ -131,7 +131,8 @@ class Train:
             if dataset.unbounded
             else "voxels, the scene is bounded (--field splat trains splats)"
         )
-        print(f"Training {what}", file=sys.stderr)
+        if not self.resume:
+            print(f"Training {what}", file=sys.stderr)
         return kind
 
     def _train_nerf(self, dataset: Dataset, checkpoint: Path) -> tuple[Scene, str, bool]:
