@@ -13,7 +13,7 @@ from cagefield import Cage, Edit, EditStack, Scene, load_dataset
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import FieldError
-from cagefield.fields.baking import _Grid, widened
+from cagefield.fields.baking import _Grid, bake, surrounding, widened
 from cagefield.fields.splat import SplatField, rotation_matrices
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.metrics import psnr
@@ -162,6 +162,32 @@ def test_wider_splats_cover_more_with_less() -> None:
     axes = rotation_matrices(field.quaternions.astype(float))[1][:, [0, 2]]
     shadows = [np.sqrt(np.linalg.det(axes.T @ C @ axes)) for C in (plain[1], blurred[1])]
     assert wide.opacities[1] == pytest.approx(0.6 * shadows[0] / shadows[1], rel=1e-4)
+
+
+def test_splats_around_a_camera_are_no_veil_in_voxels() -> None:
+    scene = splat_scene()
+    eye = scene.cameras["test"][0].origin
+    turned = np.array([[0.8, 0.1, -0.3, 0.5]])
+    veil = SplatField(
+        eye[None] + 0.4 * rotation_matrices(turned / np.linalg.norm(turned))[0][:, 0],
+        np.log([[0.25, 0.2, 0.05]]), turned, np.array([0.9]), np.full((1, 1, 3), 2.0),
+    )  # fmt: skip
+    # 0.4 away along the axis of scale 0.25: 1.6 standard deviations
+    np.testing.assert_array_equal(surrounding(veil, eye[None]), [True])
+    np.testing.assert_array_equal(surrounding(veil, eye[None] + [[3.0, 0, 0]]), [False])
+    farther = replace(veil, log_scales=np.log([[0.15, 0.2, 0.05]]))
+    np.testing.assert_array_equal(surrounding(farther, eye[None]), [False])
+    both = SplatField(
+        *(
+            np.concatenate([getattr(scene.field, name), getattr(veil, name)])
+            for name in ("means", "log_scales", "quaternions", "opacities", "sh")
+        ),
+        bounds=[[-4.0] * 3, [4.0] * 3],
+    )
+    eyes = np.array([camera.origin for camera in scene.cameras["test"]])
+    # Without the veil only the ball is left, and the box closes around it.
+    assert np.abs(bake(both, 32, eyes=eyes).bounds).max() < 1.0
+    assert np.abs(bake(both, 32).bounds).max() > 2.0
 
 
 def covariances_of(field: SplatField) -> np.ndarray:

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from cagefield.training.voxel import TrainResult
     from cagefield.training.voxel_config import VoxelConfig
 
-FieldKind = Literal["voxel", "nerf"]
-AnyKind = Literal["auto", "splat", "voxel", "nerf"]
+FieldKind = Literal["auto", "splat", "voxel", "nerf"]
 Preset = Literal["auto", "paper", "small"]
 Ndc = Literal["auto", "on", "off"]
 
@@ -51,7 +50,7 @@ class Train:
     photos: Photos
     out: Output
     """Scene folder."""
-    field: AnyKind = "auto"
+    field: FieldKind = "auto"
     """splat are 3D Gaussians, made for captures of real places; voxel is a grid, made for things on a plain
     background; auto takes splats where a capture is unbounded, else voxels. nerf is the original NeRF, needs
     PyTorch, and is baked into voxels at the end."""
@@ -117,11 +116,11 @@ class Train:
         if self.field != "splat" and (self.field != "auto" or self.training.sh_degree != 3):
             self.training.config()
 
-    def _kind(self, dataset: Dataset) -> AnyKind:
+    def _kind(self, dataset: Dataset) -> FieldKind:
         """What is trained; where that was left open, a line on stderr says so."""
         if self.field != "auto":
             return self.field
-        kind: AnyKind = "splat" if dataset.unbounded else "voxel"
+        kind: FieldKind = "splat" if dataset.unbounded else "voxel"
         if kind == "voxel" and self.splats is not None:
             raise CagefieldError("--splats is for splats, these photos get voxels; give --field splat too")
         if kind == "voxel":

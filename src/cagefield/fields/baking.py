@@ -12,8 +12,9 @@ w_k is 1 for directions that meet the front of the density's surface (against it
 those that meet its back, which no camera sees.
 
 Splats are finer than voxels: each is widened first, by a Gaussian of `FILTER` voxel edges where it is, and
-becomes less opaque in proportion to the area that it then covers. Their density is the mean one over
-directions (`SplatField.grid_sigma`).
+becomes less opaque in proportion to the area that it then covers. One that a camera stands in is left out:
+a picture of splats shows it where its mean is, one of voxels as a veil all over. Their density is the mean
+one over directions (`SplatField.grid_sigma`).
 """
 
 from __future__ import annotations
@@ -92,6 +93,8 @@ def bake(
     report = on_progress or (lambda done: None)
 
     places = None if eyes is None else np.asarray(eyes, np.float64).reshape(-1, 3)
+    if isinstance(field, SplatField) and places is not None:
+        field = field.take(~surrounding(field, places))
     density = _Density(field, None if places is None else places.mean(axis=0))
     if contracted:
         grid = _Grid.contracting(box, resolution)
@@ -267,6 +270,18 @@ class _Density:
                 toward = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
             sigma[rows] = self.field(part, toward)[0] if self.signed is None else self.signed(part, toward)
         return sigma
+
+
+def surrounding(field: SplatField, eyes: Array) -> NDArray[np.bool_]:
+    """True [N] for splats that have one of the eyes [E,3] within 2 standard deviations."""
+    axes = (
+        rotation_matrices(field.quaternions.astype(np.float64))
+        / np.exp(field.log_scales.astype(np.float64))[:, None]
+    )
+    found = np.zeros(len(field), bool)
+    for eye in eyes:
+        found |= (np.einsum("nij,ni->nj", axes, eye - field.means) ** 2).sum(axis=1) < 4.0
+    return found
 
 
 def widened(field: SplatField, widths: Array) -> SplatField:
