@@ -40,6 +40,9 @@ OUTSIDE = 0.3
 NEAR = 0.04
 """Depth at which drawing starts, in half-diagonals of the box of interest."""
 
+EVERYWHERE: Float32 = np.zeros((1, 1), np.float32)
+"""Distances up to which nothing is known to be empty."""
+
 COLOUR, DEPTH, NORMALS = 4, 5, 8
 """Channels of a picture: T and colour; depth as well; normals as well."""
 
@@ -94,18 +97,27 @@ class Projection:
         return untiled(self.blend(channels)[0], self.width, self.height)
 
     def gradients(
-        self, colour: Float32, slopes: Float32, stops: NDArray[np.int64], sums: Float32 | None = None
+        self,
+        colour: Float32,
+        slopes: Float32,
+        stops: NDArray[np.int64],
+        sums: Float32 | None = None,
+        empty: Float32 = EVERYWHERE,
+        veil: float = 0.0,
     ) -> Float32:
         """Sums [pairs, SUMS] (see `splat_blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
         `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
+        `empty` [h,w] are distances along the picture's rays, at its size or smaller, up to which there is
+        nothing, 0 where nobody knows: each alpha before them adds `veil` to the loss.
         """
         if sums is None or len(sums) < self.pairs:
             sums = np.empty((self.pairs, splat_blending.SUMS), np.float32)
         with kernels():
             splat_blending.gradients(
-                self.packed, self.ids, self.starts, stops, self.width, self.height, colour, slopes, sums
-            )
+                self.packed, self.ids, self.starts, stops, self.width, self.height, colour, slopes, empty,
+                np.float32(veil), sums,
+            )  # fmt: skip
         return sums
 
     def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:

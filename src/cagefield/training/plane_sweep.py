@@ -2,12 +2,14 @@
 
 Each photo gets an inverse depth for every pixel by plane sweeping against a few neighbours; those stay that
 are clearly better than any other depth and that two other photos' own depths agree with. The agreeing
-points are thinned until about as many are left as wanted, evenly as the cameras see them.
+points are thinned until about as many are left as wanted, evenly as the cameras see them. What lies between
+them and their photo is empty.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,23 +44,43 @@ AGREEMENT = 1.0
 AGREEING = 2
 """Other photos that must agree."""
 
+CLEAR = 0.9
+"""Share of a distance that is empty."""
 
-def surface_points(
+CAUTION = 1.0
+"""Steps of inverse depth by which what is empty ends sooner."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What photos agree on.
+
+    positions [M,3] and rgb [M,3] of points on surfaces; `empty` [V,H,W]: distances along the rays of each
+    photo's pixels up to which there is nothing, 0 where nobody knows.
+    """
+
+    positions: Array
+    rgb: NDArray[np.uint8]
+    empty: NDArray[np.float32]
+
+
+def find_surfaces(
     images: Sequence[NDArray[np.uint8]],
     cameras: Sequence[Camera],
     nearest: Sequence[float],
     middle: Sequence[float],
     wanted: int,
     seed: int = 0,
-) -> tuple[Array, NDArray[np.uint8]]:
-    """(positions [M,3], rgb [M,3]) of about `wanted` points that photos of one size agree on, or fewer.
+) -> Surfaces:
+    """What photos of one size agree on, with about `wanted` points, or fewer.
 
     images [H,W,3] with their cameras; `nearest` and `middle` are each camera's least and usual depth of what
     it shows, in world units.
     """
     chosen = neighbours_of(cameras, middle)
     if (chosen < 0).all():
-        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
+        none = np.zeros((len(images), *images[0].shape[:2]), np.float32)
+        return Surfaces(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), none)
     from cagefield.training.kernels.plane_sweep import sweep
 
     grey = np.stack([image[..., :3].mean(axis=2).astype(np.float32) / 255.0 for image in images])
@@ -93,6 +115,7 @@ def surface_points(
     sure[:, :border] = sure[:, -border:] = False
     sure[:, :, :border] = sure[:, :, -border:] = False
     positions, colours, footprints = [], [], []
+    empty = np.zeros((views, height * width), np.float32)
     for r in range(views):
         at = np.flatnonzero(sure[r])
         local = np.concatenate([directions[r].reshape(-1, 2)[at], np.ones((len(at), 1))], axis=1)
@@ -105,13 +128,15 @@ def surface_points(
         positions.append(points[kept])
         colours.append(images[r].reshape(-1, images[r].shape[-1])[at[kept], :3])
         footprints.append(depth[kept] / cameras[r].fx)
+        distance = np.linalg.norm(local[kept], axis=1) / (w[r].ravel()[at[kept]] + CAUTION * step[r])
+        empty[r, at[kept]] = CLEAR * distance
     everything, rgb, footprint = (
         np.concatenate(positions),
         np.concatenate(colours),
         np.concatenate(footprints),
     )
     rows = _thinned(everything, footprint, wanted, seed)
-    return everything[rows], rgb[rows]
+    return Surfaces(everything[rows], rgb[rows], empty.reshape(views, height, width))
 
 
 def neighbours_of(cameras: Sequence[Camera], middle: Sequence[float]) -> NDArray[np.int64]:

@@ -25,6 +25,8 @@ class SplatConfig:
         cap: largest step of log scales and turns, and of means in sigmas.
         memory: decay of the running gradients and curvatures.
         opaque: pull on each opacity's logit towards 1, as a gradient: surfaces in place of fog.
+        veil: what each alpha of a splat costs in space that is known to be empty, beside a squared error
+            of colours in [0,1].
         prune: splats whose opacity falls below this are taken out.
     """
 
@@ -41,6 +43,7 @@ class SplatConfig:
     cap: float = 0.15
     memory: tuple[float, float] = (0.5, 0.98)
     opaque: float = 0.002
+    veil: float = 0.02
     prune: float = 0.01
 
     def __post_init__(self) -> None:

@@ -68,7 +68,7 @@ class SplatRun:
         self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
         self._most = self._most_splats()
-        self.state = first_splats(dataset, self.views, config, self._most)
+        self.state, self._empty = first_splats(dataset, self.views, config, self._most)
         self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
@@ -132,7 +132,7 @@ class SplatRun:
         with kernels():
             residuals(out, target, seen.width, seen.height, gain, background, colour, slopes, tile_sums)
             sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
-            seen.gradients(colour, slopes, stops, sums)
+            seen.gradients(colour, slopes, stops, sums, self._empty[index], config.veil)
             chain(
                 seen.order, seen.firsts, seen.slots, sums, seen.packed, state.means, state.log_scales,
                 state.quaternions, opacities, state.sh, world_to_camera(camera), camera.origin, lens.focal,

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
 from cagefield.datasets.points import random_points
-from cagefield.datasets.views import Dataset
+from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.rendering.splat_rasterizer import untiled
-from cagefield.training.plane_sweep import surface_points
+from cagefield.training.plane_sweep import CLEAR, find_surfaces
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import TrainingView
@@ -40,8 +40,10 @@ SWEPT_SIDE = 150
 
 def first_splats(
     dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, most: int
-) -> SplatState:
-    """The splats that a training begins with, at most `most`.
+) -> tuple[SplatState, list[NDArray[np.float32]]]:
+    """The splats that a training begins with, at most `most`; what the photos know to be empty.
+
+    The latter [H,W] by photo: distances along its pixels' rays, 0 where nobody knows.
 
     At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
     capture, on a sphere far away. Where the data set has no points they are random ones.
@@ -49,7 +51,8 @@ def first_splats(
     points = dataset.points or random_points(dataset, min(most // 4, RANDOM), config.seed)
     positions, rgb = points.positions, points.rgb
     wanted = int(SURFACE_SHARE * most)
-    swept, colours = swept_points(views, positions, wanted, config.seed)
+    swept, colours, empty = swept_points(views, positions, wanted, config.seed)
+    _add_sightings(empty, views, dataset.points)
     if dataset.points is None and len(swept) > len(positions):
         # Random ones have done what they are for: to say how deep the photos may be.
         positions, rgb = swept, colours
@@ -74,7 +77,7 @@ def first_splats(
     )
     if far is not None:
         state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
-    return state
+    return state, empty
 
 
 def neighbour_distance(positions: Array) -> Array:
@@ -165,22 +168,50 @@ def in_front_of(camera: Camera, positions: NDArray[Any], depth: float) -> NDArra
 
 def swept_points(
     views: Sequence[TrainingView], positions: Array, wanted: int, seed: int
-) -> tuple[Array, NDArray[np.uint8]]:
-    """Surface points (positions, rgb) by plane sweeping the photos, their depths guided by sparse points."""
+) -> tuple[Array, NDArray[np.uint8], list[NDArray[np.float32]]]:
+    """Surface points (positions, rgb) by plane sweeping the photos, their depths guided by sparse points.
+
+    And, by photo, the distances [H,W] up to which there is nothing.
+    """
     sides = [max(camera.width, camera.height) for camera in views[0].cameras]
     level = max([level for level, side in enumerate(sides) if side >= SWEPT_SIDE], default=0)
     cameras = [view.level(level)[0] for view in views]
+    empty = [np.zeros((camera.height, camera.width), np.float32) for camera in cameras]
     depths = depths_seen(cameras, positions)
     usable = [n for n, depth in enumerate(depths) if depth is not None]
     size = (cameras[0].width, cameras[0].height)
     usable = [n for n in usable if (cameras[n].width, cameras[n].height) == size]
     images = [_over_white(untiled(views[n].level(level)[1], *size)) for n in usable]
     if len(usable) < 3 or wanted < 1:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8)
+        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8), empty
     known = [depth for n in usable if (depth := depths[n]) is not None]
-    return surface_points(
+    found = find_surfaces(
         images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], wanted, seed
     )
+    for n, one in zip(usable, found.empty, strict=True):
+        empty[n] = one
+    return found.positions, found.rgb, empty
+
+
+def _add_sightings(
+    empty: Sequence[NDArray[np.float32]], views: Sequence[TrainingView], points: SparsePoints | None
+) -> None:
+    """Writes what sparse points that a photo is known to see say about empty space into its distances."""
+    if points is None or not points.seen_by:
+        return
+    for view, distances in zip(views, empty, strict=True):
+        camera = view.cameras[0]
+        rows = np.flatnonzero([view.name in names for names in points.seen_by])
+        pixels, depth = camera.project(points.positions[rows])
+        with np.errstate(invalid="ignore"):
+            inside = (
+                (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
+            )
+        height, width = distances.shape
+        at = (pixels[inside] * (width / camera.width, height / camera.height)).astype(np.int64)
+        known = CLEAR * np.linalg.norm(points.positions[rows[inside]] - camera.origin, axis=1)
+        before = distances[at[:, 1], at[:, 0]]
+        distances[at[:, 1], at[:, 0]] = np.where(before > 0, np.minimum(before, known), known)
 
 
 def _over_white(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
