@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras import Camera
-from cagefield.training.plane_sweep import neighbours_of, surface_points
+from cagefield.training.plane_sweep import CLEAR, Surfaces, find_surfaces, neighbours_of
 
 DISTANCE, NEAR = 4.0, 2.2
 LENSES = {
@@ -56,7 +56,12 @@ def photo(camera: Camera, step: float = 0.0, plain: bool = False) -> np.ndarray:
 
 def found(views: list[Camera], images: list[np.ndarray], wanted: int = 100_000, **rest):
     """The points of photos whose depths are known roughly."""
-    return surface_points(images, views, [NEAR] * len(views), [DISTANCE] * len(views), wanted, **rest)
+    surfaces = surfaces_of(views, images, wanted, **rest)
+    return surfaces.positions, surfaces.rgb
+
+
+def surfaces_of(views: list[Camera], images: list[np.ndarray], wanted: int = 100_000, **rest) -> Surfaces:
+    return find_surfaces(images, views, [NEAR] * len(views), [DISTANCE] * len(views), wanted, **rest)
 
 
 @pytest.mark.parametrize("lens", LENSES)
@@ -85,8 +90,22 @@ def test_a_step_is_found_with_its_two_depths():
 
 def test_photos_without_texture_give_no_points():
     views = cameras()
-    points, rgb = found(views, [photo(camera, plain=True) for camera in views])
-    assert points.shape == (0, 3) and rgb.shape == (0, 3)
+    surfaces = surfaces_of(views, [photo(camera, plain=True) for camera in views])
+    assert surfaces.positions.shape == (0, 3) and surfaces.rgb.shape == (0, 3)
+    assert surfaces.empty.shape == (len(views), 56, 72) and not surfaces.empty.any()
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_rays_are_empty_until_shortly_before_what_photos_agree_on(lens):
+    views = cameras(lens)
+    surfaces = surfaces_of(views, [photo(camera) for camera in views])
+    for camera, empty in zip(views, surfaces.empty, strict=True):
+        origins, toward = (values.astype(np.float64) for values in camera.rays())
+        true = -origins[:, 2] / toward[:, 2] / np.linalg.norm(toward, axis=1)
+        share = empty.ravel()[empty.ravel() > 0] / true[empty.ravel() > 0]
+        assert len(share) > 0.3 * len(true)
+        # A step of inverse depth, by which it ends sooner, is 0.04 of this depth.
+        assert np.quantile(share, 0.98) < 1.0 and 0.85 < np.median(share) < CLEAR
 
 
 def test_photos_of_different_things_give_next_to_no_points():

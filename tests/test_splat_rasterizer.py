@@ -245,6 +245,24 @@ def test_values_that_are_extreme_but_finite_leave_no_nan() -> None:
             assert np.isfinite(before).all()
 
 
+def test_alpha_in_empty_space_costs_what_it_is() -> None:
+    view = camera()
+    values = {name: value[:1] for name, value in parameters(4).items()}
+    values["means"] = np.zeros((1, 3))
+    values["log_scales"] = np.log(0.4) + np.zeros((1, 3))
+    splats = single(splats_of(values))
+    seen = project(splats, view, near=NEAR)
+    tiles, stops = seen.blend(DEPTH)
+    picture = untiled(tiles, view.width, view.height)
+    alpha, through = 1.0 - picture[..., 0], np.linalg.norm(view.origin)
+    # The right half of the picture is known to be empty to beyond the splat, the left to before it.
+    halves = np.array([[0.8 * through, 1.2 * through]], np.float32)
+    none = np.zeros((seen.tiles, 3, 256), np.float32)
+    sums = seen.gradients(none, none, stops, None, halves, 0.3)[: seen.pairs]
+    assert sums[:, 0].sum() == pytest.approx(0.3 * alpha[:, (view.width + 1) // 2 :].sum(), rel=1e-4)
+    assert not np.abs(seen.gradients(none, none, stops)[: seen.pairs, :6]).any()
+
+
 def test_splats_whose_variance_is_not_finite_are_not_drawn() -> None:
     view = camera()
     splats = single(splats_of(parameters(20)))

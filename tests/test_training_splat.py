@@ -148,22 +148,21 @@ def test_a_damaged_or_foreign_checkpoint_is_refused(capture, tmp_path):
 
 
 def test_the_world_s_units_and_axes_do_not_matter(capture):
-    # As many splats as there are surface points: these are thinned on a grid of the world's axes.
+    # As many splats as there are surface points, which are thinned.
     config = replace(CONFIG, steps=120, splats=40_000)
     begun = SplatRun(capture, config)
     expected = train_splat(capture, config)
     a, b = 0.7, -1.1
     turned = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     turned = turned @ np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
-    # Round splats begin with axes of the world's, so that a turned world's splats take other shapes.
-    for scale, turn, tolerance in ((100.0, np.eye(3), 0.2), (0.01, np.eye(3), 0.2), (100.0, turned, 0.6)):
+    for scale, turn in ((100.0, np.eye(3)), (0.01, np.eye(3)), (100.0, turned)):
         rigid = np.eye(4)
         rigid[:3, :3], rigid[:3, 3] = turn, scale * np.array([0.3, -0.2, 0.5])
         moved = Similarity(rigid, scale)
         dataset = moved.dataset(capture, moved.points(BOX.mean(axis=0)[None]) + scale * BOX)
         assert len(SplatRun(dataset, config).state) == pytest.approx(len(begun.state), rel=0.01)
         result = train_splat(dataset, config)
-        assert result.test_psnr == pytest.approx(expected.test_psnr, abs=tolerance)
+        assert result.test_psnr == pytest.approx(expected.test_psnr, abs=0.2)
         assert result.test_psnr > 20
 
 
@@ -270,11 +269,50 @@ def test_all_of_a_splat_goes_with_its_row():
 def test_without_points_surfaces_are_found_from_random_ones(capture):
     config = SplatConfig(splats=600)
     dataset = replace(capture, points=None)
-    state = first_splats(dataset, load_views(dataset.train), config, 600)
+    state, _ = first_splats(dataset, load_views(dataset.train), config, 600)
     assert 100 < len(state) <= 600
     # The ball has radius 0.5; random points fill the box.
     radius = np.linalg.norm(state.means, axis=1)
     assert abs(np.median(radius) - 0.5) < 0.08 and np.ptp(np.quantile(radius, (0.2, 0.8))) < 0.2
+
+
+def test_no_fog_stays_where_space_is_known_to_be_empty(capture):
+    """Splats stand between the ball and its cameras; the middle of each photo knows where it begins."""
+    chance = np.random.default_rng(0)
+    places = chance.normal(size=(150, 3))
+    places *= chance.uniform(0.8, 1.3, (150, 1)) / np.linalg.norm(places, axis=1, keepdims=True)
+    points = SparsePoints(
+        np.concatenate([capture.points.positions, places]),
+        np.concatenate([capture.points.rgb, np.full((150, 3), 128, np.uint8)]),
+    )
+    dataset, fog = replace(capture, points=points), []
+    for veil in (0.0, 0.1):
+        run = SplatRun(dataset, SplatConfig(steps=200, splats=800, sh_degree=1, veil=veil))
+        for view, empty in zip(run.views, run._empty, strict=True):
+            empty[20:-20, 20:-20] = np.linalg.norm(view.cameras[0].origin) - 0.6
+        while run.done < 1.0:
+            run.advance()
+        renderer, before = SplatRenderer(run.field()), []
+        for view in capture.test:
+            middle = np.mgrid[-6:7, -6:7].reshape(2, -1).T + view.camera.width / 2
+            distance = np.full(len(middle), np.linalg.norm(view.camera.origin) - 0.7)
+            before.append(renderer.opacity_before(view.camera, middle, distance))
+        fog.append(float(np.mean(np.concatenate(before) > 0.1)))
+    assert fog[1] < 0.02 < 0.5 < fog[0]
+
+
+def test_what_points_say_of_empty_space_is_known_in_the_photos_that_see_them(capture):
+    one = np.array([[0.0, 0.1, 0.3]])
+    names = [frozenset({capture.train[0].name})]
+    few = replace(
+        capture, train=capture.train[:2], points=SparsePoints(one, np.zeros((1, 3), np.uint8), names)
+    )
+    _, (here, elsewhere) = first_splats(few, load_views(few.train), CONFIG, 600)
+    camera = few.train[0].camera
+    (x, y), distance = camera.project(one)[0][0], np.linalg.norm(one - camera.origin)
+    row, column = int(y * here.shape[0] / camera.height), int(x * here.shape[1] / camera.width)
+    assert np.count_nonzero(here) == 1 and not elsewhere.any()
+    assert 0.9 * distance < here[row, column] < distance
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -292,8 +330,8 @@ def test_points_that_are_all_the_same_do_no_harm(capture):
     assert len(run.state) == 1
     twice = SparsePoints(np.tile(capture.points.positions, (2, 1)), np.tile(capture.points.rgb, (2, 1)))
     # Two photos: no points are added by sweeping.
-    once = first_splats(replace(few, points=capture.points), load_views(few.train), CONFIG, 600)
-    again = first_splats(replace(few, points=twice), load_views(few.train), CONFIG, 600)
+    once, _ = first_splats(replace(few, points=capture.points), load_views(few.train), CONFIG, 600)
+    again, _ = first_splats(replace(few, points=twice), load_views(few.train), CONFIG, 600)
     assert len(once) == len(capture.points)
     np.testing.assert_array_equal(again.means, once.means)
     np.testing.assert_array_equal(again.log_scales, once.log_scales)
@@ -306,9 +344,10 @@ def test_photos_of_another_size_and_distance_do_not_mislead_the_sweep(ball, capt
     alike = capture.train[:14]
     mixed = (alike[0], others[0], *alike[1:8], others[1], *alike[8:])
     positions = capture.points.positions
-    expected, colours = swept_points(load_views(alike), positions, 300, 0)
+    expected, colours, _ = swept_points(load_views(alike), positions, 300, 0)
     assert len(expected) > 50 and abs(np.median(np.linalg.norm(expected, axis=1)) - 0.5) < 0.08
-    got, rgb = swept_points(load_views(mixed), positions, 300, 0)
+    got, rgb, empty = swept_points(load_views(mixed), positions, 300, 0)
+    assert [bool(one.any()) for one in empty] == [n not in (1, 9) for n in range(len(mixed))]
     np.testing.assert_array_equal(got, expected)
     np.testing.assert_array_equal(rgb, colours)
     ran(replace(capture, train=mixed), 20)
@@ -336,7 +375,7 @@ def test_levels_are_box_filtered_with_alpha_as_weight(tmp_path):
 def test_an_unbounded_capture_begins_with_at_most_as_many_splats_as_it_may_have(capture):
     dataset = replace(capture, unbounded=True)
     for most in (100, 250):
-        state = first_splats(dataset, load_views(dataset.train), SplatConfig(splats=most), most)
+        state, _ = first_splats(dataset, load_views(dataset.train), SplatConfig(splats=most), most)
         far = np.linalg.norm(state.means, axis=1) > 10
         assert len(state) <= most and far.any() and not far.all()
     ran(dataset, 5)

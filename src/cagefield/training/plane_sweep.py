@@ -44,7 +44,7 @@ AGREEMENT = 1.0
 AGREEING = 2
 """Other photos that must agree."""
 
-CLEAR = 0.9
+CLEAR = 0.95
 """Share of a distance that is empty."""
 
 CAUTION = 1.0
@@ -135,7 +135,9 @@ def find_surfaces(
         np.concatenate(colours),
         np.concatenate(footprints),
     )
-    rows = _thinned(everything, footprint, wanted, seed)
+    # In units and axes of the cameras: those of the world are of no meaning.
+    unit = float(np.median(footprint)) if len(footprint) else 1.0
+    rows = _thinned((everything - origins[0]) @ rotations[0].T / unit, footprint / unit, wanted, seed)
     return Surfaces(everything[rows], rgb[rows], empty.reshape(views, height, width))
 
 

@@ -37,13 +37,13 @@ class SplatConfig:
     seed: int = 0
     antialiased: bool = True
     exposure: bool | None = None
-    background: float = 0.2
-    rate: tuple[float, float] = (1.2, 0.025)
+    background: float = 0.05
+    rate: tuple[float, float] = (1.8, 0.1)
     damping: tuple[float, float] = (0.1, 0.01)
     cap: float = 0.15
     memory: tuple[float, float] = (0.5, 0.98)
-    opaque: float = 0.002
-    veil: float = 0.02
+    opaque: float = 0.003
+    veil: float = 0.1
     prune: float = 0.01
 
     def __post_init__(self) -> None:

@@ -1,7 +1,8 @@
 """The splats that a training begins with: round ones at sparse points and on surfaces, and a far background.
 
-Their size is the root mean square distance to the three nearest neighbours; background splats lie on a sphere
-far around the cameras and have the colour that the photos show in their direction.
+Where axes are chosen they are the first camera's: a turned world gets the same splats, turned. Sizes are the
+root mean square distance to the three nearest neighbours; background splats lie on a sphere far around the
+cameras and have the colour that the photos show in their direction. And what the photos know of empty space.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 FAR = 10.0
 """Radius of the background's sphere, in median distances of the cameras from the centre of interest."""
 
-FIRST_OPACITY = 0.3
+FIRST_OPACITY = 0.5
 
 SURFACE_SHARE = 0.5
 """Surface points that a training begins with, in shares of the most splats that it may have."""
@@ -48,6 +49,8 @@ def first_splats(
     At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
     capture, on a sphere far away. Where the data set has no points they are random ones.
     """
+    from scipy.spatial.transform import Rotation
+
     points = dataset.points or random_points(dataset, min(most // 4, RANDOM), config.seed)
     positions, rgb = points.positions, points.rgb
     wanted = int(SURFACE_SHARE * most)
@@ -58,7 +61,9 @@ def first_splats(
         positions, rgb = swept, colours
     else:
         positions, rgb = np.concatenate([positions, swept]), np.concatenate([rgb, colours])
-    positions, first = np.unique(positions.astype(np.float32), axis=0, return_index=True)
+    positions = positions.astype(np.float32)
+    first = np.sort(np.unique(positions, axis=0, return_index=True)[1])
+    positions = positions[first]
     far = None
     if dataset.unbounded and config.background > 0.0:
         unit = camera_scale([view.cameras[0] for view in views], dataset.bounds)
@@ -77,6 +82,8 @@ def first_splats(
     )
     if far is not None:
         state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
+    axes = Rotation.from_matrix(views[0].cameras[0].c2w[:3, :3])
+    state.quaternions[:] = np.roll(axes.as_quat(), 1)
     return state, empty
 
 
@@ -130,9 +137,10 @@ def background_seeds(
 ) -> tuple[Array, Array, NDArray[np.float32]]:
     """(positions, sigmas, rgb) of splats on the sphere of FAR distances, those that some photo shows."""
     # Photos show a part of the sphere: enough directions that about `count` are left.
-    trial = sphere(2000)
+    axes = views[0].cameras[0].c2w[:3, :3]
+    trial = sphere(2000) @ axes.T
     share = max(0.02, float((seen_colours(views, centre + FAR * distance * trial)[1] > 0).mean()))
-    directions = sphere(max(8, int(count / share)))
+    directions = sphere(max(8, int(count / share))) @ axes.T
     positions = centre + FAR * distance * directions
     rgb, seen = seen_colours(views, positions)
     sigma = 0.5 * FAR * distance * np.sqrt(4.0 * np.pi / len(directions))
