@@ -120,6 +120,8 @@ def test_what_is_refused(
     for data, argv, message in (
         (photos, ("--splats", 500), "--splats is for splats, these photos get voxels"),
         (photos, ("--splats", 500, "--field", "voxel"), "--splats is for splats; give --field splat too"),
+        (photos, ("--refine-poses",), "--refine-poses is for splats, these photos get voxels"),
+        (capture, ("--refine-poses", "--field", "voxel"), "--refine-poses is for splats; give --field splat"),
         (photos, ("--splats", 5, "--field", "splat"), "splats is 5; it must be from 100"),
         (capture, ("--sh-degree", 4), "sh_degree is 4; it must be from 0 to 3"),
         (photos, ("--sh-degree", 3), "sh_degree is 3; it must be from 0 to 2"),

@@ -109,9 +109,12 @@ class Scene:
         """
         white = (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0)
         splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
+        cameras = {split: tuple(view.camera for view in views) for split, views in splits.items() if views}
+        # Poses may have been refined.
+        cameras["train"] = getattr(result, "cameras", cameras["train"])
         return cls(
             result.field,
-            cameras={split: tuple(view.camera for view in views) for split, views in splits.items() if views},
+            cameras=cameras,
             background=background_rgb(getattr(result, "background", white)),
             gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
         )

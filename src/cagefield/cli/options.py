@@ -76,7 +76,7 @@ class TrainingOptions:
             seed=self.seed,
         )
 
-    def splat_config(self, splats: int | None = None) -> SplatConfig:
+    def splat_config(self, splats: int | None = None, refine_poses: bool = False) -> SplatConfig:
         """The configuration of the splats' trainer; at most so many `splats`, None for its own choice."""
         from cagefield.training.splat_config import SplatConfig
 
@@ -84,6 +84,7 @@ class TrainingOptions:
             steps=SplatConfig.steps if self.steps is None else self.steps,
             minutes=self.minutes if self.steps is None else None,
             splats=splats,
+            refine_poses=refine_poses,
             sh_degree=SplatConfig.sh_degree if self.sh_degree is None else self.sh_degree,
             seed=self.seed,
         )

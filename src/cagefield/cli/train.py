@@ -56,6 +56,8 @@ class Train:
     PyTorch, and is baked into voxels at the end."""
     splats: int | None = None
     """Most splats at the end; left out, as many as the photos and the time allow."""
+    refine_poses: Flag = False
+    """Also move the photos' cameras to where the splats agree best with them; for poses that are rough."""
     preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
     ndc: Ndc = "auto"
@@ -74,8 +76,9 @@ class Train:
 
         if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
             raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
-        if self.splats is not None and self.field not in ("splat", "auto"):
-            raise CagefieldError("--splats is for splats; give --field splat too")
+        for option, given in (("--splats", self.splats is not None), ("--refine-poses", self.refine_poses)):
+            if given and self.field not in ("splat", "auto"):
+                raise CagefieldError(f"{option} is for splats; give --field splat too")
         target = check_destination(self.out, self.overwrite or self.resume)
         checkpoint = target.with_name(target.name + ".training")
         if checkpoint.exists() and not (self.resume or self.overwrite):
@@ -92,7 +95,7 @@ class Train:
         if kind == "nerf":
             scene, figures, finished = self._train_nerf(dataset, checkpoint)
         elif kind == "splat":
-            options = self.training.splat_config(self.splats)
+            options = self.training.splat_config(self.splats, self.refine_poses)
             scene, splats = train_splats(dataset, options, checkpoint, resume=self.resume)
             figures, finished = summary(splats), splats.finished
         else:
@@ -111,7 +114,7 @@ class Train:
     def _check_options(self) -> None:
         """Refuses, before photos are looked at, options that no trainer in question takes."""
         if self.field in ("auto", "splat"):
-            self.training.splat_config(self.splats)
+            self.training.splat_config(self.splats, self.refine_poses)
         # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.
         if self.field != "splat" and (self.field != "auto" or self.training.sh_degree != 3):
             self.training.config()
@@ -121,8 +124,9 @@ class Train:
         if self.field != "auto":
             return self.field
         kind: FieldKind = "splat" if dataset.unbounded else "voxel"
-        if kind == "voxel" and self.splats is not None:
-            raise CagefieldError("--splats is for splats, these photos get voxels; give --field splat too")
+        if kind == "voxel" and (self.splats is not None or self.refine_poses):
+            option = "--refine-poses" if self.refine_poses else "--splats"
+            raise CagefieldError(f"{option} is for splats, these photos get voxels; give --field splat too")
         if kind == "voxel":
             self.training.config()
         what = (
@@ -268,7 +272,7 @@ def train_splats(
             checkpoint=checkpoint,
             resume=resume,
             on_progress=on_progress,
-            on_points=lambda done, note: stages.move("Finding points", done, note),
+            on_stage=stages.move,
         )
     return Scene.trained(result, dataset), result
 

@@ -14,11 +14,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.cameras import Camera
 from cagefield.datasets.points import points_cache, points_of
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat import SplatField
@@ -29,7 +31,10 @@ from cagefield.training.splat_config import SplatConfig
 
 @dataclass(frozen=True, eq=False)
 class SplatTrainResult:
-    """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none."""
+    """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none.
+
+    `cameras` are those of the training photos, in their order: not the data set's where poses were refined.
+    """
 
     field: SplatField
     steps: int
@@ -38,6 +43,7 @@ class SplatTrainResult:
     test_psnr: float
     test_ssim: float
     gains: NDArray[np.float32]
+    cameras: tuple[Camera, ...]
     finished: bool
 
 
@@ -48,17 +54,16 @@ def train_splat(
     checkpoint: Path | str | None = None,
     resume: bool = False,
     on_progress: Callable[[object], None] | None = None,
-    on_points: Callable[[float, str], None] | None = None,
+    on_stage: Callable[[str, float, str], None] | None = None,
     evaluate: bool = True,
 ) -> SplatTrainResult:
     """The splats trained on the data set's photos, with PSNR and SSIM on its test views.
 
-    A capture without points gets them from its poses first (`points_of`; `on_points` is told how far that
-    is),
-    and keeps them in the user's cache. With `checkpoint`, the state of the run is written there every
-    minute and
-    at its end, which may be early (Ctrl-C; `finished` is then False); `resume` goes on from it. On a CPU a
-    resumed run of given `steps` ends in the same field as an uninterrupted one.
+    A capture without points gets them from its poses first (`points_of`), and keeps them in the user's cache;
+    then the photos' surfaces are found. `on_stage` is told what is being found, how far that is, and a note.
+    With `checkpoint`, the state of the run is written there every minute and at its end, which may be early
+    (Ctrl-C; `finished` is then False); `resume` goes on from it. On a CPU a resumed run of given `steps` ends
+    in the same field as an uninterrupted one.
 
     Raises:
         DatasetError: no photos, or photos that cannot be read.
@@ -67,18 +72,26 @@ def train_splat(
     from cagefield.training.splat_run import SplatRun
 
     config = config or SplatConfig()
+    report = on_stage or (lambda stage, done, note: None)
     points = None
     if dataset.unbounded or dataset.points is not None:
-        points = points_of(dataset, points_cache(), on_progress=on_points, seed=config.seed)
+        points = points_of(
+            dataset, points_cache(), on_progress=partial(report, "Finding points"), seed=config.seed
+        )
+    report("Finding surfaces", 0.0, "")
     run = SplatRun(dataclasses.replace(dataset, points=points), config)
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field):
-        some = dataset.train[:: max(1, len(dataset.train) // 10)]
-        train_psnr, _ = evaluate_views(field, some)
+        moved = [
+            dataclasses.replace(view, camera=camera)
+            for view, camera in zip(dataset.train, run.cameras(), strict=True)
+        ]
+        some = moved[:: max(1, len(moved) // 10)]
+        train_psnr, _ = evaluate_views(field, tuple(some))
         if dataset.test:
             test_psnr, test_ssim = evaluate_views(field, dataset.test)
     return SplatTrainResult(
-        field, run.step, run.seconds, train_psnr, test_psnr, test_ssim, run.gains, finished
+        field, run.step, run.seconds, train_psnr, test_psnr, test_ssim, run.gains, run.cameras(), finished
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import DeformedSplats
@@ -29,6 +30,7 @@ from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.splat_step import gauss_newton, residuals
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, split
+from cagefield.training.splat_poses import FROM, PoseRefinement
 from cagefield.training.splat_seeds import camera_scale, depths_seen, first_splats, in_front_of
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
@@ -74,6 +76,7 @@ class SplatRun:
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fitted = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
+        self.poses = PoseRefinement(len(self.views), self._scale)
         self._buffers = Buffers()
         self._queue: list[int] = []
         self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
@@ -103,6 +106,7 @@ class SplatRun:
         if self.step % CARVE_EVERY == CARVE_EVERY - 1 and done < 0.95:
             self._carve()
         if not self._queue:
+            self.poses.centre()
             self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
         self._photo(self._queue.pop(), done)
         self.step += 1
@@ -113,6 +117,7 @@ class SplatRun:
         config, state = self._config, self.state
         level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
         camera, target = self.views[index].level(level)
+        camera = self.poses.camera(index, camera)
         count = len(state)
         covariances = self._buffers.take("covariances", (count, 6), np.float32)
         opacities = self._buffers.take("opacities", (count,), np.float32)
@@ -139,6 +144,8 @@ class SplatRun:
                 lens.limits, lens.model, lens.coefficients, config.antialiased, False,
                 state.gradients, state.curvatures,
             )  # fmt: skip
+            if config.refine_poses and done >= FROM:
+                self.poses.step(index, camera.origin, state, seen.order, min(rate, 1.0))
             gauss_newton(
                 seen.order, state.gradients, state.curvatures, state.means, state.log_scales,
                 state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
@@ -192,6 +199,10 @@ class SplatRun:
         state.error[:] = 0.0
         state.hits[:] = 0
 
+    def cameras(self) -> tuple[Camera, ...]:
+        """The photos' cameras where they are now."""
+        return tuple(self.poses.camera(n, view.cameras[0]) for n, view in enumerate(self.views))
+
     def field(self) -> SplatField:
         """The field as it is now."""
         return self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
@@ -222,7 +233,9 @@ class SplatRun:
             "random": self._rng.bit_generator.state,
         }
         arrays = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
-        write_checkpoint(path, self._signature(), scalars, {**arrays, "gains": self.gains})
+        write_checkpoint(
+            path, self._signature(), scalars, {**arrays, "gains": self.gains, "motions": self.poses.motions}
+        )
 
     def restore(self, path: Path) -> None:
         """Takes the run's state from a file written by `store`.
@@ -231,7 +244,7 @@ class SplatRun:
             CagefieldError: a file that cannot be read, or of other photos or settings.
         """
         scalars, arrays = read_checkpoint(path, self._signature())
-        self.gains = arrays.pop("gains")
+        self.gains, self.poses.motions = arrays.pop("gains"), arrays.pop("motions")
         self.state = SplatState(**arrays)
         self.step, self.seconds = scalars["step"], scalars["seconds"]
         self.running_loss, self._queue = scalars["running_loss"], scalars["queue"]
