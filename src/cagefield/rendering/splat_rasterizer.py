@@ -40,8 +40,8 @@ OUTSIDE = 0.3
 NEAR = 0.04
 """Depth at which drawing starts, in half-diagonals of the box of interest."""
 
-EVERYWHERE: Float32 = np.zeros((1, 1), np.float32)
-"""Distances up to which nothing is known to be empty."""
+NOWHERE: Float32 = np.zeros((2, 1, 1), np.float32)
+"""Nothing is known to be empty."""
 
 COLOUR, DEPTH, NORMALS = 4, 5, 8
 """Channels of a picture: T and colour; depth as well; normals as well."""
@@ -102,14 +102,15 @@ class Projection:
         slopes: Float32,
         stops: NDArray[np.int64],
         sums: Float32 | None = None,
-        empty: Float32 = EVERYWHERE,
+        empty: Float32 = NOWHERE,
         veil: float = 0.0,
     ) -> Float32:
         """Sums [pairs, SUMS] (see `splat_blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
         `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
-        `empty` [h,w] are distances along the picture's rays, at its size or smaller, up to which there is
-        nothing, 0 where nobody knows: each alpha before them adds `veil` to the loss.
+        `empty` [2,h,w] are distances along the picture's rays, at its size or smaller, up to which there is
+        nothing, 0 where nobody knows, and how sure that is: each alpha before them adds that times `veil` to
+        the loss.
         """
         if sums is None or len(sums) < self.pairs:
             sums = np.empty((self.pairs, splat_blending.SUMS), np.float32)

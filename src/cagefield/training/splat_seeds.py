@@ -32,6 +32,15 @@ FIRST_OPACITY = 0.5
 SURFACE_SHARE = 0.5
 """Surface points that a training begins with, in shares of the most splats that it may have."""
 
+REACH = 0.25
+"""Share of a photo's longer side within which known distances say something about unknown ones."""
+
+NEARBY = 0.85
+"""Share of the least known distance around it that a pixel takes."""
+
+HEARSAY = 0.2
+"""How sure that is."""
+
 RANDOM = 4000
 """Random points, where a data set has none, at most."""
 
@@ -44,7 +53,7 @@ def first_splats(
 ) -> tuple[SplatState, list[NDArray[np.float32]]]:
     """The splats that a training begins with, at most `most`; what the photos know to be empty.
 
-    The latter [H,W] by photo: distances along its pixels' rays, 0 where nobody knows.
+    The latter [2,H,W] by photo: distances along its pixels' rays, 0 where nobody knows, and how sure they are.
 
     At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
     capture, on a sphere far away. Where the data set has no points they are random ones.
@@ -56,6 +65,7 @@ def first_splats(
     wanted = int(SURFACE_SHARE * most)
     swept, colours, empty = swept_points(views, positions, wanted, config.seed)
     _add_sightings(empty, views, dataset.points)
+    empty = [spread(one) for one in empty]
     if dataset.points is None and len(swept) > len(positions):
         # Random ones have done what they are for: to say how deep the photos may be.
         positions, rgb = swept, colours
@@ -220,6 +230,26 @@ def _add_sightings(
         known = CLEAR * np.linalg.norm(points.positions[rows[inside]] - camera.origin, axis=1)
         before = distances[at[:, 1], at[:, 0]]
         distances[at[:, 1], at[:, 0]] = np.where(before > 0, np.minimum(before, known), known)
+
+
+def spread(distances: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Distances [2,H,W] up to which there is nothing, and how sure that is, from those [H,W] that are known.
+
+    What has no texture lies mostly between things that have: a pixel of which nothing is known takes the least
+    that is known around it, in a square that is as small as has it and at most REACH of the photo large.
+    """
+    from scipy.ndimage import minimum_filter
+
+    known = distances > 0
+    filled, sure = distances.copy(), known.astype(np.float32)
+    far = np.where(known, distances, np.inf).astype(np.float32)
+    size, most = 3, REACH * max(distances.shape)
+    while size <= most:
+        around = minimum_filter(far, size, mode="nearest")
+        new = (filled == 0) & np.isfinite(around)
+        filled[new], sure[new] = NEARBY * around[new], HEARSAY
+        size = 2 * size + 1
+    return np.stack([filled, sure])
 
 
 def _over_white(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:

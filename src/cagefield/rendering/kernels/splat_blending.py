@@ -31,8 +31,8 @@ Q_MAX = F(16)
 """Larger values of the quadratic form are this: alpha is then below ALPHA_MIN whatever the opacity."""
 E1, E2, E3, E4, E5 = F(0.99997018), F(0.49960978), F(0.16494888), F(0.03824679), F(0.00505834)
 """Of the polynomial 1 + E1 x + ... that has the least largest relative error to exp(x) on [-1, 0]: 8e-7."""
-ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8, ROW9, ROW10 = (U(AREA * k) for k in range(1, 11))
-ROWS = 11
+ROW1, ROW2, ROW3, ROW4, ROW5, ROW6, ROW7, ROW8, ROW9, ROW10, ROW11 = (U(AREA * k) for k in range(1, 12))
+ROWS = 12
 X, Y = ROW8, ROW9
 """Where the pixels' own coordinates lie in a tile's state."""
 
@@ -40,7 +40,7 @@ SUMS = 20
 """Floats a pair's sums have. With v = alpha dL/dalpha, e = Q d, g = dL/dC, h_k = |J_k| sum_j |J_j|, J = alpha
 dC/dalpha:
 0 v, 1-2 v e, 3-5 v e e^T, 6-8 w g, 9 w, 10 h, 11-13 h e e^T, 14-18 h e e e e (xxxx xxxy xxyy xyyy yyyy),
-19 w |g|^2. Where a splat lies in space that is known to be empty, v is greater by `veil` alpha."""
+19 w |g|^2. Where a splat lies in space that is known to be empty, v is greater by alpha times a cost."""
 
 
 @njit(inline="always", **FAST)
@@ -193,10 +193,11 @@ def influence_tile(state, packed, ids, begin, end, x0, y0):
 
 
 @njit(**FAST)
-def gradient_tile(state, packed, ids, begin, end, x0, y0, veil, sums):
+def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
     """Sums of a tile's pairs.
 
-    Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour to come, background too, 7 influence, 10 empty distance.
+    Rows of the state: 0 T, 1-3 dL/dC, 4-6 colour to come, background too, 7 influence, 10 distance that is
+    empty, 11 cost of an alpha there.
     """
     for e in range(begin, end):
         p = packed[ids[e]]
@@ -232,7 +233,7 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, veil, sums):
             jg = free * (w * g - q * rg)
             jb = free * (w * b - q * rb)
             v = jr * gr + jg * gg + jb * gb
-            v += veil * (a if t + tx * dx + ty * dy < state[ROW10 + i] else ZERO)
+            v += state[ROW11 + i] * (a if t + tx * dx + ty * dy < state[ROW10 + i] else ZERO)
             h = np.sqrt(jr * jr + jg * jg + jb * jb) * state[ROW7 + i]
             vx = v * ex
             vy = v * ey
@@ -268,8 +269,8 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, veil, sums):
 def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, veil, sums):
     """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
-    `empty` [h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there is
-    nothing; each alpha of a splat before them costs `veil`.
+    `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there is
+    nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
     """
     across = (width + TILE - 1) // TILE
     for t in prange(starts.size - 1):
@@ -281,9 +282,10 @@ def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, 
             inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
             state[i] = inside
             state[7 * AREA + i] = ZERO
-            row = min((y0 + i // TILE) * empty.shape[0] // height, empty.shape[0] - 1)
-            column = min((x0 + i % TILE) * empty.shape[1] // width, empty.shape[1] - 1)
-            state[10 * AREA + i] = inside * empty[row, column]
+            row = min((y0 + i // TILE) * empty.shape[1] // height, empty.shape[1] - 1)
+            column = min((x0 + i % TILE) * empty.shape[2] // width, empty.shape[2] - 1)
+            state[10 * AREA + i] = inside * empty[0, row, column]
+            state[11 * AREA + i] = veil * empty[1, row, column]
             for ch in range(3):
                 state[(1 + ch) * AREA + i] = inside * slopes[t, ch, i]
                 state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
@@ -293,7 +295,7 @@ def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, 
             state[i] = inside
             for ch in range(3):
                 state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
-        gradient_tile(state, packed, ids, starts[t], stops[t], x0, y0, veil, sums)
+        gradient_tile(state, packed, ids, starts[t], stops[t], x0, y0, sums)
         for e in range(stops[t], starts[t + 1]):
             for j in range(SUMS):
                 sums[e, j] = ZERO
