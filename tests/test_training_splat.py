@@ -21,7 +21,7 @@ from cagefield.training.splat import train_splat
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, split
 from cagefield.training.splat_run import SplatRun
-from cagefield.training.splat_seeds import first_splats, swept_points
+from cagefield.training.splat_seeds import first_splats, spread, swept_points
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
 from splat_captures import BOX, around, as_dataset, painted_ball, photos_of, points_near, write_views
@@ -289,7 +289,8 @@ def test_no_fog_stays_where_space_is_known_to_be_empty(capture):
     for veil in (0.0, 0.1):
         run = SplatRun(dataset, SplatConfig(steps=200, splats=800, sh_degree=1, veil=veil))
         for view, empty in zip(run.views, run._empty, strict=True):
-            empty[20:-20, 20:-20] = np.linalg.norm(view.cameras[0].origin) - 0.6
+            empty[0, 20:-20, 20:-20] = np.linalg.norm(view.cameras[0].origin) - 0.6
+            empty[1, 20:-20, 20:-20] = 1.0
         while run.done < 1.0:
             run.advance()
         renderer, before = SplatRenderer(run.field()), []
@@ -310,9 +311,22 @@ def test_what_points_say_of_empty_space_is_known_in_the_photos_that_see_them(cap
     _, (here, elsewhere) = first_splats(few, load_views(few.train), CONFIG, 600)
     camera = few.train[0].camera
     (x, y), distance = camera.project(one)[0][0], np.linalg.norm(one - camera.origin)
-    row, column = int(y * here.shape[0] / camera.height), int(x * here.shape[1] / camera.width)
-    assert np.count_nonzero(here) == 1 and not elsewhere.any()
-    assert 0.9 * distance < here[row, column] < distance
+    row, column = int(y * here.shape[1] / camera.height), int(x * here.shape[2] / camera.width)
+    assert np.count_nonzero(here[1] == 1.0) == 1 and not elsewhere.any()
+    assert here[1, row, column] == 1.0 and 0.9 * distance < here[0, row, column] < distance
+
+
+def test_what_is_known_of_a_pixel_speaks_for_those_around_it_with_care():
+    distances = np.zeros((40, 60), np.float32)
+    distances[5, 5], distances[5, 9] = 2.0, 1.0
+    spread_out, sure = spread(distances)
+    # The nearest square that has anything known, and the least there.
+    assert (spread_out[5, 5], sure[5, 5]) == (2.0, 1.0) and (spread_out[5, 9], sure[5, 9]) == (1.0, 1.0)
+    np.testing.assert_allclose((spread_out[5, 4], spread_out[5, 7], spread_out[6, 10]), (1.7, 0.85, 0.85))
+    assert 0 < sure[5, 4] < 1 and sure[5, 4] == sure[6, 10]
+    # Too far away to say anything.
+    assert spread_out[35, 55] == 0 and sure[35, 55] == 0
+    assert not spread(np.zeros((8, 8), np.float32)).any()
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -29,6 +29,7 @@ class SplatConfig:
         veil: what each alpha of a splat costs in space that is known to be empty, beside a squared error
             of colours in [0,1].
         prune: splats whose opacity falls below this are taken out.
+        dropout: share of the splats that each step leaves out, so that none explains what others show.
     """
 
     steps: int = 6000
@@ -47,6 +48,7 @@ class SplatConfig:
     opaque: float = 0.003
     veil: float = 0.1
     prune: float = 0.01
+    dropout: float = 0.1
 
     def __post_init__(self) -> None:
         limits = {"steps": (1, 10**8), "sh_degree": (0, 3), "splats": (100, 10**8)}

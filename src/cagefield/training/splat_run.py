@@ -123,6 +123,8 @@ class SplatRun:
         opacities = self._buffers.take("opacities", (count,), np.float32)
         with kernels():
             shapes(state.log_scales, state.quaternions, state.logits, covariances, opacities)
+        if config.dropout > 0.0:
+            opacities *= self._rng.random(count, np.float32) >= config.dropout
         splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
         seen = project(splats, camera, near=self._near, buffers=self._buffers)
         out, stops = seen.blend(COLOUR)
