@@ -241,6 +241,16 @@ def march_batch(
                             scratch[at + 7] = u
                         penalties[ray] = 0.5 * distortion * total_wu
 
+                    slopes = vec3(0.0, 0.0, 0.0)
+                    remaining = C
+                    for sample in range(samples):
+                        at = SAMPLE * (worker * MOST_SAMPLES + sample)
+                        for a in qd.static(range(3)):
+                            c = qd.max(qd.min(scratch[at + 4 + a], 1.0), 0.0)
+                            remaining[a] -= scratch[at + 2] * c
+                            slopes[a] += scratch[at + 1] * qd.abs(scratch[at + 3] * c - remaining[a])
+                    slopes *= gain
+
                     remaining = C
                     for sample in range(samples):
                         at = SAMPLE * (worker * MOST_SAMPLES + sample)
@@ -257,7 +267,7 @@ def march_batch(
                         c = qd.max(qd.min(colour, 1.0), 0.0)
                         remaining -= w * c
                         slope = h * gain * (scratch[at + 3] * c - remaining)
-                        curvature = slope.dot(slope)
+                        curvature = qd.abs(slope).dot(slopes)
                         gradient = slope.dot(residual)
                         if distortion > 0.0:
                             total_wu -= w * scratch[at + 7]
@@ -273,7 +283,7 @@ def march_batch(
                                 to = base + slots[k] * (HEAD + 3 * K)
                                 add(accumulator, to, b[k] * gradient, gpu)
                                 add(accumulator, to + 1, b[k] * curvature, gpu)
-                                add(accumulator, to + 2, b[k] * w * w, gpu)
+                                add(accumulator, to + 2, b[k] * w * total_w, gpu)
                                 if qd.static(gpu):
                                     qd.atomic_max(accumulator[to + 3], b[k] * w)
                                 else:
