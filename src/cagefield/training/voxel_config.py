@@ -21,7 +21,7 @@ class VoxelConfig:
         seed: of the batches, jitter and random backgrounds.
         batch_rays: rays a batch; doubled for the last stage.
         patch: edge of a pixel patch.
-        rate: (first, last) learning rate; None takes (8, 0.8), or (4, 0.4) for an unbounded capture.
+        rate: (first, last) learning rate; None takes (8, 2), or (4, 0.4) for an unbounded capture.
         decay: of the running curvatures, for each touch of a voxel.
         damping: added to every curvature.
         largest_step: largest change of a voxel's optical depth in one step.
@@ -48,7 +48,7 @@ class VoxelConfig:
     damping: float = 0.05
     largest_step: float = 0.3
     smooth: float | None = None
-    plain: float = 2e-2
+    plain: float = 3e-3
     prune: float = 0.01
     step: float = 0.7
     exposure: bool | None = None

@@ -49,7 +49,7 @@ def settings(
     chosen = (
         Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3)
         if unbounded
-        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 0.8), 2e-5)
+        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5)
     )
     named = {field.name: getattr(config, field.name) for field in dataclasses.fields(Settings)}
     return dataclasses.replace(chosen, **{name: value for name, value in named.items() if value is not None})
