@@ -39,9 +39,9 @@ def test_a_run_of_given_steps_chooses_the_same_on_every_machine():
 
 
 def test_what_is_named_is_taken():
-    named = VoxelConfig(resolution=90, sh_degree=0, rate=(3.0, 1.0), smooth=0.0)
+    named = VoxelConfig(resolution=90, sh_degree=0, rate=(3.0, 1.0), smooth=0.0, plain=0.1)
     for unbounded in (False, True):
-        assert chosen(named, 400, unbounded=unbounded) == Settings(90, 0, (3.0, 1.0), 0.0)
+        assert chosen(named, 400, unbounded=unbounded) == Settings(90, 0, (3.0, 1.0), 0.0, 0.1)
 
 
 @pytest.mark.parametrize("final", [16, 48, 256, 400, 512, 1024])

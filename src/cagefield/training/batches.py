@@ -126,7 +126,7 @@ class Batches:
             rate,
             config.largest_step,
             config.damping,
-            config.plain,
+            self._settings.plain,
             grid.terms,
         )
 

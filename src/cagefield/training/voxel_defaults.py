@@ -40,6 +40,7 @@ class Settings:
     sh_degree: int
     rate: tuple[float, float]
     smooth: float
+    plain: float
 
 
 def settings(
@@ -47,9 +48,9 @@ def settings(
 ) -> Settings:
     """The choices for photos of these sizes [V,2]; `threads` of the CPU, None on a GPU."""
     chosen = (
-        Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3)
+        Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3, 2e-2)
         if unbounded
-        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5)
+        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5, 3e-3)
     )
     named = {field.name: getattr(config, field.name) for field in dataclasses.fields(Settings)}
     return dataclasses.replace(chosen, **{name: value for name, value in named.items() if value is not None})
