@@ -182,7 +182,7 @@ def test_curvatures_bound_how_all_voxels_together_change_the_pictures(tmp_path, 
         ratios.append(change / (bounds * direction**2).sum())
     # 1 % for the differences' own error.
     assert max(ratios) < 1.01
-    # Not far too large either: where all colours move alike, only the vertices that are not stored are missing.
+    # Not far too large either: where all colours move alike, only vertices that are not stored are missing.
     if name == "sh":
         assert ratios[0] > 0.6
 

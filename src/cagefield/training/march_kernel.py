@@ -10,8 +10,8 @@ The loss of a ray is r^2 / 2 summed over channels, plus `distortion` times the d
 (equation 15), which pulls the weights of a ray together; its distance along the ray is t / (t + reach).
 
 A voxel's curvature in a bounded grid is that of one Gauss-Newton step for all voxels at once: with J_k the
-slope of C with respect to voxel k, (sum_k J_k x_k)^2 <= sum_k D_k x_k^2 for D_k = |J_k| sum_j |J_j|, and D_k is
-summed over the rays. J_k^2 alone is too small where samples share a ray's error, most in the fog of a
+slope of C with respect to voxel k, (sum_k J_k x_k)^2 <= sum_k D_k x_k^2 for D_k = |J_k| sum_j |J_j|, and D_k
+is summed over the rays. J_k^2 alone is too small where samples share a ray's error, most in the fog of a
 training's start: all of them would mend the whole error. A contracted grid has J_k^2: with D_k its fog clears
 too slowly (3 dB less on a capture).
 
