@@ -27,8 +27,8 @@ class VoxelConfig:
         largest_step: largest change of a voxel's optical depth in one step.
         smooth: weight of the Laplacian regularisation; None takes 2e-5, or 2e-3 for an unbounded capture.
         plain: weight of a penalty on the colour's dependence on the view, relative to what the photos say:
-            what was seen from one side alone keeps its colour on the others, where it would take a wild one; None
-            takes 3e-3, or 2e-2 for an unbounded capture.
+            what was seen from one side alone keeps its colour on the others, where it would take a wild one;
+            None takes 3e-3, or 2e-2 for an unbounded capture.
         prune: vertices whose largest weight stayed under this are dropped.
         step: distance between samples, in voxels.
         distortion: weight of mip-NeRF 360's distortion loss, against floaters.
