@@ -63,3 +63,19 @@ def test_only_the_first_stage_has_fewer_harmonics():
         degrees.append(schedule.sh_degree)
     assert degrees == [1, 2, 2, 2]
     assert Schedule(96, 0, by_clock=False).sh_degree == 0
+
+
+def test_by_the_clock_no_grid_is_pruned_or_refined_before_batches_have_met_it():
+    """A compilation or another program takes time too: what no batch has met would be lost."""
+    schedule = Schedule(320, 1, by_clock=True)
+    schedule.enter_next(100)
+    assert schedule.resolution == 140
+    least = 140**2 // 128 + 1
+    assert not schedule.prunes(0.5, 101) and not schedule.is_over(0.5, 101)
+    assert schedule.prunes(0.5, 100 + least)
+    schedule.prune(100 + least)
+    assert not schedule.prunes(0.5, 2000) and not schedule.is_over(0.5, 101 + least)
+    assert schedule.is_over(0.5, 100 + 2 * least)
+    steps = Schedule(320, 1, by_clock=False)
+    steps.enter_next(100)
+    assert steps.prunes(0.5, 101) and steps.is_over(0.5, 101)

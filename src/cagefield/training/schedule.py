@@ -18,7 +18,10 @@ PRUNE_WITHIN = 0.4
 """A stage is pruned once more after this share of it."""
 
 LEAST_STEPS = 60
-"""Steps that a stage has at least when a run is limited by time."""
+"""Steps that a stage has at least, before and after its pruning, when a run is limited by time."""
+
+STEPS_PER_SQUARE = 1 / 128
+"""As LEAST_STEPS, for each vertex of a square of the longest axis: what no batch met would be pruned."""
 
 LEAST_RESOLUTION = 16
 """Vertices along the longest axis of any grid, at least."""
@@ -44,7 +47,7 @@ class Schedule:
     Attributes:
         final: vertices along the longest axis at the end. degree: SH degree at the end.
         by_clock: whether the run is limited by time.
-        stage: number of the stage. began: the step at which it did.
+        stage: number of the stage. began: the step at which it did, or was pruned.
         pruned: whether it was pruned within; the first stage is not.
     """
 
@@ -78,14 +81,23 @@ class Schedule:
         """Whether the next stage is due at this progress and step."""
         if self.last or done < self._stages[self.stage + 1][1]:
             return False
-        # By the clock, a slow machine could reach a stage's end before its grid has learnt anything.
-        return not self.by_clock or step - self.began >= LEAST_STEPS
+        return self._has_learnt(step)
 
-    def prunes(self, done: float) -> bool:
-        """Whether the pruning within this stage is due at this progress."""
+    def _has_learnt(self, step: int) -> bool:
+        """Whether batches have met the grid; by the clock, a slow machine could prune or refine it before."""
+        least = max(LEAST_STEPS, STEPS_PER_SQUARE * self.resolution**2)
+        return not self.by_clock or step - self.began >= least
+
+    def prunes(self, done: float, step: int) -> bool:
+        """Whether the pruning within this stage is due at this progress and step."""
         start = self._stages[self.stage][1]
         end = 1.0 if self.last else self._stages[self.stage + 1][1]
-        return not self.pruned and done >= start + PRUNE_WITHIN * (end - start)
+        due = not self.pruned and done >= start + PRUNE_WITHIN * (end - start)
+        return due and self._has_learnt(step)
+
+    def prune(self, step: int) -> None:
+        """The stage is pruned at this step."""
+        self.began, self.pruned = step, True
 
     def enter_next(self, step: int) -> None:
         """The next stage begins at this step."""

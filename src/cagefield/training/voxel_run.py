@@ -89,8 +89,8 @@ class VoxelRun:
             self._grid.accumulator = None
             self._grid = self._space.refined(self._grid, schedule.resolution, schedule.sh_degree)
             self._patches.choose(self._space, self._grid)
-        elif schedule.prunes(done):
-            schedule.pruned = True
+        elif schedule.prunes(done, self.step):
+            schedule.prune(self.step)
             self._grid = self._pruned()
             self._patches.choose(self._space, self._grid)
         prepared = time.perf_counter()
