@@ -38,6 +38,11 @@ class Patches:
         self.chosen = self._all if space.contracted else self._all[self._touched(space, grid)]
         self._shuffle()
 
+    def compile(self, space: VoxelSpace, grid: GridState) -> None:
+        """Compiles what `choose` needs, which is no training; chooses nothing."""
+        if not space.contracted:
+            self._touched(space, grid)
+
     def take(self, count: int) -> NDArray[np.int32]:
         """The next so many patches [count,3], of a new epoch where this one has fewer left.
 

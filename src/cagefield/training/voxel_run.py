@@ -60,6 +60,7 @@ class VoxelRun:
         self._grid = self._space.first_grid(
             dataset.train, self._schedule.resolution, self._schedule.sh_degree, self._threads
         )
+        self._patches.compile(self._space, self._grid)
         self.step, self.rays = 0, 0
         self.seconds, self.running_loss = 0.0, float("nan")
         self._compiled: set[int] = set()
