@@ -53,7 +53,7 @@ def first_splats(
 ) -> tuple[SplatState, list[NDArray[np.float32]]]:
     """The splats that a training begins with, at most `most`; what the photos know to be empty.
 
-    The latter [2,H,W] by photo: distances along its pixels' rays, 0 where nobody knows, and how sure they are.
+    The latter [2,H,W] by photo: distances along its pixels' rays, 0 where nobody knows, and how sure that is.
 
     At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
     capture, on a sphere far away. Where the data set has no points they are random ones.
@@ -235,8 +235,8 @@ def _add_sightings(
 def spread(distances: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distances [2,H,W] up to which there is nothing, and how sure that is, from those [H,W] that are known.
 
-    What has no texture lies mostly between things that have: a pixel of which nothing is known takes the least
-    that is known around it, in a square that is as small as has it and at most REACH of the photo large.
+    What has no texture lies mostly between things that have: a pixel of which nothing is known takes the
+    least that is known around it, in a square that is as small as has it and at most REACH of the photo large.
     """
     from scipy.ndimage import minimum_filter
 

@@ -269,8 +269,8 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
 def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, veil, sums):
     """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
-    `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there is
-    nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
+    `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there
+    is nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
     """
     across = (width + TILE - 1) // TILE
     for t in prange(starts.size - 1):
