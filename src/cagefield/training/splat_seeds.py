@@ -236,7 +236,7 @@ def spread(distances: NDArray[np.float32]) -> NDArray[np.float32]:
     """Distances [2,H,W] up to which there is nothing, and how sure that is, from those [H,W] that are known.
 
     What has no texture lies mostly between things that have: a pixel of which nothing is known takes the
-    least that is known around it, in a square that is as small as has it and at most REACH of the photo large.
+    least that is known around it, in a square that is as small as has it and at most REACH of the photo.
     """
     from scipy.ndimage import minimum_filter
 
