@@ -124,7 +124,7 @@ class SplatRun:
         with kernels():
             shapes(state.log_scales, state.quaternions, state.logits, covariances, opacities)
         if config.dropout > 0.0:
-            opacities *= self._rng.random(count, np.float32) >= config.dropout
+            opacities *= self._rng.random(count, np.float32) >= config.dropout * done
         splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
         seen = project(splats, camera, near=self._near, buffers=self._buffers)
         out, stops = seen.blend(COLOUR)

@@ -40,7 +40,8 @@ SUMS = 20
 """Floats a pair's sums have. With v = alpha dL/dalpha, e = Q d, g = dL/dC, h_k = |J_k| sum_j |J_j|, J = alpha
 dC/dalpha:
 0 v, 1-2 v e, 3-5 v e e^T, 6-8 w g, 9 w, 10 h, 11-13 h e e^T, 14-18 h e e e e (xxxx xxxy xxyy xyyy yyyy),
-19 w |g|^2. Where a splat lies in space that is known to be empty, v is greater by alpha times a cost."""
+19 w |g|^2. Where a splat lies in space that is known to be empty, 0 is greater by alpha times a
+cost: such a splat fades, it does not move to where nobody looks."""
 
 
 @njit(inline="always", **FAST)
@@ -233,11 +234,10 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
             jg = free * (w * g - q * rg)
             jb = free * (w * b - q * rb)
             v = jr * gr + jg * gg + jb * gb
-            v += state[ROW11 + i] * (a if t + tx * dx + ty * dy < state[ROW10 + i] else ZERO)
             h = np.sqrt(jr * jr + jg * jg + jb * jb) * state[ROW7 + i]
             vx = v * ex
             vy = v * ey
-            s0 += v
+            s0 += v + state[ROW11 + i] * (a if t + tx * dx + ty * dy < state[ROW10 + i] else ZERO)
             s1 += vx
             s2 += vy
             s3 += vx * ex
