@@ -250,6 +250,10 @@ def test_splats_that_show_nothing_or_are_huge_are_taken_out():
     state = state_of([0.5, 0.004, 0.02, 0.5], np.log(0.1))
     state.log_scales[3, 1] = np.log(50.0)
     assert fading(state, 0.01, 20.0).tolist() == [False, True, False, True]
+    # A line without width; a disc without thickness stays.
+    state.log_scales[0] = np.log([1e-4, 0.1, 1e-4])
+    state.log_scales[2] = np.log([1e-4, 0.1, 0.1])
+    assert fading(state, 0.01, 20.0).tolist() == [True, True, False, True]
 
 
 def test_all_of_a_splat_goes_with_its_row():

@@ -11,6 +11,9 @@ from cagefield.training.splat_state import SplatState
 SPLIT_OFFSET = 0.6
 """Each half of a split splat goes this many sigmas along its longest axis."""
 
+NEEDLE = 300.0
+"""Most of a splat's length in its width, of a flat one its larger width."""
+
 SPLIT_SCALE = 0.7
 """The halves' sigma along that axis, in sigmas of the whole."""
 
@@ -18,7 +21,14 @@ SPLIT_SCALE = 0.7
 def fading(state: SplatState, prune: float, largest: float) -> NDArray[np.bool_]:
     """True [N] where a splat shows nothing any more, or is larger than a scene of that size has use for."""
     opacity = 1.0 / (1.0 + np.exp(-state.logits))
-    return np.asarray((opacity < prune) | (np.exp(state.log_scales.max(axis=1)) > largest))
+    vast = np.exp(state.log_scales.max(axis=1)) > largest
+    return np.asarray((opacity < prune) | vast | needles(state.log_scales))
+
+
+def needles(log_scales: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """True [N] where a splat is a line without width: hardly seen as it is, a streak once it is edited."""
+    ordered = np.sort(log_scales, axis=1)
+    return np.asarray(ordered[:, 2] - ordered[:, 1] > np.log(NEEDLE))
 
 
 def split(state: SplatState, rows: NDArray[np.int64]) -> None:

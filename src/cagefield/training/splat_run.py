@@ -29,7 +29,7 @@ from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.splat_step import gauss_newton, residuals
 from cagefield.training.splat_config import SplatConfig
-from cagefield.training.splat_growth import fading, split
+from cagefield.training.splat_growth import fading, needles, split
 from cagefield.training.splat_poses import FROM, PoseRefinement
 from cagefield.training.splat_seeds import camera_scale, depths_seen, first_splats, in_front_of
 from cagefield.training.splat_state import SplatState
@@ -178,9 +178,9 @@ class SplatRun:
             self.gains /= self.gains.mean(axis=0)
 
     def _carve(self) -> None:
-        """Takes out splats that stand nearer to a camera, in its picture, than anything it shows can be."""
+        """Takes out needles, and what stands nearer to a camera than anything that it shows can be."""
         state = self.state
-        close = np.zeros(len(state), bool)
+        close = needles(state.log_scales)
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
                 close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
@@ -207,7 +207,9 @@ class SplatRun:
 
     def field(self) -> SplatField:
         """The field as it is now."""
-        return self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+        field = self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+        thin = needles(field.log_scales)
+        return field if thin.all() else field.take(~thin)
 
     def progress(self) -> SplatProgress:
         """Where the run stands."""
