@@ -117,7 +117,8 @@ class SplatRun:
         config, state = self._config, self.state
         level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
         camera, target = self.views[index].level(level)
-        camera = self.poses.camera(index, camera)
+        if config.refine_poses:
+            camera = self.poses.camera(index, camera)
         count = len(state)
         covariances = self._buffers.take("covariances", (count, 6), np.float32)
         opacities = self._buffers.take("opacities", (count,), np.float32)
