@@ -45,6 +45,8 @@ class BenchCaptures:
     """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views."""
+    keep_poses: Flag = False
+    """Train on poses as they are, even where they are folded; else those are found anew."""
     room_size: int | None = None
     """Longer side of the photos of built-in rooms, 640 if left out."""
     room_views: int | None = None
@@ -122,6 +124,7 @@ class BenchCaptures:
     def _open(self, name: str, folder: Path) -> Dataset:
         """The data set of that name; a built-in room is photographed where the work folder lacks it."""
         from cagefield.benchmarking.workbench import digest
+        from cagefield.cli.poses import unfolded
         from cagefield.datasets import load_dataset
         from cagefield.datasets.procedural import CAPTURES, make_capture
 
@@ -139,6 +142,9 @@ class BenchCaptures:
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
+        if not self.keep_poses and name not in CAPTURES:
+            anew = folder / f"{dataset.name}-{digest([str(dataset.path.resolve())], ())}.poses"
+            dataset = unfolded(dataset, anew, self.downscale)
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
         return dataset

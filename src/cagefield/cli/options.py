@@ -39,13 +39,19 @@ class PhotoOptions:
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
 
-    def load(self, posed_in: Path | None = None) -> Dataset:
-        """The data set; photos without poses get them first, in the folder `posed_in` where it is given."""
-        from cagefield.cli.poses import posed
+    def load(self, posed_in: Path | None = None, keep_poses: bool = True) -> Dataset:
+        """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
+
+        So do those whose poses are folded, unless `keep_poses`.
+        """
+        from cagefield.cli.poses import posed, unfolded
         from cagefield.datasets import load_dataset
 
         data = self.data if posed_in is None else posed(self.data, posed_in)
-        return load_dataset(data, downscale=self.downscale, holdout=self.holdout)
+        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout)
+        if posed_in is None or keep_poses or data != self.data.expanduser():
+            return dataset
+        return unfolded(dataset, posed_in, self.downscale)
 
 
 @dataclass(frozen=True)

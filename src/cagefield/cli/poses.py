@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import tyro
 
 from cagefield.cli.options import Flag, Output, check_folder, progress_bar
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, DatasetError
 
 if TYPE_CHECKING:
+    from cagefield.datasets import Dataset, View
+    from cagefield.datasets.folds import Fold
     from cagefield.datasets.structure_from_motion import PosesReport
 
 _LISTED = 20  # photos named at the end, at most
+_KEPT = 0.9  # share of the photos that must find their place anew
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,19 @@ class Poses:
             raise CagefieldError(f"--frames is {self.frames}; it must be at least 3")
         check_folder(self.out, self.overwrite, RECORD)
         print(make(self.photos, self.out, self.frames))
+        self._warn_of_fold()
         print(f"data set written to {self.out}; next: cagefield train {self.out} -o SCENE")
+
+    def _warn_of_fold(self) -> None:
+        from cagefield.datasets import load_dataset
+
+        fold = check(load_dataset(self.out))
+        if fold is not None:
+            warnings.warn(
+                f"{self.out}: {describe(fold)}; photos in the order in which they were taken can be told "
+                "apart: name them in that order, or take more of what is around the thing",
+                stacklevel=2,
+            )
 
 
 def make(photos: Path, target: Path, frames: int = 80) -> str:
@@ -83,6 +100,77 @@ def posed(photos: Path, target: Path) -> Path:
     print(f"{photos} has no poses; finding them first, into {target}", flush=True)
     print(make(photos, target), flush=True)
     return target
+
+
+def unfolded(dataset: Dataset, target: Path, downscale: int | None) -> Dataset:
+    """The data set; where its poses are folded, one of its photos with poses found anew in `target`.
+
+    Lines say so. What is found anew is taken where it is not folded and nearly all photos found their place.
+    The same photos stay held out; the world is another one.
+    """
+    from cagefield.datasets import load_dataset
+    from cagefield.datasets.structure_from_motion import RECORD, is_made_of
+
+    fold = check(dataset)
+    if fold is None:
+        return dataset
+    folders = {view.image_path.parent for view in _photos(dataset)}
+    print(f"{dataset.path}: {describe(fold)}", flush=True)
+    if len(folders) != 1:
+        print("no field can show both; find the poses anew with: cagefield poses PHOTOS -o DATA", flush=True)
+        return dataset
+    photos = folders.pop()
+    if is_made_of(target, photos):
+        print(f"those in {target} were found before")
+    else:
+        check_folder(target, True, RECORD)
+        print(f"finding them anew, into {target} (--keep-poses leaves them as they are)", flush=True)
+        try:
+            print(make(photos, target), flush=True)
+        except DatasetError as error:
+            print(f"{error}; training on the poses that there are", flush=True)
+            return dataset
+    found = split_like(dataset, load_dataset(target, downscale=downscale))
+    if len(_photos(found)) < _KEPT * len(_photos(dataset)) or check(found) is not None:
+        print("those are no better; training on the poses that there are", flush=True)
+        return dataset
+    return found
+
+
+def split_like(known: Dataset, found: Dataset) -> Dataset:
+    """The data set `found` with the photos held out that are in `known`, by the names of their files."""
+
+    def of(views: Sequence[View]) -> tuple[View, ...]:
+        names = {view.image_path.name for view in views}
+        return tuple(view for view in _photos(found) if view.image_path.name in names)
+
+    test, val = of(known.test), of(known.val)
+    train = tuple(view for view in _photos(found) if view not in test and view not in val)
+    return replace(found, name=known.name, train=train, test=test, val=val)
+
+
+def check(dataset: Dataset) -> Fold | None:
+    """What tells that the poses of a capture are folded, with a progress bar; None where nothing does."""
+    from cagefield.datasets.folds import find_fold
+
+    if not dataset.unbounded:
+        return None
+    with progress_bar("Checking poses") as move:
+        return find_fold(dataset, lambda done, note: move(done, 1.0, note))
+
+
+def describe(fold: Fold) -> str:
+    """What is wrong, in words."""
+    return (
+        f"the poses are folded: {fold.photos} of {fold.looked_at} photos stand beside others that show "
+        f"something else ({fold.pair[0]} and {fold.pair[1]}), as where two sides of a thing look alike"
+    )
+
+
+def _photos(dataset: Dataset) -> list[View]:
+    """All photos of a data set, sorted by name."""
+    everything = {view.name: view for view in (*dataset.val, *dataset.test, *dataset.train)}
+    return [everything[name] for name in sorted(everything)]
 
 
 def summary(report: PosesReport, seconds: float) -> str:

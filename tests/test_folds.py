@@ -1,0 +1,145 @@
+"""Folded poses: a room whose other half lies on this one, and what only looks like it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cagefield.cameras import Camera
+from cagefield.cli import poses as poses_command
+from cagefield.datasets import View, folds
+from cagefield.datasets.procedural.textures import noise
+from cagefield.datasets.structure_from_motion import RECORD, PosesReport
+from cagefield.datasets.views import Dataset
+from cagefield.rendering.images import write_png
+from posed_photos import ring
+
+COUNT, WIDTH, HEIGHT = 24, 72, 48
+
+
+def cameras() -> list[Camera]:
+    """Two rounds of a ring, half a step apart, look at the middle from 3 away."""
+    return [Camera.from_fov(pose, WIDTH, HEIGHT, 1.0) for pose in ring(COUNT, 3.0)]
+
+
+def photo(camera: Camera) -> np.ndarray:
+    """A room of noise, 10 wide, and in its middle a ball that looks the same from the other side."""
+    origins, directions = (np.asarray(part, np.float64) for part in camera.rays())
+    with np.errstate(divide="ignore"):
+        wall = ((np.where(directions > 0, 5.0, -5.0) - origins) / directions).min(axis=1)
+    points = origins + wall[:, None] * directions
+    along, off = (origins * directions).sum(axis=1), (origins**2).sum(axis=1) - 0.6**2
+    inside = along**2 - off
+    ball = np.where(inside > 0, -along - np.sqrt(np.maximum(inside, 0.0)), np.inf)
+    hit = origins + np.where(np.isfinite(ball), ball, 0.0)[:, None] * directions
+    turned = np.stack([hit[:, 0] ** 2 - hit[:, 1] ** 2, hit[:, 0] * hit[:, 1], hit[:, 2]], axis=1)
+    value = 0.5 + 0.15 * np.where(np.isfinite(ball), noise(turned, 0.1), noise(points, 1.0))
+    grey = np.rint(255 * np.clip(value, 0, 1)).astype(np.uint8).reshape(HEIGHT, WIDTH, 1)
+    return np.repeat(grey, 3, axis=2)
+
+
+def dataset(folder, poses: list[Camera], photos: list[np.ndarray]) -> Dataset:
+    """The capture of these photos with these poses; every 8th held out."""
+    folder.mkdir()
+    views = []
+    for index, (camera, pixels) in enumerate(zip(poses, photos, strict=True)):
+        path = folder / f"{index:02}.png"
+        write_png(path, pixels)
+        views.append(View(path.name, camera, path))
+    bounds = np.array([[-2.0] * 3, [2.0] * 3])
+    test, train = tuple(views[::8]), tuple(view for i, view in enumerate(views) if i % 8)
+    return Dataset("room", folder, train, test, (), True, bounds, False)
+
+
+@pytest.fixture(scope="module")
+def photos():
+    return [photo(camera) for camera in cameras()]
+
+
+def folded() -> list[Camera]:
+    """The second half's poses lie between those of the first."""
+    right = cameras()
+    half = COUNT // 2
+    step = 0.5 * (2 * np.pi / COUNT)
+    turn = np.eye(4)
+    turn[:2, :2] = [[np.cos(step), -np.sin(step)], [np.sin(step), np.cos(step)]]
+    return right[:half] + [camera.with_c2w(turn @ camera.c2w) for camera in right[:half]]
+
+
+def test_right_poses_are_not_folded(photos, tmp_path):
+    assert folds.find_fold(dataset(tmp_path / "room", cameras(), photos)) is None
+
+
+def test_two_sides_that_lie_on_each_other_are_found(photos, tmp_path):
+    steps = []
+    fold = folds.find_fold(
+        dataset(tmp_path / "room", folded(), photos), lambda done, note: steps.append((done, note))
+    )
+    assert fold is not None and fold.looked_at == COUNT and fold.photos >= COUNT // 2
+    first, second = sorted(int(name[:2]) for name in fold.pair)
+    assert first < COUNT // 2 <= second and second - first - COUNT // 2 in (-1, 0, 1)
+    assert steps[-1][0] == 1.0 and "pairs of photos compared" in steps[-1][1]
+
+
+def test_one_wrong_pose_blur_and_darkness_are_no_fold(photos, tmp_path):
+    poses = cameras()
+    poses[5] = poses[17]
+    shown = list(photos)
+    shown[9] = np.full_like(shown[9], 128)
+    shown[13] = (shown[13] * 0.4).astype(np.uint8)
+    assert folds.find_fold(dataset(tmp_path / "room", poses, shown)) is None
+
+
+def test_few_photos_and_walls_without_texture_are_no_fold(photos, tmp_path):
+    assert folds.find_fold(dataset(tmp_path / "two", folded()[:2], photos[:2])) is None
+    plain = [np.full_like(pixels, 200) for pixels in photos]
+    assert folds.find_fold(dataset(tmp_path / "plain", folded(), plain)) is None
+
+
+def test_photos_that_agree_with_nobody_do_not_count():
+    pairs = [(0, 1), (1, 2), (2, 3), (4, 5)]
+    alike = np.array([0.9, 0.1, 0.9, 0.1])
+    assert folds.contradicting(pairs, alike, 6) == {1, 2}
+    assert folds.contradicting(pairs, np.full(4, np.nan), 6) == set()
+
+
+def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
+    photos, tmp_path, monkeypatch, capsys
+):
+    wrong, right = (
+        dataset(tmp_path / "wrong", folded(), photos),
+        dataset(tmp_path / "right", cameras(), photos),
+    )
+    reordered = replace(right, train=(*right.test, *right.train[4:]), test=right.train[:4])
+    calls = []
+
+    def made(source, target, *, frames, on_progress):
+        calls.append(source)
+        target.mkdir()
+        (target / RECORD).write_text("{}")
+        return PosesReport(target, COUNT, COUNT, 500, 0.5)
+
+    monkeypatch.setattr("cagefield.datasets.structure_from_motion.make_poses", made)
+    monkeypatch.setattr("cagefield.datasets.load_dataset", lambda *_, **__: reordered)
+    found = poses_command.unfolded(wrong, tmp_path / "anew", None)
+    said = capsys.readouterr().out
+    assert calls == [tmp_path / "wrong"] and "the poses are folded" in said and "--keep-poses" in said
+    assert [view.name for view in found.test] == [view.name for view in wrong.test]
+    assert {view.name for view in found.train} == {view.name for view in wrong.train}
+    assert found.train[0].camera == right.train[0].camera
+    assert poses_command.unfolded(right, tmp_path / "never", None) is right
+    assert not (tmp_path / "never").exists()
+
+
+def test_poses_found_anew_that_are_no_better_are_not_taken(photos, tmp_path, monkeypatch, capsys):
+    wrong = dataset(tmp_path / "wrong", folded(), photos)
+
+    def made(source, target, *, frames, on_progress):
+        return PosesReport(target, COUNT, COUNT, 500, 0.5)
+
+    monkeypatch.setattr("cagefield.datasets.structure_from_motion.make_poses", made)
+    monkeypatch.setattr("cagefield.datasets.load_dataset", lambda *_, **__: wrong)
+    assert poses_command.unfolded(wrong, tmp_path / "anew", None) is wrong
+    assert "no better" in capsys.readouterr().out
