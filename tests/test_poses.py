@@ -17,6 +17,7 @@ from cagefield.cameras import Camera
 from cagefield.cli import poses as poses_command
 from cagefield.datasets import features, load_dataset, structure_from_motion
 from cagefield.datasets.dataset import has_photos_alone
+from cagefield.datasets.folds import Fold
 from cagefield.datasets.raw_photos import find_raw_photos, sharpest_frames, sharpness, upright, video_frames
 from cagefield.datasets.structure_from_motion import PosesReport, is_made_of, make_poses, work_folder
 from cagefield.errors import DatasetError
@@ -336,16 +337,22 @@ def test_frames_of_a_video(tmp_path):
     assert has_photos_alone(video)
 
 
-def test_the_command_makes_a_data_set_and_says_what_is_next(photos, tmp_path, capsys, monkeypatch):
-    def made(source, target, *, frames, on_progress):
-        (target / "images").mkdir(parents=True)
-        (target / "poses.json").write_text("{}")
+def test_the_command_makes_a_data_set_and_says_what_is_next(photos, made, tmp_path, capsys, monkeypatch):
+    real, _, _ = made
+    fold = Fold(5, 9, ("a.jpg", "c.jpg"))
+
+    def fake(source, target, *, frames, on_progress):
+        shutil.copytree(real, target)
         on_progress(1.0, "done")
         return PosesReport(target, 9, 7, 1234, 0.613, {"b.jpg": "blurred", "a.heic": "unreadable"})
 
-    monkeypatch.setattr(structure_from_motion, "make_poses", made)
+    monkeypatch.setattr(structure_from_motion, "make_poses", fake)
+    monkeypatch.setattr(poses_command, "check", lambda dataset: fold)
     out = tmp_path / "data"
-    text = printed(capsys, "poses", photos, "-o", out)
+    with pytest.warns(
+        UserWarning, match=r"folded: 5 of 9 photos .*\(a.jpg and c.jpg\).*name them in that order"
+    ):
+        text = printed(capsys, "poses", photos, "-o", out)
     assert "7 of 9 photos found their place" in text and "1234 points" in text and "0.61 pixels" in text
     assert text.index("left out: a.heic: unreadable") < text.index("left out: b.jpg: blurred")
     assert f"next: cagefield train {out} -o SCENE" in text

@@ -28,6 +28,8 @@ class SplatConfig:
         opaque: pull on each opacity's logit towards 1, as a gradient: surfaces in place of fog.
         veil: what each alpha of a splat costs in space that is known to be empty, beside a squared error
             of colours in [0,1].
+        structure: weight of structural similarity, (1 - SSIM) / 2 of each pixel's window, beside half its
+            squared error.
         prune: splats whose opacity falls below this are taken out.
         dropout: share of the splats that steps leave out at the end, so that none explains what others show.
     """
@@ -47,6 +49,7 @@ class SplatConfig:
     memory: tuple[float, float] = (0.5, 0.98)
     opaque: float = 0.003
     veil: float = 0.1
+    structure: float = 0.02
     prune: float = 0.01
     dropout: float = 0.1
 

@@ -19,6 +19,7 @@ from cagefield.rendering.kernels.splat_projection import AREA
 from cagefield.rendering.splat_rasterizer import (
     COLOUR,
     Buffers,
+    Projection,
     intrinsics,
     kernels,
     near_depth,
@@ -28,6 +29,7 @@ from cagefield.rendering.splat_rasterizer import (
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.splat_step import gauss_newton, residuals
+from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, needles, split
 from cagefield.training.splat_poses import FROM, PoseRefinement
@@ -139,6 +141,8 @@ class SplatRun:
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
         with kernels():
             residuals(out, target, seen.width, seen.height, gain, background, colour, slopes, tile_sums)
+            if config.structure > 0.0 and min(seen.width, seen.height) >= WINDOW:
+                self._structure(seen, colour, target, gain, background, slopes)
             sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
             seen.gradients(colour, slopes, stops, sums, self._empty[index], config.veil)
             chain(
@@ -161,6 +165,24 @@ class SplatRun:
         self._expose(index, tile_sums)
         loss = float(tile_sums[:, 0].sum()) / (3 * seen.width * seen.height)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
+
+    def _structure(
+        self,
+        seen: Projection,
+        colour: NDArray[np.float32],
+        target: NDArray[np.uint8],
+        gain: NDArray[np.float32],
+        background: NDArray[np.float32],
+        slopes: NDArray[np.float32],
+    ) -> None:
+        """Adds what structural similarity says of the picture's pixels to the slopes of their error."""
+        size = (seen.height, seen.width)
+        structure(
+            colour, target, seen.width, seen.height, gain, background, self._config.structure,
+            self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
+            self._buffers.take("slopes_of", (3, 3, *size), np.float32),
+            self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
+        )  # fmt: skip
 
     def _behind(self) -> NDArray[np.float32]:
         """The background of the next picture: behind cut-outs a random one, so that they become opaque."""
