@@ -22,7 +22,7 @@ from cagefield.datasets.folds import Fold
 from cagefield.datasets.raw_photos import find_raw_photos, sharpest_frames, sharpness, upright, video_frames
 from cagefield.datasets.structure_from_motion import PosesReport, is_made_of, make_poses, work_folder
 from cagefield.errors import DatasetError
-from commands import printed, refused
+from commands import refused
 from posed_photos import distance_to_textures, photo_of_textures, ring, save
 
 pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
