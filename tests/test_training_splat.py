@@ -201,6 +201,18 @@ def test_exposures_of_the_photos_are_found(capture, tmp_path):
     np.testing.assert_array_equal(off.gains, 1.0)
 
 
+def test_more_and_more_splats_are_left_out_of_the_pictures_by_chance(capture):
+    def seen(dropout: float, done: float) -> int:
+        run = SplatRun(capture, SplatConfig(steps=100, splats=400, dropout=dropout))
+        run._photo(0, done)
+        return int(run.state.hits.sum())
+
+    everything = seen(0.0, 0.5)
+    assert seen(0.8, 0.0) == everything > 100
+    assert seen(0.8, 0.5) == pytest.approx(0.6 * everything, rel=0.15)
+    assert seen(1.0, 1.0) == 0
+
+
 def test_splats_become_more_up_to_the_most_that_may_be(capture):
     run = SplatRun(capture, SplatConfig(steps=320, splats=340, sh_degree=0))
     begun = len(run.state)
@@ -388,6 +400,17 @@ def test_levels_are_box_filtered_with_alpha_as_weight(tmp_path):
     camera, tiles = loaded.level(2)
     assert (camera.width, len(loaded.cameras), loaded.has_alpha) == (48, 2, True)
     np.testing.assert_array_equal(tiles[0, :, 0], (200, 100, 50, 128))
+
+
+def test_photos_with_and_without_alpha_are_trained_on_together(ball, tmp_path):
+    cameras = around(4, 0.3, 48)
+    photos = photos_of(ball, cameras, cut_out=True)
+    photos[0] = np.ascontiguousarray(photos[0][..., :3])
+    views = load_views(write_views(tmp_path / "mixed", cameras, photos))
+    assert all(view.has_alpha and view.tiles[0].shape[1] == 4 for view in views)
+    assert (views[0].tiles[0][:, 3] == 255).all() and (views[1].tiles[0][:, 3] == 0).any()
+    plain = load_views(write_views(tmp_path / "plain", cameras[:1], photos[:1]))
+    assert not plain[0].has_alpha and plain[0].tiles[0].shape[1] == 3
 
 
 def test_an_unbounded_capture_begins_with_at_most_as_many_splats_as_it_may_have(capture):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +46,18 @@ class TrainingView:
         at = min(level, len(self.cameras) - 1)
         return self.cameras[at], self.tiles[at]
 
+    def with_alpha(self) -> TrainingView:
+        """The same; a photo without alpha is opaque."""
+        if self.has_alpha:
+            return self
+        filled = (np.pad(tiles, ((0, 0), (0, 1), (0, 0)), constant_values=255) for tiles in self.tiles)
+        return replace(self, tiles=tuple(filled), has_alpha=True)
+
 
 def load_views(views: Sequence[View]) -> list[TrainingView]:
-    """All photos. Raises DatasetError where one cannot be read."""
-    return [TrainingView.of(view) for view in views]
+    """All photos, with alpha where one of them has it. Raises DatasetError where one cannot be read."""
+    found = [TrainingView.of(view) for view in views]
+    return [view.with_alpha() for view in found] if any(view.has_alpha for view in found) else found
 
 
 def _boxed(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
