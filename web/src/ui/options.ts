@@ -125,6 +125,7 @@ export function options(app: App, actions: Actions): HTMLElement {
 function latticeError(edit: EditState): string {
   if (edit.lattice_error === null) return "being measured";
   const [most, mean] = edit.lattice_error;
+  if (most === 0) return "none";
   return `≤ ${most.toPrecision(2)}, mean ${mean.toPrecision(2)} voxels`;
 }
 
