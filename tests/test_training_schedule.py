@@ -20,7 +20,7 @@ def chosen(config: VoxelConfig, side: int, threads: int | None = 2, *, unbounded
 
 def test_the_resolution_grows_with_the_photos_as_far_as_there_is_time():
     long = [chosen(VoxelConfig(minutes=60.0), side).resolution for side in (32, 100, 200, 400, 800)]
-    assert long == [SMALLEST, 128, 248, 496, LARGEST]
+    assert long == [SMALLEST, 88, 176, 360, LARGEST]
     assert chosen(VoxelConfig(minutes=1e4), 4000, threads=None).resolution == LARGEST
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cagefield.training.voxel_config import VoxelConfig
 
-VOXELS_PER_PIXEL = 1.25
+VOXELS_PER_PIXEL = 0.9
 """Vertices along the longest axis for each pixel of the photos' longer side, at most."""
 
 RAYS_PER_VOXEL = 340.0
