@@ -29,7 +29,7 @@ class SplatConfig:
         veil: what each alpha of a splat costs in space that is known to be empty, beside a squared error
             of colours in [0,1].
         structure: weight of structural similarity, (1 - SSIM) / 2 of each pixel's window, beside half its
-            squared error.
+            squared error, from when surfaces are found.
         prune: splats whose opacity falls below this are taken out.
         dropout: share of the splats that steps leave out at the end, so that none explains what others show.
     """

@@ -40,6 +40,9 @@ from cagefield.training.splat_views import load_views
 LEVEL_UNTIL = ((2, 0.04), (1, 0.15))
 """(level of the photos, progress until which it is used); then whole photos."""
 
+STRUCTURE_FROM = 0.6
+"""Progress from which structural similarity counts: while surfaces are being found it would favour fog."""
+
 DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
 """Progress from which harmonics of each degree are used."""
 
@@ -141,7 +144,8 @@ class SplatRun:
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
         with kernels():
             residuals(out, target, seen.width, seen.height, gain, background, colour, slopes, tile_sums)
-            if config.structure > 0.0 and min(seen.width, seen.height) >= WINDOW:
+            structured = config.structure > 0.0 and done >= STRUCTURE_FROM
+            if structured and min(seen.width, seen.height) >= WINDOW:
                 self._structure(seen, colour, target, gain, background, slopes)
             sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
             seen.gradients(colour, slopes, stops, sums, self._empty[index], config.veil)
