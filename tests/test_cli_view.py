@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from cagefield.cli.demo import Demo
-from cagefield.server import opening, running
-from cagefield.server.safety import Guard
+from cagefield.server.web import launch
+from cagefield.server.web.security import Guard
 from commands import printed, refused
 from scenes import ball_scene
 
@@ -31,7 +31,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[Guard]:
         listening.close()
         guards.append(guard)
 
-    monkeypatch.setattr(running, "serve", serve)
+    monkeypatch.setattr(launch, "serve", serve)
     return guards
 
 
@@ -132,7 +132,7 @@ def test_the_demo_ends_by_offering_the_editor(
 
 
 def test_a_page_is_told_where_up_is_and_where_to_begin(scene: Path) -> None:
-    hub, hello = opening.open_hub(scene)
+    hub, hello = launch.open_hub(scene)
     assert hub.session.saved and hello.name == "scene"
     assert hello.up == (0.0, 0.0, 1.0)
     camera = ball_scene().cameras["test"][0]

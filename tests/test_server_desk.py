@@ -10,11 +10,11 @@ import pytest
 
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
-from cagefield.server import desk as module
-from cagefield.server.desk import RESTARTS, Chore, Desk, Stamp
-from cagefield.server.pictures import Request
-from cagefield.server.regions import WHOLE, Rect
-from cagefield.server.tasks import (
+from cagefield.server.render_queue import dispatcher as module
+from cagefield.server.render_queue.damage import WHOLE, Rect
+from cagefield.server.render_queue.dispatcher import RESTARTS, Chore, Desk, Stamp
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_worker.tasks import (
     Answered,
     Failed,
     PictureDone,

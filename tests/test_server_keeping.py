@@ -14,8 +14,8 @@ from cagefield.errors import SceneError
 from cagefield.keyframe_files import load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
-from cagefield.server.keeping import Keeper
-from cagefield.server.session import Session
+from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.session import Session
 from scenes import ball_scene, files_of
 
 INNER = Cage.box((0, 0, 0), 1.1)

@@ -17,13 +17,13 @@ from cagefield.edits import Edit, EditStack, dump_edits
 from cagefield.errors import CagefieldError, CameraError
 from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe
-from cagefield.server import from_page, from_server
-from cagefield.server.app import application
-from cagefield.server.hub import Hub
-from cagefield.server.opening import open_hub
-from cagefield.server.refusing import refusal
-from cagefield.server.safety import Guard
-from cagefield.server.speaking import Speaker
+from cagefield.server.protocol import client_messages, server_messages
+from cagefield.server.protocol.validation_errors import refusal
+from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.web.app import application
+from cagefield.server.web.handlers import Speaker
+from cagefield.server.web.launch import open_hub
+from cagefield.server.web.security import Guard
 from scenes import ball_scene
 
 POSE = np.eye(4).ravel().tolist()
@@ -44,10 +44,10 @@ def key(**changed: Any) -> dict[str, Any]:
     return {"c2w": POSE, "fov_y_deg": 50.0, "seconds": 2.0, "parts": {"1": 0.5}} | changed
 
 
-def said(hub: Hub, hello: from_server.Hello, text: str) -> str | None:
+def said(hub: Hub, hello: server_messages.Hello, text: str) -> str | None:
     """What the page's user is told of a message; None where it is followed."""
     try:
-        Speaker(hub, hub.join(hello)).hear(from_page.page_messages.validate_json(text))
+        Speaker(hub, hub.join(hello)).hear(client_messages.page_messages.validate_json(text))
     except ValidationError as error:
         return refusal(error)
     except CagefieldError as error:
@@ -133,7 +133,7 @@ def test_a_path_that_is_too_long_for_a_file_changes_no_file(scene: Path) -> None
     assert answer.status_code == 409 and "make it shorter" in answer.text
 
 
-async def fetched(hub: Hub, hello: from_server.Hello, path: str) -> httpx.Response:
+async def fetched(hub: Hub, hello: server_messages.Hello, path: str) -> httpx.Response:
     transport = httpx.ASGITransport(application(hub, hello, Guard("localhost", 80)))
     async with httpx.AsyncClient(transport=transport, base_url="http://localhost:80") as client:
         return await client.get(path)

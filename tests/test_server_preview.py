@@ -15,15 +15,15 @@ from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Translate, dump_edits
 from cagefield.errors import CagefieldError, CameraError, EditError
 from cagefield.keyframes import Keyframe, stills
-from cagefield.server import from_page, wire
-from cagefield.server.blending import blended
-from cagefield.server.converting import MOST_STILLS, STILLS_PER_SECOND, stills_of
-from cagefield.server.document import Document
-from cagefield.server.opening import open_hub
-from cagefield.server.session import Session
-from cagefield.server.sockets import Inbox
-from cagefield.server.speaking import Speaker
-from cagefield.server.tasks import PictureTask, Shown, values_of
+from cagefield.server.editor.document import Document
+from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.session import Session
+from cagefield.server.protocol import client_messages, common
+from cagefield.server.protocol.conversion import MOST_STILLS, STILLS_PER_SECOND, stills_of
+from cagefield.server.render_worker.tasks import PictureTask, Shown, values_of
+from cagefield.server.web.handlers import Speaker
+from cagefield.server.web.launch import open_hub
+from cagefield.server.web.websocket import Inbox
 from scenes import ball_scene
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
@@ -196,7 +196,7 @@ class Played:
         self.heard()
 
     def say(self, page: int, kind: str, **values: Any) -> None:
-        message = from_page.page_messages.validate_python({"type": kind, **values})
+        message = client_messages.page_messages.validate_python({"type": kind, **values})
         rest = self.speakers[page].hear(message)
         assert rest is None
 
@@ -308,16 +308,16 @@ def test_of_messages_on_the_way_along_the_path_only_the_newest_wait() -> None:
     inbox = Inbox()
     pose = np.eye(4).reshape(-1).tolist()
 
-    def camera(seq: int) -> wire.CameraMessage:
-        return wire.CameraMessage(seq=seq, c2w=pose, width=64, height=64, fov_y_deg=50.0, moving=True)
+    def camera(seq: int) -> common.CameraMessage:
+        return common.CameraMessage(seq=seq, c2w=pose, width=64, height=64, fov_y_deg=50.0, moving=True)
 
-    begin, end = from_page.PlayBegin(play=1), from_page.PlayEnd(play=1)
+    begin, end = client_messages.PlayBegin(play=1), client_messages.PlayEnd(play=1)
     for message in (
         begin,
-        *(m for n in range(5) for m in (from_page.Play(play=1, seconds=n), camera(n))),
+        *(m for n in range(5) for m in (client_messages.Play(play=1, seconds=n), camera(n))),
         end,
         camera(9),
     ):
         inbox.put(message)
     waiting = list(inbox._waiting)
-    assert waiting == [begin, from_page.Play(play=1, seconds=4), camera(4), end, camera(9)]
+    assert waiting == [begin, client_messages.Play(play=1, seconds=4), camera(4), end, camera(9)]

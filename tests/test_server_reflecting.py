@@ -8,7 +8,7 @@ import pytest
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
-from cagefield.server.reflecting import mirrored, mirrored_cage
+from cagefield.server.editor.mirror import mirrored, mirrored_cage
 
 INNER = Cage.box((0.2, 0.1, -0.1), (0.5, 0.4, 0.3), (0.3, -0.2, 0.5))
 OPERATIONS: tuple[ops.Operation, ...] = (

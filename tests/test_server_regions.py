@@ -12,11 +12,12 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
-from cagefield.server.pictures import Look, Region, Request
-from cagefield.server.regions import WHOLE, Rect, Showing, joined, pixels, seen, tiles
-from cagefield.server.scheduler import SETTLE_SECONDS, Scheduler
-from cagefield.server.studio import Studio
-from cagefield.server.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
+from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, joined, pixels, seen, tiles
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
+from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.renderer_cache import Studio
+from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from scenes import ball_scene
 from sent_pictures import pixels_of
 

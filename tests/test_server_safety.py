@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cagefield.server.safety import Allowance, Guard, is_loopback, new_token
+from cagefield.server.web.security import Allowance, Guard, is_loopback, new_token
 
 HOME = Guard("localhost", 8741)
 OPEN = Guard("0.0.0.0", 8741, token="secret-token")

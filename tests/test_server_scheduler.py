@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from cagefield.server.pictures import Look, Request
-from cagefield.server.scheduler import MOST_MOVING, MOST_TILES, MOVING_SECONDS, SETTLE_SECONDS, Scheduler
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.scheduler import (
+    MOST_MOVING,
+    MOST_TILES,
+    MOVING_SECONDS,
+    SETTLE_SECONDS,
+    Scheduler,
+)
+from cagefield.server.render_worker.pictures import Look
 
 SIDE = 800
 RATE = 1e6

@@ -11,11 +11,11 @@ from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
 from cagefield.keyframes import Keyframe
-from cagefield.server import reasons
-from cagefield.server.document import Document
-from cagefield.server.history import History
-from cagefield.server.moving import Target, move_corners
-from cagefield.server.session import Session
+from cagefield.server.editor import validity
+from cagefield.server.editor.document import Document
+from cagefield.server.editor.drag_solver import Target, move_corners
+from cagefield.server.editor.history import History
+from cagefield.server.editor.session import Session
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 INNER = Cage.box((0, 0, 0), 0.4)
@@ -132,12 +132,12 @@ def test_in_set_mode_the_outer_cage_stops_at_the_inner_one() -> None:
 @pytest.mark.parametrize(
     ("edit", "target", "operation", "why"),
     [
-        (ARM, "field", Translate((2.0, 0, 0)), reasons.OUTSIDE),
-        (ARM.replace(shell="trilinear"), "field", Rotate((0, 0, 80)), reasons.FOLDED),
-        (ARM, "field", Translate((0.299999, 0, 0)), reasons.CLOSE),
-        (ARM, "field", MoveCorner(0, (2.0, 2.0, 2.0)), reasons.INSIDE_OUT),
+        (ARM, "field", Translate((2.0, 0, 0)), validity.OUTSIDE),
+        (ARM.replace(shell="trilinear"), "field", Rotate((0, 0, 80)), validity.FOLDED),
+        (ARM, "field", Translate((0.299999, 0, 0)), validity.CLOSE),
+        (ARM, "field", MoveCorner(0, (2.0, 2.0, 2.0)), validity.INSIDE_OUT),
         (ARM, "outer", Translate((2.0, 0, 0)), "the inner cage must stay inside the outer cage"),
-        (ARM, "inner", MoveCorner(0, (2.0, 2.0, 2.0)), reasons.INSIDE_OUT),
+        (ARM, "inner", MoveCorner(0, (2.0, 2.0, 2.0)), validity.INSIDE_OUT),
     ],
 )
 def test_why_a_drag_stops_is_said_in_the_editors_words(

@@ -24,9 +24,9 @@ from websockets.sync.client import connect
 
 from cagefield.edits import load_edits
 from cagefield.errors import CagefieldError
-from cagefield.server.hub import Page
-from cagefield.server.sockets import _told
-from cagefield.server.wire import MOST_BYTES
+from cagefield.server.protocol.common import MOST_BYTES
+from cagefield.server.render_queue.coordinator import Page
+from cagefield.server.web.websocket import _told
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from sent_pictures import pixels_of

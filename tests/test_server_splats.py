@@ -19,17 +19,18 @@ from cagefield.keyframes import Still
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.metrics import psnr
 from cagefield.scene import Scene
-from cagefield.server.hub import Hub
-from cagefield.server.keeping import Keeper
-from cagefield.server.opening import hello_of, open_hub
-from cagefield.server.pictures import Look, Region
-from cagefield.server.placing import fitted
-from cagefield.server.regions import WHOLE, Showing
-from cagefield.server.scheduler import Scheduler
-from cagefield.server.session import Session
-from cagefield.server.splats import dense, spread
-from cagefield.server.studio import Studio
-from cagefield.server.tasks import (
+from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.session import Session
+from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_queue.damage import WHOLE, Showing
+from cagefield.server.render_queue.scheduler import Scheduler
+from cagefield.server.render_queue.splat_extent import spread
+from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.renderer_cache import Studio
+from cagefield.server.render_worker.splat_density import dense
+from cagefield.server.render_worker.task_handlers import Working
+from cagefield.server.render_worker.tasks import (
     WARM_STAGES,
     Answered,
     ErrorTask,
@@ -43,7 +44,7 @@ from cagefield.server.tasks import (
     WarmTask,
     values_of,
 )
-from cagefield.server.working import Working
+from cagefield.server.web.launch import hello_of, open_hub
 from sent_pictures import pixels_of
 from splat_scenes import ball_of_splats, splat_scene
 

@@ -17,15 +17,16 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.keyframes import Keyframe, Still
-from cagefield.server import jobs
-from cagefield.server.blending import blended
-from cagefield.server.chores import Chores
-from cagefield.server.document import Document
-from cagefield.server.grid_lines import grid_lines
-from cagefield.server.pictures import Look, Region
-from cagefield.server.placing import PROBES, fitted, probes
-from cagefield.server.studio import Studio
-from cagefield.server.tasks import (
+from cagefield.server.editor.cage_placement import PROBES, fitted, probes
+from cagefield.server.editor.document import Document
+from cagefield.server.editor.path_edits import blended
+from cagefield.server.render_queue import jobs
+from cagefield.server.render_queue.background import Chores
+from cagefield.server.render_worker.grid_lines import grid_lines
+from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.renderer_cache import Studio
+from cagefield.server.render_worker.task_handlers import SAMPLES, Working
+from cagefield.server.render_worker.tasks import (
     WARM_STAGES,
     Answered,
     EndJobTask,
@@ -39,7 +40,6 @@ from cagefield.server.tasks import (
     WarmTask,
     values_of,
 )
-from cagefield.server.working import SAMPLES, Working
 from scenes import ball_scene
 from sent_pictures import pixels_of
 

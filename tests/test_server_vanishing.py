@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from cagefield.server.opening import open_hub
-from cagefield.server.sockets import attend
+from cagefield.server.web.launch import open_hub
+from cagefield.server.web.websocket import attend
 from editor_server import PATIENCE, EditorServer, editor_server, page
 from scenes import ball_scene
 

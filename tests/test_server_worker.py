@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from cagefield.server.tasks import Answered, Ready, Result, WarmTask
-from cagefield.server.worker import Worker, serve
+from cagefield.server.render_worker.process import Worker, serve
+from cagefield.server.render_worker.tasks import Answered, Ready, Result, WarmTask
 from scenes import ball_scene
 
 PATIENCE = 120.0

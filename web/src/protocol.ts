@@ -1,4 +1,4 @@
-// Made by `npm run protocol` from what src/cagefield/server/schema.py collects; change that.
+// Made by `npm run protocol` from what src/cagefield/server/protocol/schema.py collects; change that.
 
 /**
  * @minItems 3

@@ -34,9 +34,8 @@ class View:
             raise CagefieldError(f"--port is {self.port}; give a number from 0 to 65535")
         if self.token is not None and len(self.token) < 8:
             raise CagefieldError("--token is too short to keep anybody out; give 8 characters or more")
-        from cagefield.server.opening import bound_socket, open_hub
-        from cagefield.server.running import serve
-        from cagefield.server.safety import Guard, is_loopback, new_token
+        from cagefield.server.web.launch import bound_socket, open_hub, serve
+        from cagefield.server.web.security import Guard, is_loopback, new_token
 
         hub, hello = open_hub(self.scene, self.device)
         listening = bound_socket(self.host, self.port)

@@ -1,0 +1,134 @@
+"""What a drag or a numeric field does to an edit's cages, and how far it may go.
+
+*Edit* mode moves the inner cage with the field: the operation joins the edit's. *Set* mode moves cages alone:
+the inner cage as it was trained, the outer one, or both about the inner one's pivot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+from cagefield.cages import EDGES, FACES, Cage
+from cagefield.edits import Edit
+from cagefield.edits import operations as ops
+from cagefield.edits.edit import largest_safe
+from cagefield.edits.operations import Operation, Triple
+from cagefield.errors import CagefieldError, EditError
+from cagefield.server.editor.document import Entry
+from cagefield.server.editor.validity import INSIDE_OUT, cause, problem
+
+_ROUNDING = 1e-3
+"""Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
+
+Target: TypeAlias = Literal["field", "inner", "outer", "both"]
+
+
+@dataclass(frozen=True)
+class Moved:
+    """An edit after `part` of an operation; `why` says what stopped the rest.
+
+    `problem` is the edit's, as `problem` finds it.
+    """
+
+    edit: Edit
+    part: float = 1.0
+    why: str | None = None
+    problem: str | None = None
+
+
+def move_corners(corners: tuple[int, ...], by: Triple) -> Operation:
+    """The operation that moves some corners: of a corner, an edge or a face where they are one."""
+    chosen = tuple(sorted(set(corners)))
+    if len(chosen) == 1:
+        return ops.MoveCorner(chosen[0], by)
+    if chosen in EDGES:
+        return ops.MoveEdge((chosen[0], chosen[1]), by)
+    face = next((name for name, ids in FACES.items() if ids == chosen), None)
+    return ops.MoveCorners(chosen, by) if face is None else ops.MoveFace(face, by)
+
+
+def move(entry: Entry, target: Target, operation: Operation) -> Moved:
+    """The entry's edit after as much of an operation as it can follow.
+
+    Raises EditError for a locked edit, a deleted one, and an outer cage that is not there.
+    """
+    edit = entry.edit
+    if entry.locked:
+        raise EditError(f'edit "{edit.name}" is locked; unlock it to change it')
+    if target == "field":
+        return _with_field(edit, operation)
+    if target == "outer" and edit.outer is None:
+        raise EditError(f'edit "{edit.name}" has no outer cage; give it one with "outer margin"')
+    return _cages_alone(edit, target, operation)
+
+
+def joined(operations: tuple[Operation, ...], last: Operation) -> tuple[Operation, ...]:
+    """The operations with one more; moves of the same kind, one after the other, become one."""
+    total = _sum(operations[-1], last) if operations else None
+    return (*operations, last) if total is None else (*operations[:-1], total)
+
+
+def _sum(first: Operation, second: Operation) -> Operation | None:
+    """One operation in place of two moves of the same corners or of the whole cage; None for any others."""
+    turning = (ops.Rotate, ops.Scale, ops.Shear)
+    if isinstance(first, turning) or isinstance(second, turning) or type(first) is not type(second):
+        return None
+    x, y, z = (a + b for a, b in zip(first.by, second.by, strict=True))
+    total = replace(second, by=(x, y, z))
+    return total if total == replace(first, by=total.by) else None
+
+
+def _with_field(edit: Edit, operation: Operation) -> Moved:
+    if edit.deleted:
+        raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
+    try:
+        whole = edit.replace(operations=joined(edit.operations, operation))
+    except CagefieldError:
+        why = INSIDE_OUT
+    else:
+        found = problem(whole)
+        if found is None or problem(edit) is not None:
+            return Moved(whole, problem=found)
+        why = found
+    part = edit.safe_fraction(operation)
+    while part > 0.0:
+        done = edit.replace(operations=joined(edit.operations, operation.part(part)))
+        if problem(done) is None:
+            return Moved(done, part, why)
+        part -= _ROUNDING
+    return Moved(edit, 0.0, why)
+
+
+def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
+    was_fine = problem(edit) is None
+
+    def at(t: float) -> Edit:
+        return _set_cages(edit, target, operation.part(t))
+
+    def safe(t: float) -> bool:
+        try:
+            moved = at(t)
+        except CagefieldError:
+            return False
+        return not was_fine or problem(moved) is None
+
+    part = largest_safe(safe)
+    if part >= 1.0:
+        return Moved(at(1.0), problem=None if was_fine else problem(at(1.0)))
+    try:
+        why = cause(problem(at(1.0)) or "the cages would not fit together on the way there")
+    except CagefieldError:
+        why = INSIDE_OUT
+    return Moved(at(part) if part > 0.0 else edit, part, why)
+
+
+def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
+    inner = edit.inner if target == "outer" else operation.apply(edit.inner)
+    outer = edit.outer
+    if outer is not None and target == "outer":
+        outer = operation.apply(outer)
+    elif outer is not None and target == "both":
+        about = operation.apply(Cage(outer.corners, pivot=edit.inner.pivot))
+        outer = Cage(about.corners)
+    return edit.replace(inner=inner, outer=outer)

@@ -1,0 +1,73 @@
+"""The drags that go on, one for each page at most: what was dragged, and what it has become."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from cagefield.edits.operations import Operation
+from cagefield.errors import EditError
+from cagefield.server.editor.document import Document, Entry
+from cagefield.server.editor.drag_solver import Moved, Target, move
+
+
+@dataclass(frozen=True)
+class Drag:
+    """A drag that goes on: its number on its page, the entry as it was, and what it has become."""
+
+    number: int
+    target: Target
+    before: Entry
+    now: Entry
+
+
+class Drags:
+    """The drags by page."""
+
+    def __init__(self) -> None:
+        self._drags: dict[int, Drag] = {}
+
+    def __len__(self) -> int:
+        return len(self._drags)
+
+    def begin(self, page: int, number: int, entry: Entry, target: Target) -> None:
+        """A page begins to drag an entry's cages."""
+        self._drags[page] = Drag(number, target, entry, entry)
+
+    def move(self, page: int, number: int, operation: Operation) -> Moved:
+        """How far the drag could follow its operation since the beginning."""
+        drag = self._find(page, number)
+        moved = move(drag.before, drag.target, operation)
+        self._drags[page] = replace(drag, now=replace(drag.before, edit=moved.edit))
+        return moved
+
+    def take(self, page: int, number: int) -> Drag:
+        """The drag, which is over with that. Raises EditError where it was over before."""
+        drag = self._find(page, number)
+        del self._drags[page]
+        return drag
+
+    def cancel(self, page: int) -> bool:
+        """True where the page dragged; it does so no more."""
+        return self._drags.pop(page, None) is not None
+
+    def clear(self) -> None:
+        """All drags are given up."""
+        self._drags.clear()
+
+    def dragged(self, page: int) -> Entry | None:
+        """What the page's drag has become, or None."""
+        drag = self._drags.get(page)
+        return None if drag is None else drag.now
+
+    def shown(self, document: Document) -> Document:
+        """The document as the drags show it."""
+        for drag in self._drags.values():
+            if document.has(drag.now.id):
+                document = document.put(drag.now)
+        return document
+
+    def _find(self, page: int, number: int) -> Drag:
+        drag = self._drags.get(page)
+        if drag is None or drag.number != number:
+            raise EditError("this drag is over: the edit was changed or the server restarted; begin it again")
+        return drag

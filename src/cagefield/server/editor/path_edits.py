@@ -1,0 +1,37 @@
+"""The edits of a document as they are on the way along its camera path: in its video, and in the preview."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from cagefield.edits import Edit
+from cagefield.errors import CagefieldError
+from cagefield.server.editor.document import Document
+from cagefield.server.editor.validity import problem
+
+
+def blended(
+    document: Document,
+    parts: Mapping[int, float],
+    known_problem: Callable[[Edit], str | None] = problem,
+) -> tuple[Edit, ...]:
+    """The edits that are shown, each gone through to its part; a deletion is there from one half on.
+
+    `known_problem` says why a whole edit cannot be shown, as `problem` does.
+
+    Raises CagefieldError where an edit is possible as a whole, but not there.
+    """
+    found = []
+    for entry in document.entries:
+        part = parts.get(entry.id, 1.0)
+        edit = entry.edit
+        if not edit.enabled or known_problem(edit) is not None or (edit.deleted and part < 0.5):
+            continue
+        if part < 1.0:
+            edit = edit.replace(operations=tuple(operation.part(part) for operation in edit.operations))
+            why = problem(edit)
+            if why is not None:
+                raise CagefieldError(f'edit "{edit.name}" is not possible at {part:.0%}: {why}')
+        if edit.changes_anything:
+            found.append(edit)
+    return tuple(found)

@@ -1,0 +1,198 @@
+"""Saving, and what survives a crash. Nothing is overwritten that the user has not asked to be.
+
+Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or
+not at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and
+an editor that is started and finds one restores what it holds.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+from pathlib import Path
+
+from cagefield.edits import dump_edits, parse_edits
+from cagefield.edits.files import save_edits
+from cagefield.errors import CagefieldError, SceneError
+from cagefield.keyframe_files import dump_path, load_keys
+from cagefield.keyframes import Keyframe
+from cagefield.rendering.images import replaced_whole
+from cagefield.scene import Scene
+from cagefield.server.editor.document import Document
+from cagefield.server.editor.session import Session
+
+CAMERA_PATH = "camera_path.json"
+_EDITS = "edits.yaml"
+
+
+class Keeper:
+    """Where a session is kept: the scene's folder, and the autosave beside it.
+
+    `origin` is the folder whose field is rendered, `path` the one that is saved to.
+    """
+
+    def __init__(self, scene: Scene, path: Path) -> None:
+        self.scene = scene
+        self.origin = path.resolve()
+        self.path = path.resolve()
+        self.trouble: str | None = None
+        """Why the last autosave failed, or None."""
+        self._written = self._fingerprint()
+        self._warned = ""
+        self._kept: Document | None = None
+
+    # ---- opening ----
+
+    def document(self) -> Document:
+        """What the scene's folder holds. Raises CagefieldError for a camera path that cannot be read."""
+        keys: tuple[Keyframe, ...] = ()
+        loop = False
+        if (self.path / CAMERA_PATH).is_file():
+            keys, loop = load_keys(self.path / CAMERA_PATH)
+        return Document.of(
+            self.scene.edits, preserve_opacity=self.scene.preserve_opacity, keys=keys, loop=loop
+        )
+
+    def recovered(self) -> Document | None:
+        """What an editor that ended without saving left behind; None where that is nothing new."""
+        try:
+            content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
+            document = _parsed(content)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None
+        return None if document == self.document() else document
+
+    # ---- keeping ----
+
+    @property
+    def autosave_path(self) -> Path:
+        """The hidden file beside the scene."""
+        return self.path.with_name(f".{self.path.name}.cagefield-autosave.json")
+
+    def autosave(self, session: Session) -> None:
+        """Keeps what is not saved yet, if it is not kept already; `trouble` says why it could not be."""
+        document = session.document
+        if document is self._kept:
+            return
+        self._kept = document
+        try:
+            if session.saved:
+                self.autosave_path.unlink(missing_ok=True)
+            else:
+                with replaced_whole(self.autosave_path) as draft:
+                    draft.write_text(json.dumps(_content(document)), encoding="utf-8")
+            self.trouble = None
+        except OSError as error:
+            self.trouble = f"changes cannot be kept in {self.autosave_path} ({error.strerror}); save often"
+
+    def save(self, session: Session) -> None:
+        """Writes the session into its scene's folder.
+
+        Raises SceneError, once, where another program has changed the edits meanwhile; saving again replaces
+        them.
+        """
+        if not self.path.is_dir():
+            raise SceneError(f"{self.path} is not there any more; use Save as, with a new folder")
+        now = self._fingerprint()
+        if now not in (self._written, self._warned):
+            self._warned = now
+            raise SceneError(
+                f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
+            )
+        document = session.document
+        camera_path = dump_path(document.placed_keys, loop=document.loop)
+        save_edits(document.stack, self.path / _EDITS)
+        if document.keys or (self.path / CAMERA_PATH).exists():
+            with replaced_whole(self.path / CAMERA_PATH) as draft:
+                draft.write_text(camera_path, encoding="utf-8")
+        self._scene(document).save_manifest(self.path)
+        self._done(session)
+
+    def save_as(self, session: Session, path: str, overwrite: bool) -> None:
+        """Writes the scene with its edits as another folder, and goes on with that one.
+
+        Raises SceneError where something is there that may not be replaced.
+        """
+        target = Path(path).expanduser()
+        if not target.is_absolute():
+            target = self.path.parent / target
+        if target.resolve() == self.path:
+            self.save(session)
+            return
+        document = session.document
+        camera_path = dump_path(document.placed_keys, loop=document.loop)
+        try:
+            self._scene(document).save(target, overwrite)
+        except SceneError as error:
+            raise SceneError(
+                str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
+            ) from None
+        if document.keys:
+            (target / CAMERA_PATH).write_text(camera_path, encoding="utf-8")
+        with contextlib.suppress(OSError):
+            self.autosave_path.unlink(missing_ok=True)
+        self.path = target.resolve()
+        self._done(session)
+
+    def _done(self, session: Session) -> None:
+        session.mark_saved()
+        self._written, self._warned = self._fingerprint(), ""
+        self._kept = None
+        self.autosave(session)
+
+    def _scene(self, document: Document) -> Scene:
+        return dataclasses.replace(
+            self.scene, edits=document.stack, preserve_opacity=document.preserve_opacity
+        )
+
+    def _fingerprint(self) -> str:
+        try:
+            return hashlib.sha256((self.path / _EDITS).read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
+
+def _content(document: Document) -> dict[str, object]:
+    return {
+        "version": 1,
+        "edits": json.loads(dump_edits(document.stack, format="json")),
+        "locked": [entry.locked for entry in document.entries],
+        "preserve_opacity": document.preserve_opacity,
+        "loop": document.loop,
+        "keys": [
+            {
+                "c2w": list(key.c2w),
+                "fov_y_deg": key.fov_y_deg,
+                "seconds": key.seconds,
+                "parts": {str(name): part for name, part in key.parts.items()},
+            }
+            for key in document.placed_keys
+        ],
+    }
+
+
+def _parsed(content: dict[str, object]) -> Document:
+    """The document of an autosave. Raises ValueError and its like for anything else."""
+    if content["version"] != 1:
+        raise CagefieldError("an autosave of another version")
+    stack = parse_edits(json.dumps(content["edits"]), format="json", source="autosave", check=False)
+    keys = tuple(
+        Keyframe(
+            tuple(key["c2w"]),
+            key["fov_y_deg"],
+            key["seconds"],
+            {int(name): part for name, part in key["parts"].items()},
+        )
+        for key in content["keys"]  # type: ignore[attr-defined]
+    )
+    document = Document.of(
+        stack, preserve_opacity=bool(content["preserve_opacity"]), keys=keys, loop=bool(content["loop"])
+    )
+    locked = content["locked"]
+    entries = tuple(
+        dataclasses.replace(entry, locked=bool(flag))
+        for entry, flag in zip(document.entries, locked, strict=True)  # type: ignore[call-overload]
+    )
+    return dataclasses.replace(document, entries=entries)

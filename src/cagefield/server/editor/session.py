@@ -1,0 +1,374 @@
+"""Session: what several pages edit together. One method per command; no web, no rendering.
+
+A drag works on the edit as it was when the drag began, and becomes one entry of the history when it ends.
+Every method that changes something raises a `CagefieldError` with the cure where it cannot, and then
+changes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits.operations import Operation
+from cagefield.errors import CameraError, EditError
+from cagefield.hexahedron import Array
+from cagefield.keyframe_files import is_path
+from cagefield.keyframes import Keyframe, Timeline
+from cagefield.server.editor.cage_placement import outer_around, pair_around
+from cagefield.server.editor.document import Document, Entry
+from cagefield.server.editor.drag_solver import Moved, Target, move
+from cagefield.server.editor.drags import Drags
+from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
+from cagefield.server.editor.history import History
+from cagefield.server.editor.labels import fresh_name, named, of
+from cagefield.server.editor.mirror import mirrored
+from cagefield.server.editor.path_edits import blended
+from cagefield.server.editor.path_preview import Preview
+from cagefield.server.editor.validity import problem
+
+LATTICE = 64
+"""Lattice nodes along an axis of a new continuous edit."""
+
+
+class Session:
+    """The document with its history, the selection, and the drags that go on."""
+
+    def __init__(self, document: Document, bounds: Array, voxel: float) -> None:
+        """`bounds` [2,3] and `voxel` are the field's, world units."""
+        self.history = History.begin(document)
+        self.bounds = bounds
+        self.voxel = voxel
+        self.selected: int | None = document.entries[-1].id if document.entries else None
+        self.drags = Drags()
+        self.preview: Preview | None = None
+        """What a page plays; over with the next change of the document, or drag."""
+        self.revision = 1
+        self._saved: Document | None = document
+        self._next = max((entry.id for entry in document.entries), default=0) + 1
+        self._problems: list[tuple[Edit, str | None]] = []
+
+    # ---- what is there ----
+
+    @property
+    def document(self) -> Document:
+        """The document as it is, without the drags."""
+        return self.history.state
+
+    @property
+    def shown(self) -> Document:
+        """The document as the drags that go on show it."""
+        return self.drags.shown(self.document)
+
+    @property
+    def moving(self) -> bool:
+        """True while pictures show what is not in the document: drags, or a preview."""
+        return bool(self.drags) or self.preview is not None
+
+    @property
+    def saved(self) -> bool:
+        """True where the document is as it was last saved."""
+        return self.document == self._saved
+
+    def problem(self, edit: Edit) -> str | None:
+        """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
+        for known, found in self._problems:
+            if known is edit:
+                return found
+        found = problem(edit) if edit.changes_anything else None
+        self._problems = [*self._problems[-63:], (edit, found)]
+        return found
+
+    def drawn(self) -> tuple[Edit, ...]:
+        """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
+        if self.preview is not None:
+            return self.preview.edits
+        edits = (entry.edit for entry in self.shown.entries)
+        return tuple(
+            edit for edit in edits if edit.enabled and edit.changes_anything and self.problem(edit) is None
+        )
+
+    def below(self, number: int) -> tuple[Edit, ...]:
+        """The drawn edits before the one of that number: what makes the space its inner cage stands in."""
+        first = self.document.entries[: self.document.place(number)]
+        return tuple(entry.edit for entry in first if entry.edit.enabled and self.problem(entry.edit) is None)
+
+    # ---- drags ----
+
+    def drag_begin(self, page: int, number: int, edit: int, target: Target) -> None:
+        """A page begins to drag; a drag of its own that went on is given up."""
+        self.drag_cancel(page)
+        self.drags.begin(page, number, self._unlocked(edit), target)
+        self.preview = None
+        self.selected = edit
+        self.revision += 1
+
+    def drag(self, page: int, number: int, operation: Operation) -> Moved:
+        """How far the drag could follow its operation since the beginning; it shows that."""
+        moved = self.drags.move(page, number, operation)
+        self._problems = [*self._problems[-63:], (moved.edit, moved.problem)]
+        self.revision += 1
+        return moved
+
+    def drag_end(self, page: int, number: int, operation: Operation) -> Moved:
+        """The same for the last time; becomes an entry of the history.
+
+        Where another page has changed the edit meanwhile, the operation is done to what it is now.
+        """
+        drag = self.drags.take(page, number)
+        self.revision += 1
+        entry = self.document.entry(drag.before.id)
+        moved = move(entry, drag.target, operation)
+        if moved.part > 0.0 and moved.edit != entry.edit:
+            self._put(named(operation, drag.target, entry), replace(entry, edit=moved.edit))
+        return moved
+
+    def drag_cancel(self, page: int) -> None:
+        """The page's drag is given up, if there is one."""
+        if self.drags.cancel(page):
+            self.revision += 1
+
+    # ---- the preview ----
+
+    def play_begin(self, page: int, number: int) -> None:
+        """A page begins to play the camera path, from its beginning; what was played before is over.
+
+        Raises EditError while anybody drags, CagefieldError where the path or an edit on it is not possible.
+        """
+        if self.drags:
+            raise EditError("an edit is being dragged; play the camera path when the drag is over")
+        timeline = Timeline(self.document.keys, loop=self.document.loop)
+        self.preview = Preview(page, number, timeline, self.drawn())
+        self.revision += 1
+        self.play(page, number, 0.0)
+
+    def play(self, page: int, number: int, seconds: float) -> None:
+        """Shows the edits as the video will at a time; nothing where this is not played any more.
+
+        Raises CagefieldError, and the preview is over, where an edit is not possible there.
+        """
+        preview = self.preview
+        if preview is None or not preview.is_of(page, number):
+            return
+        self.preview = None
+        self.revision += 1
+        edits = blended(self.document, preview.parts(seconds), self.problem)
+        self.preview = replace(preview, edits=edits)
+
+    def play_end(self, page: int, number: int | None = None) -> None:
+        """What the page plays is over: that of a number, or whatever it is."""
+        preview = self.preview
+        if preview is not None and preview.is_of(page, preview.number if number is None else number):
+            self.preview = None
+            self.revision += 1
+
+    # ---- operations ----
+
+    def apply(self, number: int, target: Target, operation: Operation) -> Moved:
+        """A whole operation at once. Raises EditError where not all of it is possible."""
+        entry = self.document.entry(number)
+        moved = move(entry, target, operation)
+        if moved.part < 1.0:
+            raise EditError(f"{moved.why}; {moved.part:.0%} of it is possible")
+        self._put(named(operation, target, entry), replace(entry, edit=moved.edit))
+        return moved
+
+    # ---- cages ----
+
+    def set_cage(self, number: int, which: str, cage: Cage) -> None:
+        """The "inner" or "outer" cage by its corners; the field does not move."""
+        entry = self._unlocked(number)
+        edit = entry.edit.replace(**{which: cage})
+        self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
+
+    def place(self, point: Array, view_height: float) -> int:
+        """The number of a new continuous edit, selected, its cages around a point [3] of a surface."""
+        inner, outer = pair_around(point, view_height, self.bounds, self.voxel)
+        edit = Edit(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
+        return self._add("Place cages", edit)
+
+    def fit_inner(self, number: int, inner: Cage) -> None:
+        """The inner cage as it was fitted to its content."""
+        entry = self._unlocked(number)
+        self._put(f"Fit inner cage{of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
+
+    def outer_margin(self, number: int, margin: float) -> None:
+        """The outer cage as a margin around all that the inner cage is and was."""
+        entry = self._unlocked(number)
+        outer = outer_around(entry.edit, margin)
+        self._put(f"Outer margin{of(entry)}", replace(entry, edit=entry.edit.replace(outer=outer)))
+
+    # ---- options and the list ----
+
+    def change(
+        self,
+        number: int,
+        *,
+        kind: Kind | None = None,
+        shell: str | None = None,
+        locked: bool | None = None,
+        **options: object,
+    ) -> None:
+        """An edit's options; `options` are fields of `Edit`: name, enabled, falloff, width, lattice."""
+        before = self.document.entry(number)
+        entry = before if locked is None else replace(before, locked=locked)
+        if entry.locked and (kind or shell or set(options) - {"enabled"}):
+            raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
+        entry = entry if kind is None else with_kind(entry, kind)
+        entry = entry if shell is None else with_shell(entry, shell)
+        entry = replace(entry, edit=entry.edit.replace(**options))
+        words = [
+            word for word, value in (("kind", kind), ("shell", shell), ("lock", locked)) if value is not None
+        ]
+        if options.get("enabled") is not None:
+            words.append("show" if options["enabled"] else "hide")
+        words += [name for name in options if name != "enabled"]
+        if entry != before:
+            self._put(f"{', '.join(words).capitalize()}{of(before)}", entry)
+
+    def preserve_opacity(self, value: bool) -> None:
+        """Whether density is scaled with the map, for all edits."""
+        if value != self.document.preserve_opacity:
+            self._push("Preserve opacity", replace(self.document, preserve_opacity=value))
+
+    def select(self, number: int | None) -> None:
+        """What all pages show as selected; no entry of the history."""
+        if number is not None:
+            self.document.entry(number)
+        self.selected = number
+        self.revision += 1
+
+    def duplicate(self, number: int) -> int:
+        """The number of a copy of an edit, after it."""
+        entry = self.document.entry(number)
+        edit = entry.edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
+        return self._add(f"Duplicate{of(entry)}", edit, at=self.document.place(number) + 1)
+
+    def mirror(self, number: int, axis: int) -> int:
+        """The number of a mirrored copy of an edit, across the plane through the field's middle."""
+        entry = self.document.entry(number)
+        edit = mirrored(entry.edit, axis, float(self.bounds[:, axis].mean()))
+        edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
+        return self._add(f"Mirror{of(entry)}", edit, at=self.document.place(number) + 1)
+
+    def remove(self, number: int) -> None:
+        """An edit goes; the one beside it is selected."""
+        entry = self._unlocked(number)
+        at = self.document.place(number)
+        document = self.document.without(number)
+        self._push(f"Remove{of(entry)}", document)
+        rest = document.entries
+        self.selected = rest[min(at, len(rest) - 1)].id if rest else None
+
+    def reorder(self, number: int, to: int) -> None:
+        """An edit goes to another place in the stack, 0 first."""
+        entry = self.document.entry(number)
+        document = self.document.moved(number, to)
+        if document != self.document:
+            self._push(f"Reorder{of(entry)}", document)
+
+    def reset_operations(self, number: int) -> None:
+        """The inner cage goes back to where it was set."""
+        entry = self._unlocked(number)
+        if entry.edit.operations:
+            self._put(f"Reset{of(entry)}", replace(entry, edit=entry.edit.replace(operations=())))
+
+    def remove_last_operation(self, number: int) -> None:
+        """The last operation of an edit goes."""
+        entry = self._unlocked(number)
+        if entry.edit.operations:
+            edit = entry.edit.replace(operations=entry.edit.operations[:-1])
+            self._put(f"Remove last operation{of(entry)}", replace(entry, edit=edit))
+
+    # ---- texts, path, history ----
+
+    def edit_text(self, number: int) -> str:
+        """An edit as the text of an edit file, to be copied."""
+        return dump_edits(EditStack([self.document.entry(number).edit]))
+
+    def load_edits(self, text: str, append: bool) -> int:
+        """How many edits a text held; they replace the stack, or are appended to it.
+
+        Raises EditFileError for a text that holds no edits, CameraError for a camera path's.
+        """
+        if is_path(text):
+            raise CameraError(
+                "this is a camera path, and no edits; save it as camera_path.json in the scene's folder, "
+                "then start the editor again"
+            )
+        form = "json" if text.lstrip().startswith("{") else "yaml"
+        edits = list(parse_edits(text, format=form, source="the text", check=False))
+        document = self.document if append else replace(self.document, entries=())
+        for edit in edits:
+            document = document.insert(self._entry(edit, document))
+        self._push("Paste" if append else "Load edits", document)
+        self.selected = document.entries[-1].id if document.entries else None
+        return len(edits)
+
+    def set_path(self, keys: tuple[Keyframe, ...], loop: bool) -> None:
+        """The camera path's keyframes."""
+        document = replace(self.document, keys=keys, loop=loop)
+        if document != self.document:
+            self._push("Camera path", document)
+
+    def restore(self, document: Document) -> None:
+        """Changes that were not saved before a crash, as one entry."""
+        self._next = max([self._next, *(entry.id + 1 for entry in document.entries)])
+        self._push("Restore unsaved changes", document)
+        self.selected = document.entries[-1].id if document.entries else None
+
+    def undo(self) -> None:
+        """One entry of the history back."""
+        self._travel(History.undo)
+
+    def redo(self) -> None:
+        """One entry of the history on."""
+        self._travel(History.redo)
+
+    def go_to(self, entry: int) -> None:
+        """To an entry of the history."""
+        self._travel(lambda history: history.go_to(entry))
+
+    def mark_saved(self) -> None:
+        """What is now is what is saved."""
+        self._saved = self.document
+        self.revision += 1
+
+    # ---- inside ----
+
+    def _travel(self, step: Callable[[History[Document]], History[Document]]) -> None:
+        self.drags.clear()
+        self.preview = None
+        self.history = step(self.history)
+        if not self.document.has(self.selected):
+            entries = self.document.entries
+            self.selected = entries[-1].id if entries else None
+        self.revision += 1
+
+    def _unlocked(self, number: int) -> Entry:
+        entry = self.document.entry(number)
+        if entry.locked:
+            raise EditError(f'edit "{entry.edit.name}" is locked; unlock it to change it')
+        return entry
+
+    def _entry(self, edit: Edit, document: Document) -> Entry:
+        number = self._next
+        self._next += 1
+        return Entry(number, edit, document.next_colour)
+
+    def _add(self, name: str, edit: Edit, at: int | None = None) -> int:
+        entry = self._entry(edit, self.document)
+        self._push(name, self.document.insert(entry, at))
+        self.selected = entry.id
+        return entry.id
+
+    def _put(self, name: str, entry: Entry) -> None:
+        self._push(name, self.document.put(entry))
+        self.selected = entry.id
+
+    def _push(self, name: str, document: Document) -> None:
+        self.preview = None
+        self.history = self.history.push(name, document)
+        self.revision += 1

@@ -1,0 +1,259 @@
+"""What the editor's page says to its server; see `common`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field, TypeAdapter
+
+from cagefield.server.protocol.common import (
+    MOST_BYTES,
+    CameraMessage,
+    Corners,
+    EditId,
+    Key,
+    Kind,
+    Message,
+    Target,
+    Text,
+    View,
+)
+from cagefield.server.protocol.operation_messages import OperationMessage
+
+
+class LookMessage(Message):
+    """What is shown: a view; `before` leaves the edits out, `split` left of a share of the width."""
+
+    type: Literal["look"] = "look"
+    view: View = "colour"
+    before: bool = False
+    split: Annotated[float, Field(ge=0, le=1)] | None = None
+
+
+class PresentedMessage(Message):
+    """The page has shown a picture; until then the server sends at most one more."""
+
+    type: Literal["presented"] = "presented"
+    picture: int
+
+
+class DragBegin(Message):
+    """A drag of an edit's cages begins."""
+
+    type: Literal["drag_begin"] = "drag_begin"
+    drag: Annotated[int, Field(ge=1)]
+    edit: EditId
+    target: Target
+
+
+class DragMove(Message):
+    """Where the drag is: the whole operation since its beginning."""
+
+    type: Literal["drag"] = "drag"
+    drag: int
+    seq: Annotated[int, Field(ge=0)]
+    operation: OperationMessage
+
+
+class DragEnd(Message):
+    """The drag ends with this operation, which becomes one entry of the history."""
+
+    type: Literal["drag_end"] = "drag_end"
+    drag: int
+    seq: Annotated[int, Field(ge=0)]
+    operation: OperationMessage
+
+
+class DragCancel(Message):
+    """The drag is given up: everything as before it."""
+
+    type: Literal["drag_cancel"] = "drag_cancel"
+    drag: int
+
+
+class PlayBegin(Message):
+    """The page plays the camera path: pictures show the edits as its video will, at its beginning first."""
+
+    type: Literal["play_begin"] = "play_begin"
+    play: Annotated[int, Field(ge=1)]
+
+
+class Play(Message):
+    """Where on the path the page is; passed over where that preview is over."""
+
+    type: Literal["play"] = "play"
+    play: int
+    seconds: Annotated[float, Field(ge=0, le=1e7)]
+
+
+class PlayEnd(Message):
+    """The page plays no more: pictures show the edits as they are."""
+
+    type: Literal["play_end"] = "play_end"
+    play: int
+
+
+class Apply(Message):
+    """A whole operation at once, from numeric fields."""
+
+    type: Literal["apply"] = "apply"
+    edit: EditId
+    target: Target
+    operation: OperationMessage
+
+
+class SetCage(Message):
+    """A cage's corners by number, in Set mode: nothing of the field moves."""
+
+    type: Literal["set_cage"] = "set_cage"
+    edit: EditId
+    cage: Literal["inner", "outer"]
+    corners: Corners
+
+
+class Place(Message):
+    """A new edit: a cage pair around the surface seen at a pixel (x, y in [0,1] of the camera's picture).
+
+    Without a pixel it goes around the middle of what the camera sees.
+    """
+
+    type: Literal["place"] = "place"
+    x: Annotated[float, Field(ge=0, le=1)] | None = None
+    y: Annotated[float, Field(ge=0, le=1)] | None = None
+
+
+class FitInner(Message):
+    """Shrinks the inner cage to the dense region inside it."""
+
+    type: Literal["fit_inner"] = "fit_inner"
+    edit: EditId
+
+
+class OuterMargin(Message):
+    """Makes the outer cage a margin around everything the inner cage is and was."""
+
+    type: Literal["outer_margin"] = "outer_margin"
+    edit: EditId
+    margin: Annotated[float, Field(gt=0, lt=1e6)]
+
+
+class Change(Message):
+    """Changes an edit's options; what is left out stays."""
+
+    type: Literal["change"] = "change"
+    edit: EditId
+    name: Text | None = None
+    enabled: bool | None = None
+    locked: bool | None = None
+    kind: Kind | None = None
+    shell: Literal["flow", "trilinear"] | None = None
+    falloff: Literal["smooth", "linear"] | None = None
+    width: Annotated[float, Field(gt=0, le=1)] | None = None
+    lattice: Annotated[int, Field(ge=0, le=512)] | None = Field(default=None, description="0: exact")
+
+
+class SceneChange(Message):
+    """Changes what holds for all edits."""
+
+    type: Literal["scene_change"] = "scene_change"
+    preserve_opacity: bool
+
+
+class Command(Message):
+    """What has no more than an edit to say."""
+
+    type: Literal["command"] = "command"
+    name: Literal[
+        "undo", "redo", "save", "duplicate", "remove", "select", "reset_operations", "remove_last_operation"
+    ]
+    edit: EditId | None = None
+
+
+class Mirror(Message):
+    """A mirrored copy of an edit's cages and operations, across the plane through the scene's middle."""
+
+    type: Literal["mirror"] = "mirror"
+    edit: EditId
+    axis: Literal["x", "y", "z"]
+
+
+class Reorder(Message):
+    """Puts an edit at another place in the stack, 0 first."""
+
+    type: Literal["reorder"] = "reorder"
+    edit: EditId
+    to: Annotated[int, Field(ge=0)]
+
+
+class GoTo(Message):
+    """Goes to an entry of the history, 0 the beginning."""
+
+    type: Literal["go_to"] = "go_to"
+    entry: Annotated[int, Field(ge=0)]
+
+
+class SaveAs(Message):
+    """Saves the scene, edits included, as a new folder on the server's machine."""
+
+    type: Literal["save_as"] = "save_as"
+    path: Annotated[str, Field(min_length=1, max_length=1000)]
+    overwrite: bool = False
+
+
+class LoadEdits(Message):
+    """An edit file's text: replaces the stack, or (paste) is appended to it."""
+
+    type: Literal["load_edits"] = "load_edits"
+    text: Annotated[str, Field(max_length=MOST_BYTES)]
+    append: bool = False
+
+
+class Ask(Message):
+    """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
+
+    The "path" is the camera path between its keyframes, as its video goes.
+    """
+
+    type: Literal["ask"] = "ask"
+    request: int
+    what: Literal["surface", "edit_text", "grid", "path"]
+    x: Annotated[float, Field(ge=0, le=1)] = 0.5
+    y: Annotated[float, Field(ge=0, le=1)] = 0.5
+    edit: EditId | None = None
+
+
+class SetPath(Message):
+    """The camera path's keyframes; saved with the scene."""
+
+    type: Literal["set_path"] = "set_path"
+    keys: Annotated[list[Key], Field(max_length=500)]
+    loop: bool = False
+
+
+class RenderJob(Message):
+    """Renders the test views to PNGs in a folder, or the camera path to an MP4; in the background."""
+
+    type: Literal["render"] = "render"
+    what: Literal["test_views", "camera_path"]
+    out: Annotated[str, Field(min_length=1, max_length=1000)]
+    width: Annotated[int, Field(ge=16, le=4096)] = 800
+    height: Annotated[int, Field(ge=16, le=4096)] = 800
+    fps: Annotated[float, Field(gt=0, le=120)] = 24.0
+    overwrite: bool = False
+
+
+class CancelJob(Message):
+    """Stops a job; what it wrote of its file is removed."""
+
+    type: Literal["cancel_job"] = "cancel_job"
+    job: int
+
+
+PageMessage: TypeAlias = Annotated[
+    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | PlayBegin
+    | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange | Command
+    | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
+    Field(discriminator="type"),
+]  # fmt: skip
+
+page_messages: TypeAdapter[PageMessage] = TypeAdapter(PageMessage)

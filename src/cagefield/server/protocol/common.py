@@ -1,0 +1,69 @@
+"""What the editor's page and its server say to each other: how they say it, and what both say.
+
+`client_messages` has what pages say, `server_messages` what the server answers; the page's types are made
+from these.
+
+One WebSocket per page carries text messages, one JSON object each, with a `type`; and, from server to page,
+pictures as binary messages (see `server_messages.PictureHeader`). Lengths are world units, angles degrees;
+c2w is OpenGL camera-to-world, row by row; pixels are counted from the left and the top. Cages are given by
+their 8 corners, corner k = x + 2y + 4z.
+
+A drag goes: `drag_begin`, any number of `drag` (each states the whole operation since the beginning, so
+the server may skip all but the newest), then `drag_end` or `drag_cancel`. The server answers with `dragged`:
+how much of the operation could be followed, and where the cages then are.
+
+A page plays the camera path so: `play_begin`, then `play` with each camera on the way, then `play_end`. All
+pages are told with `preview` that it began, and that it is over, also where something else has ended it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+Vec3: TypeAlias = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Corners: TypeAlias = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
+Pose: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=16, max_length=16)]
+Axes: TypeAlias = Literal["world", "cage"]
+View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
+Kind: TypeAlias = Literal["continuous", "move", "copy", "delete"]
+Target: TypeAlias = Literal["field", "inner", "outer", "both"]
+"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode).
+
+"both" turns and scales both cages about the inner cage's pivot.
+"""
+
+Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
+Text: TypeAlias = Annotated[str, Field(max_length=200)]
+EditId: TypeAlias = Annotated[int, Field(ge=1)]
+
+MOST_BYTES = 1 << 20
+"""Largest message that is taken from a page."""
+
+
+class Message(BaseModel):
+    """A message, or a part of one: no unknown keys, no changes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CameraMessage(Message):
+    """What the page looks from; `moving` while the mouse turns the view."""
+
+    type: Literal["camera"] = "camera"
+    seq: Annotated[int, Field(ge=0)]
+    c2w: Pose
+    width: Annotated[int, Field(ge=16, le=4096)]
+    height: Annotated[int, Field(ge=16, le=4096)]
+    fov_y_deg: Annotated[float, Field(gt=0.1, lt=179.0)]
+    moving: bool = False
+
+
+class Key(Message):
+    """A keyframe of a camera path: a camera, and how far each edit has gone (1 where it is not named)."""
+
+    c2w: Pose
+    fov_y_deg: FiniteFloat
+    seconds: FiniteFloat = 2.0
+    parts: dict[int, FiniteFloat] = {}

@@ -1,0 +1,162 @@
+"""Between what is said on the socket and what is edited: operations, cages, keyframes, the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import operations as ops
+from cagefield.edits.operations import Operation
+from cagefield.errors import CameraError
+from cagefield.hexahedron import Array
+from cagefield.keyframes import Keyframe, Timeline
+from cagefield.server.editor.document import Entry
+from cagefield.server.editor.drag_solver import Moved, move_corners
+from cagefield.server.editor.edit_kinds import kind_of
+from cagefield.server.editor.session import Session
+from cagefield.server.protocol import client_messages, common, operation_messages, server_messages
+from cagefield.server.protocol.common import Corners, Vec3
+
+STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
+"""How densely pages are told of a camera path; a longer one has them further apart."""
+
+
+def operation_of(message: operation_messages.OperationMessage) -> Operation:
+    """The operation that a message states."""
+    if isinstance(message, operation_messages.TranslateBy):
+        return ops.Translate(message.by)
+    if isinstance(message, operation_messages.RotateBy):
+        return ops.Rotate(message.rotation_deg, message.axes)
+    if isinstance(message, operation_messages.ScaleBy):
+        return ops.Scale.of(message.by, message.axes)
+    if isinstance(message, operation_messages.ShearBy):
+        return ops.Shear(
+            message.xy, message.xz, message.yx, message.yz, message.zx, message.zy, axes=message.axes
+        )
+    return move_corners(tuple(message.corners), message.by)
+
+
+def camera_of(message: common.CameraMessage) -> Camera:
+    """The camera that a page looks from. Raises CameraError for a pose that is not rigid."""
+    focal = 0.5 * message.height / float(np.tan(0.5 * np.radians(message.fov_y_deg)))
+    return Camera(
+        np.array(message.c2w).reshape(4, 4),
+        message.width, message.height, focal, focal, 0.5 * message.width, 0.5 * message.height,
+    )  # fmt: skip
+
+
+def keys_of(message: client_messages.SetPath) -> tuple[Keyframe, ...]:
+    """The keyframes that a message states. Raises CameraError for impossible ones."""
+    return tuple(_key_of(key, number) for number, key in enumerate(message.keys, start=1))
+
+
+def _key_of(key: common.Key, number: int) -> Keyframe:
+    try:
+        return Keyframe(tuple(key.c2w), key.fov_y_deg, key.seconds, dict(key.parts))
+    except CameraError as error:
+        raise CameraError(f"the camera path is not taken: keyframe {number}: {error}") from None
+
+
+def stills_of(keys: Sequence[Keyframe], loop: bool) -> list[server_messages.Still]:
+    """The camera path as pages play it. Raises CameraError where it does not move."""
+    line = Timeline(keys, loop=loop)
+    count = min(max(2, round(line.seconds * STILLS_PER_SECOND) + 1), MOST_STILLS)
+    at = np.linspace(0.0, line.seconds, count)
+    poses = line.poses(at).reshape(-1, 16).tolist()
+    return [
+        server_messages.Still(c2w=c2w, fov_y_deg=fov)
+        for c2w, fov in zip(poses, line.fovs_y_deg(at).tolist(), strict=True)
+    ]
+
+
+def vec3(value: Array) -> Vec3:
+    """A point as a message has it."""
+    x, y, z = value.tolist()
+    return x, y, z
+
+
+def corners(cage: Cage) -> Corners:
+    """A cage as a message has it."""
+    return cast(Corners, tuple(vec3(corner) for corner in cage.corners))
+
+
+def edit_state(
+    entry: Entry, problem: str | None, error: tuple[float, float] | None
+) -> server_messages.EditState:
+    """One edit as pages show it; `error` is its lattice's, in voxels."""
+    edit = entry.edit
+    return server_messages.EditState(
+        id=entry.id,
+        name=edit.name,
+        colour=entry.colour,
+        enabled=edit.enabled,
+        locked=entry.locked,
+        kind=kind_of(edit),
+        shell=cast(Any, edit.shell),
+        falloff=cast(Any, edit.falloff),
+        width=edit.width,
+        lattice=edit.lattice or 0,
+        lattice_error=error,
+        inner=corners(edit.inner),
+        deformed=corners(edit.deformed),
+        outer=None if edit.outer is None else corners(edit.outer),
+        pivot=vec3(edit.deformed.pivot),
+        inner_pivot=vec3(edit.inner.pivot),
+        outer_pivot=None if edit.outer is None else vec3(edit.outer.pivot),
+        operations=[f"{operation.noun} {operation}" for operation in edit.operations],
+        problem=problem,
+    )
+
+
+def state_of(
+    session: Session, path: str, pictured: int, errors: dict[int, tuple[float, float]]
+) -> server_messages.State:
+    """Everything that pages show of the edits, drags included; `errors` of lattices by edit, where known."""
+    document = session.shown
+    return server_messages.State(
+        revision=session.revision,
+        pictured=pictured,
+        edits=[
+            edit_state(entry, session.problem(entry.edit), errors.get(entry.id)) for entry in document.entries
+        ],
+        selected=session.selected,
+        history=list(session.history.names),
+        entry=session.history.entry,
+        saved=session.saved,
+        path=path,
+        preserve_opacity=document.preserve_opacity,
+        keys=[
+            common.Key(c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts))
+            for key in document.keys
+        ],
+        loop=document.loop,
+    )
+
+
+def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
+    """What became of a drag."""
+    edit = moved.edit
+    return server_messages.Dragged(
+        drag=drag,
+        seq=seq,
+        part=moved.part,
+        why=moved.why,
+        inner=corners(edit.inner),
+        deformed=corners(edit.deformed),
+        outer=None if edit.outer is None else corners(edit.outer),
+    )
+
+
+def view_height(camera: Camera, distance: float) -> float:
+    """Height of what a picture shows at a distance from its camera."""
+    return camera.height / camera.fy * distance
+
+
+def cage_of(corners: Corners, pivot: Array | None = None) -> Cage:
+    """The cage with these corners."""
+    values = np.array(corners)
+    return Cage(values) if pivot is None else Cage(values, pivot=pivot)

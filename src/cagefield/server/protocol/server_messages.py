@@ -1,0 +1,199 @@
+"""What the editor's server says to its pages; see `common`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from cagefield.server.protocol.common import (
+    CameraMessage,
+    Corners,
+    EditId,
+    Key,
+    Kind,
+    Message,
+    Pose,
+    Vec3,
+    View,
+)
+
+
+class Hello(Message):
+    """The first message: what is being edited. `page` names this page among those that are open."""
+
+    type: Literal["hello"] = "hello"
+    version: str
+    page: int
+    name: str
+    bounds: tuple[Vec3, Vec3]
+    voxel: float
+    up: Vec3
+    start: CameraMessage
+    cameras: list[Pose]
+    """Test cameras, or the training ones, to jump to."""
+
+
+class EditState(Message):
+    """One edit as pages show it; corners in world units, deformed: the inner cage after its operations."""
+
+    id: EditId
+    name: str
+    colour: str
+    enabled: bool
+    locked: bool
+    kind: Kind
+    shell: Literal["flow", "trilinear"]
+    falloff: Literal["smooth", "linear"]
+    width: float
+    lattice: int
+    """Nodes along an axis, 0 where it is exact."""
+    lattice_error: tuple[float, float] | None
+    """(max, mean) in voxels, once measured."""
+    inner: Corners
+    deformed: Corners
+    outer: Corners | None
+    pivot: Vec3
+    inner_pivot: Vec3
+    outer_pivot: Vec3 | None
+    operations: list[str]
+    problem: str | None
+    """Why the edit cannot be shown, in a sentence with its cure; it is left out of the picture until then."""
+
+
+class State(Message):
+    """Everything that pages show of the edits; sent to all pages after each change."""
+
+    type: Literal["state"] = "state"
+    revision: int
+    pictured: int
+    """The first revision whose picture is that of this one."""
+    edits: list[EditState]
+    selected: EditId | None
+    history: list[str]
+    """What was done, oldest first; entry 0 is the beginning."""
+    entry: int
+    """Where in the history we are; entries after it can be redone."""
+    saved: bool
+    path: str
+    preserve_opacity: bool
+    keys: list[Key]
+    loop: bool
+
+
+class Dragged(Message):
+    """What became of a `drag`: `part` of the operation was followed; `why` where that is less than all."""
+
+    type: Literal["dragged"] = "dragged"
+    drag: int
+    seq: int
+    part: float
+    why: str | None
+    inner: Corners
+    deformed: Corners
+    outer: Corners | None
+
+
+class Still(Message):
+    """A camera on the camera path."""
+
+    c2w: Pose
+    fov_y_deg: float
+
+
+class Answer(Message):
+    """The answer to an `ask`: a point and its normal, a text, a grid, or the path; or nothing."""
+
+    type: Literal["answer"] = "answer"
+    request: int
+    point: Vec3 | None = None
+    normal: Vec3 | None = None
+    text: str | None = None
+    grid: list[list[Vec3]] = Field(default_factory=list)
+    """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
+    stills: list[Still] = Field(default_factory=list)
+    """The path's cameras, evenly spread over its time, from its beginning to its end."""
+    failed: bool = False
+    """True where it could not be found out; a notice says why."""
+
+
+class Notice(Message):
+    """A line for the user."""
+
+    type: Literal["notice"] = "notice"
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
+class Preview(Message):
+    """A page's preview of the camera path has begun, or is over; `play` is that page's number for it."""
+
+    type: Literal["preview"] = "preview"
+    page: int
+    play: int
+    on: bool
+
+
+class Preparing(Message):
+    """How much of the renderer is ready: what a machine's first run compiles, later ones load."""
+
+    type: Literal["preparing"] = "preparing"
+    done: int
+    of: int
+
+
+class Job(Message):
+    """How far a background job is."""
+
+    type: Literal["job"] = "job"
+    job: int
+    what: Literal["test_views", "camera_path"]
+    state: Literal["running", "done", "cancelled", "failed"]
+    done: int
+    total: int
+    out: str
+    text: str = ""
+
+
+ServerMessage: TypeAlias = Annotated[
+    Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job, Field(discriminator="type")
+]
+
+
+class PictureHeader(Message):
+    """Heads a binary message: uint32 (little endian) length of this JSON, the JSON, the picture, the depth.
+
+    The picture is a JPEG of `width` x `height` or, where it is small, its RGB bytes row by row: the part at
+    (x, y) of a picture of full_width x full_height that covers the page's view; smaller ones are stretched.
+    `depth_bytes` of uint16 (little endian, row by row, depth_width x depth_height, over the same part) follow
+    it: distance along the ray = value * depth_scale, 65535 where there is nothing.
+    """
+
+    type: Literal["picture"] = "picture"
+    picture: int
+    camera: int
+    """`seq` of the camera that it shows."""
+    drag: int
+    seq: int
+    """The drag, and its newest `seq`, that it shows; 0, 0 where none goes on."""
+    revision: int
+    view: View
+    before: bool
+    split: float | None
+    x: int
+    y: int
+    width: int
+    height: int
+    full_width: int
+    full_height: int
+    final: bool
+    """True for the last part of a full-resolution picture."""
+    format: Literal["jpeg", "rgb"]
+    picture_bytes: int
+    depth_bytes: int
+    depth_width: int
+    depth_height: int
+    depth_scale: float
+    render_ms: float
+    """Time in the renderer, map and occupancy included."""
+    encode_ms: float

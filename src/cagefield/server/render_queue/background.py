@@ -1,0 +1,180 @@
+"""Chores: what the rendering process does when no page waits for a picture. Making its kernels ready, then
+measuring the lattices of edits, then the pictures of background jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from cagefield.edits import Edit
+from cagefield.errors import CagefieldError
+from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.session import Session
+from cagefield.server.protocol import client_messages, server_messages
+from cagefield.server.render_queue import jobs
+from cagefield.server.render_queue.dispatcher import Chore
+from cagefield.server.render_queue.jobs import Job
+from cagefield.server.render_worker.tasks import (
+    WARM_STAGES,
+    Answered,
+    EndJobTask,
+    ErrorTask,
+    Failed,
+    Result,
+    Stopped,
+    WarmTask,
+    values_of,
+)
+
+Errors = tuple[float, float]
+
+
+class Chores:
+    """Hands out one chore after the other."""
+
+    def __init__(
+        self,
+        session: Session,
+        keeper: Keeper,
+        measured: Callable[[], None],
+        tell: Callable[[server_messages.ServerMessage], None],
+    ) -> None:
+        """`measured` is called when a lattice was, `tell` with jobs' progress for all pages."""
+        self._session, self._keeper = session, keeper
+        self._measured, self._tell = measured, tell
+        self._warmed, self._warming = 0, 0
+        self._errors: list[tuple[Edit, Errors | None]] = []
+        self._jobs: list[Job] = []
+        self._ending: list[EndJobTask] = []
+        self._numbers = 0
+
+    def next(self, generation: int) -> Chore | None:
+        """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
+        if self._warming < WARM_STAGES:
+            return self._warm()
+        edit = self._unmeasured()
+        if edit is not None:
+            return self._measure(edit, generation)
+        if self._ending:
+            task = self._ending.pop(0)
+            return Chore(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
+        return self._picture(generation) if self._jobs else None
+
+    # ---- kernels ----
+
+    def preparing(self) -> server_messages.Preparing:
+        """How many of the stages of `Studio.warm` are done."""
+        return server_messages.Preparing(done=self._warmed, of=WARM_STAGES)
+
+    def _warm(self) -> Chore:
+        stage = self._warming
+        self._warming += 1
+
+        def done(_: Result) -> None:
+            self._warmed += 1
+            self._tell(self.preparing())
+
+        return Chore(lambda number: WarmTask(number, stage), done)
+
+    # ---- lattices ----
+
+    def errors(self) -> dict[int, Errors]:
+        """(max, mean) error of each edit's lattice by its number, voxels, where it is known."""
+        found = {}
+        for entry in self._session.shown.entries:
+            for edit, error in self._errors:
+                if edit is entry.edit and error is not None:
+                    found[entry.id] = error
+        return found
+
+    def _unmeasured(self) -> Edit | None:
+        if self._session.moving:
+            return None
+        known = [edit for edit, _ in self._errors]
+        edits = (edit for edit in self._session.drawn() if edit.lattice and edit.adjustment == "continuous")
+        return next((edit for edit in edits if not any(edit is other for other in known)), None)
+
+    def _measure(self, edit: Edit, generation: int) -> Chore:
+        values = values_of((edit,))[0]
+
+        def done(result: Result) -> None:
+            if isinstance(result, Stopped):
+                return
+            error = result.value if isinstance(result, Answered) else None
+            self._errors = [*self._errors[-63:], (edit, error)]
+            if error is not None:
+                self._measured()
+
+        return Chore(lambda number: ErrorTask(number, values, generation), done)
+
+    # ---- jobs ----
+
+    def jobs(self) -> list[server_messages.Job]:
+        """How far the jobs that go on are."""
+        return [_message(job, "running") for job in self._jobs]
+
+    def render(self, message: client_messages.RenderJob) -> None:
+        """Begins a job. Raises CagefieldError where it could not write its result."""
+        out = Path(message.out).expanduser()
+        if not out.is_absolute():
+            out = self._keeper.path.parent / out
+        self._numbers += 1
+        document, size = self._session.document, (message.width, message.height)
+        if message.what == "camera_path":
+            job = jobs.camera_path(self._numbers, document, out, size, message.fps, message.overwrite)
+        else:
+            cameras = self._keeper.scene.cameras
+            views = cameras.get("test") or next((c for c in cameras.values() if c), ())
+            job = jobs.test_views(self._numbers, document, views, out, size, message.overwrite)
+        self._jobs.append(job)
+        self._tell(_message(job, "running"))
+
+    def cancel(self, number: int) -> None:
+        """Ends a job. Raises CagefieldError where it is over already."""
+        job = next((job for job in self._jobs if job.number == number), None)
+        if job is None:
+            raise CagefieldError(f"job {number} is over already")
+        self._end(job, "cancelled", "")
+
+    def _picture(self, generation: int) -> Chore | None:
+        job = self._jobs[0]
+        try:
+            job.task(0, generation)
+        except CagefieldError as error:
+            self._end(job, "failed", str(error))
+            return self.next(generation)
+
+        def done(result: Result) -> None:
+            if job not in self._jobs:
+                return
+            if isinstance(result, Failed):
+                self._end(job, "failed", result.text)
+            elif isinstance(result, Answered):
+                job.done += 1
+                if job.done == job.total:
+                    self._end(job, "done", "")
+                else:
+                    self._tell(_message(job, "running"))
+
+        return Chore(lambda number: job.task(number, generation), done)
+
+    def _end(self, job: Job, state: str, text: str) -> None:
+        self._jobs.remove(job)
+        self._ending.append(EndJobTask(0, job.number, keep=state == "done"))
+        if state == "cancelled" and job.what == "test_views" and job.done:
+            text = f"{job.done} pictures were written and are kept"
+        self._tell(_message(job, state, text))
+
+
+def _message(job: Job, state: str, text: str = "") -> server_messages.Job:
+    return server_messages.Job.model_validate(
+        {
+            "job": job.number,
+            "what": job.what,
+            "state": state,
+            "done": job.done,
+            "total": job.total,
+            "out": str(job.out),
+            "text": text,
+        }
+    )

@@ -1,0 +1,281 @@
+"""Hub: one session, several pages, one rendering process. Says what is rendered, and to whom it goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.fields.splat import SplatField
+from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.session import Session
+from cagefield.server.protocol import server_messages
+from cagefield.server.protocol.conversion import state_of
+from cagefield.server.protocol.message_queues import Outbox
+from cagefield.server.render_queue.background import Chores
+from cagefield.server.render_queue.damage import WHOLE, Rect, seen
+from cagefield.server.render_queue.dispatcher import Chore, Desk, Level, Stamp
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.splat_extent import spread
+from cagefield.server.render_worker.pictures import Look
+from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Task, values_of
+
+
+@dataclass
+class Page:
+    """An open page: what it looks at and what waits to be sent to it."""
+
+    number: int
+    outbox: Outbox = field(default_factory=Outbox)
+    camera: Camera | None = None
+    look: Look = field(default_factory=Look)
+    drag: int = 0
+    seq: int = 0
+
+    def notice(self, level: Level, text: str) -> None:
+        """A line for this page's user."""
+        self.outbox.put(server_messages.Notice(level=level, text=" ".join(text.split())))
+
+
+class Hub:
+    """See the module."""
+
+    def __init__(self, session: Session, keeper: Keeper, device: str = "auto") -> None:
+        self.session = session
+        self.keeper = keeper
+        self.pages: dict[int, Page] = {}
+        shown = keeper.scene.field
+        self._spread = spread(shown) if isinstance(shown, SplatField) else 0.0
+        """How far beside where an edit maps points its content shows, world units."""
+        self.desk = Desk(str(keeper.origin), device, self, whole_at_rest=self._spread > 0.0)
+        self.chores = Chores(session, keeper, self._measured, self.broadcast)
+        self.greeting: str | None = None
+        """A line for the pages that come."""
+        self._pages = 0
+        self._shown = self._what_is_shown()
+        self._drawn = session.drawn()
+        self._shown_revision = session.revision
+        """The revision that `_shown` was taken from."""
+        self._pictured = session.revision
+        """The first revision that is shown as `_shown`."""
+        self._pictures = 0
+        self._stacks: dict[int, tuple[EditStack, bool]] = {}
+        """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
+        self._trouble: str | None = None
+        self._preview: tuple[int, int] | None = None
+        """The page and the number of the preview that pages were told of."""
+
+    # ---- pages ----
+
+    def join(self, hello: server_messages.Hello) -> Page:
+        """A new page, told what there is."""
+        self._pages += 1
+        page = Page(self._pages)
+        self.pages[page.number] = page
+        self.desk.scheduler.join(page.number)
+        page.outbox.put(hello.model_copy(update={"page": page.number}))
+        page.outbox.put(self.state())
+        if self.greeting is not None:
+            page.notice("info", self.greeting)
+        if self._preview is not None:
+            page.outbox.put(server_messages.Preview(page=self._preview[0], play=self._preview[1], on=True))
+        page.outbox.put(self.chores.preparing())
+        for job in self.chores.jobs():
+            page.outbox.put(job)
+        return page
+
+    def leave(self, page: Page) -> None:
+        """A page is gone; its drag is given up, and what it plays is over."""
+        self.pages.pop(page.number, None)
+        self.session.drag_cancel(page.number)
+        self.session.play_end(page.number)
+        self.desk.scheduler.leave(page.number)
+        self.changed()
+
+    def look(self, page: Page, look: Look) -> None:
+        """A page shows another view."""
+        page.look = look
+        self.desk.scheduler.look(page.number, look, time.monotonic())
+        self.pump()
+
+    def camera(self, page: Page, camera: Camera, seq: int, moving: bool) -> None:
+        """A page looks from another camera."""
+        page.camera = camera
+        self.desk.scheduler.camera(page.number, seq, camera.width, camera.height, moving, time.monotonic())
+        self.pump()
+
+    def presented(self, page: Page, picture: int) -> None:
+        """A page has shown a picture."""
+        self.desk.scheduler.presented(page.number, picture)
+        self.desk.pump()
+
+    def notice(self, level: Level, text: str) -> None:
+        """A line for every page."""
+        for page in self.pages.values():
+            page.notice(level, text)
+
+    def broadcast(self, message: server_messages.ServerMessage, but: Page | None = None) -> None:
+        """A message for every page, but one."""
+        for page in self.pages.values():
+            if page is not but:
+                page.outbox.put(message)
+
+    # ---- the session ----
+
+    def state(self) -> server_messages.State:
+        """Everything that pages show of the edits."""
+        self._look_again()
+        return state_of(self.session, str(self.keeper.path), self._pictured, self.chores.errors())
+
+    def changed(self, but: Page | None = None) -> None:
+        """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
+        self.keeper.autosave(self.session)
+        if self.keeper.trouble is not None and self.keeper.trouble != self._trouble:
+            self.notice("warning", self.keeper.trouble)
+        self._trouble = self.keeper.trouble
+        if any(page is not but for page in self.pages.values()):
+            self.broadcast(self.state(), but)
+        self.pump()
+
+    def save(self) -> None:
+        """Saves what is edited where it came from."""
+        self.keeper.save(self.session)
+        self.notice("info", f"saved to {self.keeper.path}")
+
+    def save_as(self, path: str, overwrite: bool) -> None:
+        """Saves the scene with its edits as another folder, which is edited from then on."""
+        self.keeper.save_as(self.session, path, overwrite)
+        self.desk.worker.scene = str(self.keeper.path)
+        self.notice("info", f"saved to {self.keeper.path}")
+
+    # ---- rendering ----
+
+    async def ask(self, make: Callable[[int], Task]) -> Any:
+        """What the rendering process answers to a task. Raises CagefieldError."""
+        self.desk.interrupt()
+        return await self.desk.ask(make)
+
+    def shown(self) -> Shown:
+        """What pictures show now."""
+        return self._what_is_shown()
+
+    def pump(self) -> None:
+        """Has rendered what is new to see."""
+        self._tell_preview()
+        self._look_again()
+        self.desk.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
+        self.desk.pump()
+
+    def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
+        """The task of a picture that the scheduler wants."""
+        page, region = self.pages[request.page], request.region
+        assert page.camera is not None  # the scheduler asks for pictures of pages with a camera alone
+        camera = page.camera.resized(region.full_width, region.full_height)
+        task = PictureTask(
+            request.number,
+            self._shown,
+            camera,
+            region,
+            request.look,
+            request.moving,
+            request.exact,
+            generation,
+        )
+        drag, seq = (page.drag, page.seq) if page.drag else (0, 0)
+        return task, Stamp(self._shown_revision, drag, seq)
+
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        """Where two revisions differ in a page's picture; None for nowhere."""
+        camera = self.pages[page].camera
+        stacks = [self._stack(revision) for revision in (one, another)]
+        if camera is None or None in stacks:
+            return WHOLE
+        (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
+        if opacity != other:
+            return WHOLE
+        beside = np.array([[-self._spread], [self._spread]])
+        return seen(camera, after.changed_boxes(before) + beside)
+
+    def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
+        """A picture for a page."""
+        page = self.pages.get(request.page)
+        if page is not None:
+            page.outbox.put_picture(_packed(request, stamp, done))
+
+    def chore(self) -> Chore | None:
+        """What may be done now that no page waits for anything."""
+        return self.chores.next(self.desk.scheduler.generation)
+
+    def _tell_preview(self) -> None:
+        """Tells the pages which preview is over, and which has begun."""
+        preview = self.session.preview
+        now = None if preview is None else (preview.page, preview.number)
+        before, self._preview = self._preview, now
+        if before != now:
+            for which, on in ((before, False), (now, True)):
+                if which is not None:
+                    self.broadcast(server_messages.Preview(page=which[0], play=which[1], on=on))
+
+    def _look_again(self) -> None:
+        shown = self._what_is_shown()
+        self._shown_revision = self.session.revision
+        if shown != self._shown:
+            self._keep_stack()
+            self._shown = shown
+            self._pictures += 1
+            self._pictured = self.session.revision
+        self._drawn = self.session.drawn()
+
+    def _measured(self) -> None:
+        self.broadcast(self.state())
+
+    def _stack(self, revision: int) -> tuple[EditStack, bool] | None:
+        if revision == self._pictures:
+            return EditStack(self._drawn), self._shown.preserve_opacity
+        return self._stacks.get(revision)
+
+    def _keep_stack(self) -> None:
+        """Remembers what is shown, before it is something else."""
+        wanted = self.desk.scheduler.remembered()
+        self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
+        self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity
+
+    def _what_is_shown(self) -> Shown:
+        return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)
+
+
+def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
+    """The binary message of a picture."""
+    region = request.region
+    header = server_messages.PictureHeader(
+        picture=request.number,
+        camera=request.camera,
+        drag=stamp.drag,
+        seq=stamp.seq,
+        revision=stamp.revision,
+        view=request.look.view,
+        before=request.look.before,
+        split=request.look.split,
+        x=region.x,
+        y=region.y,
+        width=region.width,
+        height=region.height,
+        full_width=region.full_width,
+        full_height=region.full_height,
+        final=request.final,
+        format=done.format,
+        picture_bytes=len(done.picture),
+        depth_bytes=len(done.depth),
+        depth_width=done.depth_size[0],
+        depth_height=done.depth_size[1],
+        depth_scale=done.depth_scale,
+        render_ms=1e3 * done.render_seconds,
+        encode_ms=1e3 * done.encode_seconds,
+    )
+    text = header.model_dump_json().encode()
+    return len(text).to_bytes(4, "little") + text + done.picture + done.depth

@@ -1,0 +1,246 @@
+"""Desk: gives the rendering process its tasks, one at a time, and passes on what comes back.
+
+Answers that somebody waits for come first, then pictures as the scheduler wants them, then what can wait.
+Everything here runs in the server's event loop; the rendering process answers through
+`call_soon_threadsafe`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from cagefield.errors import CagefieldError
+from cagefield.server.render_queue.damage import Rect
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.scheduler import Scheduler
+from cagefield.server.render_worker.process import Worker
+from cagefield.server.render_worker.tasks import (
+    Answered,
+    Failed,
+    PictureDone,
+    PictureTask,
+    Ready,
+    Result,
+    Stopped,
+    Task,
+)
+
+RESTARTS = 3
+"""How often in a minute the rendering process is started again."""
+
+_GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
+
+Level = Literal["info", "warning", "error"]
+Make = Callable[[int], Task]
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What a picture shows of the session: its revision, and the newest of the page's drag."""
+
+    revision: int
+    drag: int = 0
+    seq: int = 0
+
+
+@dataclass(frozen=True)
+class Chore:
+    """What can wait: a task, made when there is time for it, and what is done with its result."""
+
+    make: Make
+    done: Callable[[Result], None]
+
+
+class Office(Protocol):
+    """Who the desk works for."""
+
+    def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
+        """The task of a picture that the scheduler wants."""
+
+    def differing(self, page: int, one: int, another: int) -> Rect | None:
+        """Where two revisions differ in a page's picture; None for nowhere."""
+
+    def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
+        """A picture is there."""
+
+    def notice(self, level: Level, text: str) -> None:
+        """A line for the users."""
+
+    def chore(self) -> Chore | None:
+        """What may be done now that no page waits for anything."""
+
+
+@dataclass
+class _Running:
+    task: Task
+    request: Request | None = None
+    stamp: Stamp | None = None
+    done: Callable[[Result], None] | None = None
+
+
+class Desk:
+    """See the module."""
+
+    def __init__(self, scene: str, device: str, office: Office, *, whole_at_rest: bool = False) -> None:
+        """`whole_at_rest` as for `Scheduler`."""
+        self.scheduler = Scheduler(office.differing, whole_at_rest=whole_at_rest)
+        self.worker = Worker(scene, device, self._from_thread(self._result), self._from_thread(self._lost))
+        self._office = office
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._ready = False
+        self._closing = False
+        self._given_up = False
+        self._running: _Running | None = None
+        self._queue: deque[_Running] = deque()
+        self._numbers = 0
+        self._wake: asyncio.TimerHandle | None = None
+        self._losses: list[float] = []
+
+    def start(self) -> None:
+        """Starts the rendering process; called in the event loop."""
+        self._loop = asyncio.get_running_loop()
+        self.worker.start()
+
+    def close(self) -> None:
+        """Ends the rendering process."""
+        self._closing = True
+        self._sleep(None)
+        self.worker.close()
+
+    async def ask(self, make: Make) -> Any:
+        """What the rendering process answers to the task `make(number)`. Raises CagefieldError."""
+        if self._given_up:
+            raise CagefieldError(_GIVEN_UP)
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+
+        def done(result: Result) -> None:
+            if future.done():
+                return
+            if isinstance(result, Answered):
+                future.set_result(result.value)
+            else:
+                text = (
+                    result.text if isinstance(result, Failed) else "the renderer was interrupted; try again"
+                )
+                future.set_exception(CagefieldError(text))
+
+        self._queue.append(_Running(make(self._number()), done=done))
+        self.pump()
+        return await future
+
+    def pump(self) -> None:
+        """Gives the rendering process its next task, if it is free; abandons what nobody wants any more."""
+        now = time.monotonic()
+        if not self.scheduler.idle():
+            self.interrupt()
+        self.worker.abandon(self.scheduler.generation)
+        if self._running is not None or not self._ready or self._closing:
+            return
+        running = self._next(now)
+        if running is None:
+            self._sleep(self.scheduler.wake(now))
+            return
+        self._running = running
+        self.worker.send(running.task)
+
+    def interrupt(self) -> None:
+        """Abandons a chore that is being done: it has to wait after all."""
+        if self._running is not None and self._running.request is None:
+            self.scheduler.generation += 1
+
+    def _next(self, now: float) -> _Running | None:
+        if self._queue:
+            return self._queue.popleft()
+        request = self.scheduler.next(now)
+        if request is not None:
+            task, stamp = self._office.picture_task(request, self.scheduler.generation)
+            return _Running(task, request, stamp)
+        chore = self._office.chore() if self.scheduler.idle() else None
+        return None if chore is None else _Running(chore.make(self._number()), done=chore.done)
+
+    def _number(self) -> int:
+        """Numbers of tasks that are no pictures; those have the scheduler's."""
+        self._numbers -= 1
+        return self._numbers
+
+    def _sleep(self, seconds: float | None) -> None:
+        if self._wake is not None:
+            self._wake.cancel()
+            self._wake = None
+        if seconds is not None and self._loop is not None:
+            self._wake = self._loop.call_later(seconds + 0.002, self.pump)
+
+    def _result(self, result: Result) -> None:
+        if isinstance(result, Ready):
+            self._ready = True
+        elif result.number == 0:
+            if isinstance(result, Failed):
+                self._office.notice("error", result.text)
+        elif self._running is not None and self._running.task.number == result.number:
+            running, self._running = self._running, None
+            self._finish(running, result)
+        self.pump()
+
+    def _finish(self, running: _Running, result: Result) -> None:
+        if running.done is not None:
+            running.done(result)
+        if running.request is None or running.stamp is None:
+            return
+        if isinstance(result, PictureDone):
+            region = running.request.region
+            self.scheduler.finished(
+                running.request,
+                region.width * region.height,
+                result.render_seconds + result.encode_seconds,
+                result.map_seconds,
+            )
+            self._office.deliver(running.request, running.stamp, result)
+            return
+        self.scheduler.abandoned(running.request, again=isinstance(result, Stopped))
+        if isinstance(result, Failed):
+            self._office.notice("error", result.text)
+
+    def _lost(self) -> None:
+        running, self._running = self._running, None
+        self._ready = False
+        if running is not None:
+            self._finish(running, Stopped(running.task.number))
+        now = time.monotonic()
+        self._losses = [at for at in self._losses if now - at < 60.0] + [now]
+        if len(self._losses) > RESTARTS:
+            self._give_up()
+            return
+        self._office.notice("warning", "the renderer was lost and is started again; no edits are lost")
+        self.scheduler.refresh(now)
+        self.worker.start()
+
+    def _give_up(self) -> None:
+        self._given_up = True
+        self._office.notice("error", _GIVEN_UP)
+        while self._queue:
+            waiting = self._queue.popleft()
+            self._finish(waiting, Failed(waiting.task.number, _GIVEN_UP))
+
+    def _from_thread(self, method: Callable[..., None]) -> Callable[..., None]:
+        """The method, callable from another thread: runs in the event loop."""
+
+        def here(*args: Any) -> None:
+            if not self._closing:
+                method(*args)
+
+        def call(*args: Any) -> None:
+            loop = self._loop
+            if loop is None:
+                return
+            try:
+                loop.call_soon_threadsafe(here, *args)
+            except RuntimeError:
+                if not loop.is_closed():
+                    raise
+
+        return call

@@ -1,0 +1,26 @@
+"""Pictures as the scheduler asks for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cagefield.server.render_worker.pictures import Look, Region
+
+
+@dataclass(frozen=True)
+class Request:
+    """A picture to be rendered: `exact` with the edits' own lattices, `final` the last tile of a view.
+
+    `complete` says that with it everything is drawn that was not as it should be.
+    """
+
+    number: int
+    page: int
+    camera: int
+    revision: int
+    look: Look
+    region: Region
+    moving: bool
+    exact: bool
+    final: bool
+    complete: bool = True

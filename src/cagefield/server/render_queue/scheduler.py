@@ -1,0 +1,304 @@
+"""Scheduler: which picture is rendered next, for which page, how large. A state machine that knows no clock,
+no web and no renderer: it is told what happens and when, and asked for the next picture.
+
+- While anything moves (a camera, a drag) pictures of the whole view come at the resolution that the measured
+  speed allows; each shows the newest input, older input that no picture showed is passed over.
+- At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
+  anything changes.
+- Where the camera is the one of the last whole picture, only the part is rendered that the edits change.
+- A page is owed a picture only while none of its pictures is on its way; at rest, fewer than two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from cagefield.server.render_queue.damage import WHOLE, Differing, Rect, Showing, everywhere, pixels, tiles
+from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_worker.pictures import Look, Region
+
+MOST_UNSHOWN, MOST_MOVING = 2, 1
+"""Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older
+than it had to be, and would be rendered while the page has the one before to draw."""
+
+MOVING_SECONDS = 0.05
+"""Time that a picture may take while something moves."""
+
+TILE_SECONDS = 0.25
+"""Time that a tile may take at rest; each costs the page a frame. Abandoned ones end sooner."""
+
+SETTLE_SECONDS = 0.12
+"""How long nothing may have changed before the view counts as at rest."""
+
+MOST_TILES = 9
+"""Tiles of a view, at most."""
+
+LEAST_SIDE = 80
+"""Shorter side of the smallest moving picture, pixels."""
+
+SCALES = (1.0, 0.8, 0.65, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.125)
+"""Resolutions of moving pictures as shares of the full one: a few, since each has its own ray directions."""
+
+FIRST_RATE = 4e5
+"""Rays a second before any was measured."""
+
+
+@dataclass
+class _Page:
+    """What is known of a page."""
+
+    width: int = 0
+    height: int = 0
+    camera: int = -1
+    moving: bool = False
+    look: Look = field(default_factory=Look)
+    unshown: list[int] = field(default_factory=list)
+    changed: float = -math.inf
+    """When its view changed last."""
+    version: int = 0
+    """Counts changes of the view."""
+    shown_version: int = -1
+    """The version that the last picture of the whole view shows."""
+    tiles: list[Region] | None = None
+    """Tiles of the present version that are still to come; None before they are cut."""
+    whole: bool = False
+    """Whether those tiles are of the whole view."""
+    showing: Showing = field(default_factory=Showing)
+    tiles_exact: bool = False
+    served: float = -math.inf
+
+
+class Scheduler:
+    """See the module. Times are seconds of any one clock."""
+
+    def __init__(self, differing: Differing = everywhere, *, whole_at_rest: bool = False) -> None:
+        """`differing` says what of a page's picture two revisions show differently.
+
+        Where it may miss a little, all of a picture is drawn anew at rest (`whole_at_rest`).
+        """
+        self._differing = differing
+        self._whole_at_rest = whole_at_rest
+        self._pages: dict[int, _Page] = {}
+        self._numbers = 0
+        self._rate = FIRST_RATE
+        self._overhead = 0.0
+        self._dragging = False
+        self._revision = 0
+        self._running: tuple[Request, int] | None = None
+        self.generation = 0
+        """Grows when a tile that is being rendered is no longer wanted."""
+
+    # ---- what happens ----
+
+    def join(self, page: int) -> None:
+        """A page is open."""
+        self._pages[page] = _Page()
+
+    def leave(self, page: int) -> None:
+        """A page is closed."""
+        self._pages.pop(page, None)
+        if self._running is not None and self._running[0].page == page:
+            self.generation += 1
+
+    def camera(self, page: int, seq: int, width: int, height: int, moving: bool, now: float) -> None:
+        """A page looks from another camera, or its camera stops."""
+        p = self._pages[page]
+        if p.camera == seq and (p.width, p.height) == (width, height):
+            p.moving = moving
+            return
+        p.camera, p.width, p.height, p.moving = seq, width, height, moving
+        self._changed(page, now)
+
+    def look(self, page: int, look: Look, now: float) -> None:
+        """A page shows another view."""
+        if self._pages[page].look != look:
+            self._pages[page].look = look
+            self._changed(page, now)
+
+    def edits(self, revision: int, dragging: bool, now: float) -> None:
+        """The edits' picture is another one, or a drag begins or ends.
+
+        Where a drag ends nothing has to settle: the fine picture comes as soon as a quick one shows what was
+        dragged, or at once where that is shown already, or on a fine picture.
+        """
+        if revision == self._revision and dragging == self._dragging:
+            return
+        let_go, same = self._dragging and not dragging, revision == self._revision
+        self._revision, self._dragging = revision, dragging
+        for page, p in self._pages.items():
+            was_shown = same and p.shown_version == p.version
+            self._changed(page, now)
+            if let_go:
+                p.changed = -math.inf
+                if was_shown or p.showing.exact:
+                    p.shown_version = p.version
+
+    def presented(self, page: int, picture: int) -> None:
+        """A page has shown a picture, and all that were sent before it."""
+        p = self._pages.get(page)
+        if p is not None:
+            p.unshown = [number for number in p.unshown if number > picture]
+
+    def finished(self, request: Request, rays: int, seconds: float, overhead: float) -> None:
+        """The picture was rendered and sent; `overhead` of the seconds went into the edits' map."""
+        self._running = None
+        region = request.region
+        whole = (region.width, region.height) == (region.full_width, region.full_height)
+        if whole or request.moving:
+            # A tile may be empty, and says nothing of how long the whole picture takes.
+            self._rate += 0.3 * (rays / max(seconds - overhead, 1e-4) - self._rate)
+        if request.moving:
+            self._overhead += 0.5 * (min(overhead, MOVING_SECONDS) - self._overhead)
+        page = self._pages.get(request.page)
+        if page is not None:
+            page.unshown.append(request.number)
+            page.showing.drawn(
+                (request.camera, request.look),
+                request.revision,
+                (
+                    region.x / region.full_width,
+                    region.y / region.full_height,
+                    (region.x + region.width) / region.full_width,
+                    (region.y + region.height) / region.full_height,
+                ),
+                whole=whole or (request.complete and page.whole and not request.moving),
+                all_wanting=request.complete,
+                exact=request.exact,
+            )
+
+    def abandoned(self, request: Request, again: bool) -> None:
+        """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
+        running, self._running = self._running, None
+        page = self._pages.get(request.page)
+        if again and page is not None and running is not None and page.version == running[1]:
+            page.tiles, page.shown_version = None, -1
+
+    def refresh(self, now: float) -> None:
+        """Everything is to be rendered anew."""
+        for page, p in self._pages.items():
+            p.showing.lost()
+            self._changed(page, now)
+
+    # ---- what is next ----
+
+    def next(self, now: float) -> Request | None:
+        """The picture to render now; None where nothing is owed, or one is being rendered."""
+        if self._running is not None:
+            return None
+        waiting = sorted(
+            (not self._owes_moving(p), p.served, page)
+            for page, p in self._pages.items()
+            if p.camera >= 0 and self._has_room(p)
+        )
+        for _, _, page in waiting:
+            request = self._request(page, now)
+            if request is not None:
+                self._pages[page].served = now
+                self._running = (request, self._pages[page].version)
+                return request
+        return None
+
+    def wake(self, now: float) -> float | None:
+        """Seconds until `next` may have something without anything happening; None: not before."""
+        if self._running is not None:
+            return None
+        waits = [
+            p.changed + SETTLE_SECONDS - now
+            for p in self._pages.values()
+            if p.camera >= 0 and p.tiles != [] and not p.moving and self._has_room(p)
+        ]
+        return max(0.0, min(waits)) if waits else None
+
+    def remembered(self) -> set[int]:
+        """The revisions that `differing` may still be asked about."""
+        found = {self._revision}
+        if self._running is not None:
+            found.add(self._running[0].revision)
+        for p in self._pages.values():
+            found |= p.showing.later | ({p.showing.base} if p.showing.base is not None else set())
+        return found
+
+    def unshown(self, page: int) -> int:
+        """How many pictures are on their way to a page."""
+        return len(self._pages[page].unshown)
+
+    def idle(self) -> bool:
+        """True where nothing moves, and no page waits for a picture or can be sent one.
+
+        What can wait, background jobs too, stands still while anybody drags.
+        """
+        return (self._running is None and not self._dragging) and all(
+            p.camera < 0 or (not p.moving and (p.tiles == [] or not self._has_room(p)))
+            for p in self._pages.values()
+        )
+
+    # ---- inside ----
+
+    def _changed(self, page: int, now: float) -> None:
+        p = self._pages[page]
+        p.changed = now
+        p.version += 1
+        p.tiles = None
+        if self._running is not None and not self._running[0].moving and self._running[0].page == page:
+            self.generation += 1
+
+    def _has_room(self, p: _Page) -> bool:
+        return len(p.unshown) < (MOST_MOVING if p.moving or self._dragging else MOST_UNSHOWN)
+
+    def _owes_moving(self, p: _Page) -> bool:
+        return p.shown_version != p.version
+
+    def _request(self, page: int, now: float) -> Request | None:
+        p = self._pages[page]
+        if self._owes_moving(p):
+            rect = p.showing.wanting(page, (p.camera, p.look), self._revision, self._differing)
+            scale = self._scale(p, rect)
+            p.shown_version = p.version
+            if scale < 1.0 or p.moving or self._dragging:
+                return self._picture(page, scale, rect)
+            self._cut(page, exact=True)
+        if p.tiles is None:
+            if p.moving or now - p.changed < SETTLE_SECONDS:
+                return None
+            self._cut(page, exact=not self._dragging)
+        if not p.tiles:
+            return None
+        region = p.tiles.pop(0)
+        last = not p.tiles
+        return self._ask(page, region, moving=False, exact=p.tiles_exact, final=last, complete=last)
+
+    def _picture(self, page: int, scale: float, rect: Rect | None) -> Request:
+        p = self._pages[page]
+        width, height = (max(16, 2 * round(n * scale / 2)) for n in (p.width, p.height))
+        region = Region(*pixels(rect, width, height), width, height)
+        return self._ask(page, region, moving=True, exact=False, final=False, complete=True)
+
+    def _ask(
+        self, page: int, region: Region, *, moving: bool, exact: bool, final: bool, complete: bool
+    ) -> Request:
+        p = self._pages[page]
+        self._numbers += 1
+        return Request(
+            self._numbers, page, p.camera, self._revision, p.look, region, moving, exact, final, complete
+        )
+
+    def _scale(self, p: _Page, rect: Rect | None) -> float:
+        rays = self._rate * max(MOVING_SECONDS - self._overhead, 0.4 * MOVING_SECONDS)
+        _, _, width, height = pixels(rect, p.width, p.height)
+        wanted = math.sqrt(rays / (width * height))
+        least = min(1.0, LEAST_SIDE / min(p.width, p.height))
+        return max(next((s for s in SCALES if s <= wanted), SCALES[-1]), least)
+
+    def _cut(self, page: int, exact: bool) -> None:
+        """Cuts what of the view is not as it should be into tiles of about TILE_SECONDS."""
+        p = self._pages[page]
+        view = p.camera, p.look
+        rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
+        if exact and self._whole_at_rest and rect is not None:
+            rect = WHOLE
+        part = pixels(rect, p.width, p.height)
+        p.whole = part == (0, 0, p.width, p.height)
+        count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)
+        p.tiles = [Region(*tile, p.width, p.height) for tile in tiles(part, count)]
+        p.tiles_exact = exact

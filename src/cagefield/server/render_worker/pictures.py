@@ -1,0 +1,28 @@
+"""What a picture shows: a look at the scene, and a region of the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cagefield.server.protocol.common import View
+
+
+@dataclass(frozen=True)
+class Look:
+    """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
+
+    view: View = "colour"
+    before: bool = False
+    split: float | None = None
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of a picture of `full` (width, height), pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+    full_width: int
+    full_height: int

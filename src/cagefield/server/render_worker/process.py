@@ -1,0 +1,155 @@
+"""The rendering process: a kernel holds the interpreter to its end, so the server's own would stand still.
+
+`serve` runs in it, told what to do over a pipe, one task at a time. `Worker` is the server's side: starts it,
+hands it tasks, passes results on, and starts it again when it is lost.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cagefield.errors import CagefieldError, warnings_in_one_line
+from cagefield.server.render_worker.tasks import Failed, Ready, Result, Task
+
+TO_END = 10.0
+"""Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
+
+_LOST = (EOFError, OSError)
+"""What sending and receiving raise where the other process has gone."""
+
+
+@warnings_in_one_line()
+def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
+    """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from cagefield import devices
+    from cagefield.scene import Scene
+    from cagefield.server.render_worker.renderer_cache import Studio
+    from cagefield.server.render_worker.task_handlers import Working
+
+    try:
+        devices.start(device)
+        working = Working(Studio(Scene.open(scene)))
+    except CagefieldError as error:
+        _sent(connection, Failed(0, str(error)))
+        return
+    going_on = _sent(connection, Ready())
+    while going_on:
+        try:
+            task = connection.recv()
+        except _LOST:
+            break
+        going_on = task is not None and _sent(connection, _done(working, task, generation))
+    working.close()
+
+
+def _sent(connection: Connection, content: Any) -> bool:
+    """Whether there was still somebody to send it to."""
+    try:
+        connection.send(content)
+    except _LOST:
+        return False
+    return True
+
+
+def _done(working: Any, task: Task, generation: ctypes.c_ulong) -> Result:
+    try:
+        return working.do(task, lambda wanted: generation.value > wanted)
+    except CagefieldError as error:
+        return Failed(task.number, str(error))
+    except Exception as error:
+        return Failed(task.number, f"rendering failed: {type(error).__name__}: {error}")
+
+
+class Worker:
+    """The rendering process as the server has it.
+
+    `on_result` is called, from a thread of its own, with every result, and `on_lost` when the process is
+    gone; `start` starts it again.
+    """
+
+    def __init__(
+        self,
+        scene: str,
+        device: str,
+        on_result: Callable[[Result], None],
+        on_lost: Callable[[], None],
+    ) -> None:
+        self.scene = scene
+        """The folder that is read when the process starts."""
+        self._device = device
+        self._on_result, self._on_lost = on_result, on_lost
+        context = multiprocessing.get_context("spawn")
+        self._context = context
+        self._generation: ctypes.c_ulong = context.RawValue(ctypes.c_ulong, 0)
+        self._process: Any = None
+        self._connection: Connection | None = None
+        self._has_scene = False
+
+    def start(self) -> None:
+        """Starts the process; `Ready` or `Failed` with number 0 comes when it has its scene.
+
+        Where it is gone before it has begun, `on_lost` is called.
+        """
+        here, there = self._context.Pipe()
+        process = self._context.Process(
+            target=serve,
+            args=(there, self._generation, self.scene, self._device),
+            daemon=True,
+            name="cagefield-renderer",
+        )
+        try:
+            process.start()
+        except _LOST:
+            self._process = self._connection = None
+            here.close()
+            self._on_lost()
+            return
+        finally:
+            there.close()
+        self._process, self._connection, self._has_scene = process, here, False
+        threading.Thread(target=self._listen, args=(here,), daemon=True).start()
+
+    def send(self, task: Task) -> None:
+        """Hands over a task; if the process is gone, `on_lost` is called instead of an answer."""
+        if self._connection is not None:
+            _sent(self._connection, task)
+
+    def abandon(self, generation: int) -> None:
+        """Tasks of older generations stop at their next look."""
+        self._generation.value = generation
+
+    @property
+    def pid(self) -> int | None:
+        """The process's number, or None before `start`."""
+        return None if self._process is None else self._process.pid
+
+    def close(self) -> None:
+        """Ends the process; what it does is abandoned."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            self._generation.value = ctypes.c_ulong(-1).value
+            _sent(connection, None)
+            if self._process is not None and self._has_scene:
+                self._process.join(TO_END)
+            connection.close()
+        if self._process is not None:
+            self._process.terminate()
+            self._process.join(5.0)
+
+    def _listen(self, connection: Connection) -> None:
+        while True:
+            try:
+                result = connection.recv()
+            except (*_LOST, TypeError):
+                if self._connection is connection:
+                    self._on_lost()
+                return
+            self._has_scene = True
+            self._on_result(result)

@@ -1,0 +1,262 @@
+"""Studio: a scene and its renderers, kept ready between pictures. Lives in the rendering process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.frame import Float32, Frame
+from cagefield.rendering.renderers import renderer_of
+from cagefield.scene import Scene
+from cagefield.server.render_worker import encoding
+from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
+
+if TYPE_CHECKING:
+    from cagefield.rendering.renderers import AnyRenderer
+
+QUICK_LATTICE = 32
+"""Most lattice nodes along an axis while a cage is dragged."""
+
+LONGEST_STEP = 1.5
+"""Most voxels between samples while something moves; no more than a pixel shows, either."""
+
+MOVING_QUALITY, REST_QUALITY = 85, 95
+"""JPEG qualities."""
+
+KEPT_EDITS = 64
+"""Edits whose maps are kept for when they are shown again."""
+
+MOST_DEPTHS = 120_000
+"""Depths sent with a picture, at most."""
+
+Stop = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A renderer that is ready, and what it shows."""
+
+    shown: Shown
+    renderer: AnyRenderer
+
+
+class Studio:
+    """Pictures of one field under any edits."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.plain = renderer_of(scene.field)
+        self._is_sampled = isinstance(scene.field, VoxelField)
+        """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
+        self._edits: list[Edit] = []
+        self._coarse: list[tuple[Edit, Edit]] = []
+        self._exact: list[_Kept] = []
+        self._quick: list[_Kept] = []
+        lower, upper = scene.field.bounds
+        self._middle = 0.5 * (lower + upper)
+        self._radius = 0.5 * float(np.linalg.norm(upper - lower))
+
+    def picture(self, task: PictureTask, stop: Stop) -> PictureDone | Stopped:
+        """The part of a picture that a task asks for, encoded."""
+        began = time.perf_counter()
+        try:
+            renderer = (
+                self.plain if task.look.before else self.renderer(task.shown, task.exact, giving_up(stop))
+            )
+        except GivenUpError:
+            return Stopped(task.number)
+        mapped = time.perf_counter()
+        frame = self._frame(task, renderer, stop)
+        if frame is None:
+            return Stopped(task.number)
+        rendered = time.perf_counter()
+        near, far = self.reach(task.camera)
+        pixels = encoding.picture_of(frame, task.look.view, (near, far))
+        picture, form = encoding.plain_or_jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
+        few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
+        stride = 1 if few else 2
+        scale = (far if not self.scene.field.unbounded else 16.0 * far) / 65_000.0
+        depth = encoding.depths(frame, scale, stride)
+        return PictureDone(
+            task.number,
+            picture,
+            form,
+            depth.tobytes(),
+            (depth.shape[1], depth.shape[0]),
+            scale,
+            mapped - began,
+            rendered - began,
+            time.perf_counter() - rendered,
+        )
+
+    def still(self, shown: Shown, camera: Camera, look: Look, stop: Stop | None = None) -> Frame | None:
+        """A whole picture, its edits exact; None where it was stopped."""
+        region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
+        task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
+        stopping = stop or (lambda: False)
+        try:
+            renderer = self.plain if look.before else self.renderer(shown, True, giving_up(stopping))
+        except GivenUpError:
+            return None
+        return self._frame(task, renderer, stopping)
+
+    def warm(self, stage: int) -> None:
+        """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
+        if not self._is_sampled:
+            _warm_splats(stage)
+            return
+        voxel = self.scene.field.sample_spacing
+        inner = Cage.box(self._middle, 8.0 * voxel)
+        edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
+        if stage == 3:
+            self.plain.with_edits(EditStack([Edit.delete(inner)]))
+            return
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
+        if stage == 1:
+            size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
+            camera = Camera.look_at(
+                self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
+            )
+            renderer.render(camera)
+
+    def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
+        """The renderer of the edits: one that is ready, else an exact or a quick one made now.
+
+        `proceed` is called while it is made, and gives it up by raising.
+        """
+        for kept in self._exact if exact else (*self._exact, *self._quick):
+            if kept.shown == shown:
+                return kept.renderer
+        edits = self.edits(shown.edits)
+        if not exact and self._is_sampled:
+            ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
+            edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
+        # What the last ones share with these need not be looked at again.
+        last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
+        renderer = (last[0].renderer if last else self.plain).with_edits(
+            EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact, proceed=proceed
+        )
+        if exact:
+            # Two: what pages show, and what a job renders.
+            self._exact = [*self._exact[-1:], _Kept(shown, renderer)]
+        else:
+            self._quick = [_Kept(shown, renderer)]
+        return renderer
+
+    def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
+        """The edits with these fields; those that were there before are the same objects."""
+        found = []
+        for fields in values:
+            edit = Edit(**fields)
+            found.append(next((known for known in self._edits if known == edit), edit))
+        others = [known for known in self._edits if not any(known is edit for edit in found)]
+        self._edits = [*found, *others][:KEPT_EDITS]
+        return found
+
+    def reach(self, camera: Camera) -> tuple[float, float]:
+        """(nearest, farthest) distance of the field's box from a camera."""
+        distance = float(np.linalg.norm(camera.origin - self._middle))
+        return max(0.0, distance - self._radius), distance + self._radius
+
+    def _frame(self, task: PictureTask, edited: AnyRenderer, stop: Stop) -> Frame | None:
+        """The region of the picture; left of a split without the edits."""
+        region, split = task.region, task.look.split
+        if task.look.before or split is None:
+            return self._part(task, edited, region, stop)
+        left = min(max(round(split * region.full_width) - region.x, 0), region.width)
+        parts: list[Frame] = []
+        for renderer, x, width in ((self.plain, 0, left), (edited, left, region.width - left)):
+            if width > 0:
+                part = self._part(task, renderer, replace(region, x=region.x + x, width=width), stop)
+                if part is None:
+                    return None
+                parts.append(part)
+        return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])
+
+    def _part(self, task: PictureTask, renderer: AnyRenderer, region: Region, stop: Stop) -> Frame | None:
+        return renderer.render(
+            task.camera,
+            background=self.scene.background,
+            normals=task.look.view == "normals",
+            region=(region.x, region.y, region.width, region.height),
+            should_stop=None if task.moving else stop,
+            step=self._step(task.camera, renderer.step) if task.moving else None,
+        )
+
+    def _step(self, camera: Camera, least: float) -> float:
+        """Voxels between the samples of a moving picture: what a pixel shows in the middle of the field."""
+        distance = float(np.linalg.norm(camera.origin - self._middle))
+        shown = distance / camera.fx / self.scene.field.sample_spacing
+        return min(max(shown, least), LONGEST_STEP)
+
+    def _quickly(self, edit: Edit) -> Edit:
+        """The edit with a coarser lattice, kept as long as the edit is."""
+        if edit.adjustment != "continuous" or (edit.lattice or 512) <= QUICK_LATTICE:
+            return edit
+        for known, quick in self._coarse:
+            if known is edit:
+                return quick
+        quick = edit.replace(lattice=QUICK_LATTICE)
+        self._coarse = [*self._coarse[-31:], (edit, quick)]
+        return quick
+
+
+def _warm_splats(stage: int) -> None:
+    """Makes the kernels of splats ready: of plain pictures, of moving ones, of those at rest, of normals."""
+    chance = np.random.default_rng(0)
+    count = 64
+    field = SplatField(
+        chance.random((count, 3), np.float32) - 0.5,
+        np.full((count, 3), -3.0, np.float32),
+        chance.standard_normal((count, 4), np.float32),
+        np.full(count, 0.5, np.float32),
+        np.zeros((count, 1, 3), np.float32),
+    )
+    inner = Cage.box((0.0, 0.0, 0.0), 0.5)
+    turned = Edit(inner, inner.grown(0.4)).rotate((0.0, 0.0, 0.3))
+    edits = EditStack([turned, turned, Edit.delete(inner)]) if stage else EditStack()
+    renderer = renderer_of(field).with_edits(edits, coarse=stage == 1)
+    camera = Camera.look_at((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), width=32, height=32, fov_x=0.5)
+    renderer.render(camera, normals=stage == 3)
+
+
+class GivenUpError(Exception):
+    """What was being made ready is not wanted any more."""
+
+
+def giving_up(stop: Stop) -> Callable[[], None]:
+    """A `proceed` that gives up what is being made ready where `stop` says so, by raising GivenUpError."""
+
+    def proceed() -> None:
+        if stop():
+            raise GivenUpError
+
+    return proceed
+
+
+def _beside(left: Frame, right: Frame) -> Frame:
+    """Two frames of the same height as one."""
+
+    def join(a: Float32, b: Float32) -> Float32:
+        return np.concatenate([a, b], axis=1)
+
+    normals = None
+    if left.normals is not None and right.normals is not None:
+        normals = join(left.normals, right.normals)
+    return Frame(
+        join(left.rgb, right.rgb),
+        join(left.opacity, right.opacity),
+        join(left.depth, right.depth),
+        normals,
+        left.background,
+    )

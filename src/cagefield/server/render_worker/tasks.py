@@ -1,0 +1,180 @@
+"""What the server asks the rendering process for, and what comes back. Plain values that can be pickled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, TypeAlias
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit
+from cagefield.keyframes import Still
+from cagefield.server.render_worker.pictures import Look, Region
+
+WARM_STAGES = 4
+"""Steps in which the kernels of edited pictures are made ready."""
+
+EditValues: TypeAlias = Mapping[str, Any]
+
+
+def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
+    """The edits' fields alone, without what they have worked out about themselves."""
+    return tuple({f.name: getattr(edit, f.name) for f in fields(edit)} for edit in edits)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a picture is of: edits (see `values_of`) and the scene's opacity choice."""
+
+    edits: tuple[EditValues, ...]
+    preserve_opacity: bool = True
+
+
+@dataclass(frozen=True)
+class PictureTask:
+    """A part of a picture; abandoned once the shared generation is past `generation`."""
+
+    number: int
+    shown: Shown
+    camera: Camera
+    """Of the size of the whole picture that `region` is a part of."""
+    region: Region
+    look: Look
+    moving: bool
+    exact: bool
+    generation: int
+
+
+@dataclass(frozen=True)
+class StillTask:
+    """A whole picture as a PNG."""
+
+    number: int
+    shown: Shown
+    camera: Camera
+    look: Look
+
+
+@dataclass(frozen=True)
+class SurfaceTask:
+    """The surface seen at a pixel (x, y in [0,1])."""
+
+    number: int
+    shown: Shown
+    camera: Camera
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """The part of a cage that holds something dense, under the edits below it."""
+
+    number: int
+    shown: Shown
+    cage: Cage
+
+
+@dataclass(frozen=True)
+class WarmTask:
+    """One of the renderer's kernels is to be made ready, so that no drag has to wait for it."""
+
+    number: int
+    stage: int
+
+
+@dataclass(frozen=True)
+class ErrorTask:
+    """How far an edit's lattice is from its exact map; given up when its generation is over."""
+
+    number: int
+    edit: EditValues
+    generation: int
+
+
+@dataclass(frozen=True)
+class GridTask:
+    """Lines of a regular grid through an edit's shell, as the edit bends them."""
+
+    number: int
+    edit: EditValues
+
+
+@dataclass(frozen=True)
+class FrameTask:
+    """One picture of a job: the still, its place, and the edits as they are there."""
+
+    number: int
+    job: int
+    index: int
+    total: int
+    what: Literal["test_views", "camera_path"]
+    out: str
+    fps: float
+    shown: Shown
+    still: Still
+    generation: int
+
+
+@dataclass(frozen=True)
+class EndJobTask:
+    """A job's end: its files are finished or, with `keep` False, removed."""
+
+    number: int
+    job: int
+    keep: bool
+
+
+Task: TypeAlias = (
+    PictureTask | StillTask | SurfaceTask | FitTask | WarmTask | ErrorTask | GridTask | FrameTask | EndJobTask
+)
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The rendering process has loaded its scene."""
+
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class PictureDone:
+    """A rendered part: encoded picture and depths (see `server_messages.PictureHeader`)."""
+
+    number: int
+    picture: bytes
+    format: Literal["jpeg", "rgb"]
+    depth: bytes
+    depth_size: tuple[int, int]
+    depth_scale: float
+    map_seconds: float
+    render_seconds: float
+    """Map included."""
+    encode_seconds: float
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """The task was abandoned."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The task could not be done; `text` says why and what helps."""
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What was found; None where there is nothing."""
+
+    number: int
+    value: Any = field(default=None)
+
+
+Result: TypeAlias = Ready | PictureDone | Stopped | Failed | Answered

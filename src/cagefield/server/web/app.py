@@ -1,0 +1,147 @@
+"""The web application: the page, its socket, and downloads, behind the checks of `security`."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from cagefield.edits import dump_edits
+from cagefield.errors import CagefieldError
+from cagefield.server.protocol import server_messages
+from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_worker.tasks import StillTask
+from cagefield.server.web.security import Guard
+from cagefield.server.web.websocket import attend
+
+STATIC = Path(__file__).parents[1] / "static"
+"""The page as it was built."""
+
+_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
+        "connect-src 'self'; worker-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+
+
+def application(hub: Hub, hello: server_messages.Hello, guard: Guard) -> ASGIApp:
+    """The application of one editor; starts the rendering process and ends it."""
+
+    @contextlib.asynccontextmanager
+    async def life(_: Starlette) -> AsyncIterator[None]:
+        hub.desk.start()
+        yield
+        hub.desk.close()
+
+    async def socket(websocket: WebSocket) -> None:
+        await attend(websocket, hub, hello)
+
+    async def edits(_: Request) -> Response:
+        return _download(dump_edits(hub.session.document.stack), "edits.yaml", "application/yaml")
+
+    async def camera_path(_: Request) -> Response:
+        from cagefield.keyframe_files import dump_path
+
+        document = hub.session.document
+        try:
+            text = dump_path(document.placed_keys, loop=document.loop)
+        except CagefieldError as error:
+            return PlainTextResponse(str(error), 409)
+        return _download(text, "camera_path.json", "application/json")
+
+    async def screenshot(request: Request) -> Response:
+        newest = max(hub.pages, default=0)
+        page = hub.pages.get(_number(request.query_params.get("page", str(newest))))
+        if page is None:
+            return PlainTextResponse("give ?page=, the number of an open page", 404)
+        camera, look, shown = page.camera, page.look, hub.shown()
+        if camera is None:
+            return PlainTextResponse("this page has sent no camera yet", 409)
+        try:
+            content = await hub.ask(lambda number: StillTask(number, shown, camera, look))
+        except CagefieldError as error:
+            return PlainTextResponse(str(error), 500)
+        return _download(content, "screenshot.png", "image/png")
+
+    routes = [
+        WebSocketRoute("/socket", socket),
+        Route("/edits.yaml", edits),
+        Route("/camera_path.json", camera_path),
+        Route("/screenshot.png", screenshot),
+        Mount("/", StaticFiles(directory=STATIC, html=True)),
+    ]
+    return _Guarded(Starlette(routes=routes, lifespan=life), guard)
+
+
+def _number(text: str) -> int:
+    """The number, or 0, which no page has."""
+    return int(text) if text.isascii() and text.isdigit() else 0
+
+
+def _download(content: str | bytes, name: str, kind: str) -> Response:
+    return Response(
+        content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'}
+    )
+
+
+class _Guarded:
+    """Lets through what the guard lets through, and adds the headers of every answer."""
+
+    def __init__(self, app: ASGIApp, guard: Guard) -> None:
+        self._app, self._guard = app, guard
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        refusal = self._guard.refusal(
+            connection.headers,
+            connection.cookies,
+            connection.query_params,
+            needs_origin=scope["type"] == "websocket",
+        )
+        if scope["type"] == "websocket":
+            if refusal is None:
+                await self._app(scope, receive, send)
+            else:
+                with contextlib.suppress(WebSocketDisconnect):
+                    await WebSocket(scope, receive, send).close(1008, refusal[:120])
+            return
+        respond = _with_headers(send)
+        if refusal is not None:
+            await PlainTextResponse(refusal + "\n", 403)(scope, receive, respond)
+        elif self._guard.token is not None and "token" in connection.query_params:
+            await self._keep_token(scope, receive, respond)
+        else:
+            await self._app(scope, receive, respond)
+
+    async def _keep_token(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """The token moves from the address to a cookie."""
+        response = RedirectResponse(scope["path"], 303)
+        response.set_cookie(
+            self._guard.cookie, self._guard.token or "", httponly=True, samesite="strict", max_age=30 * 86400
+        )
+        await response(scope, receive, send)
+
+
+def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:
+    async def respond(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            extra = [(name.lower().encode(), value.encode()) for name, value in _HEADERS.items()]
+            message = {**message, "headers": [*message["headers"], *extra]}
+        await send(message)
+
+    return respond

@@ -1,0 +1,119 @@
+"""From a scene folder to a running editor."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import socket
+from pathlib import Path
+
+import numpy as np
+import uvicorn
+
+import cagefield
+from cagefield.camera_paths import shared_up
+from cagefield.cameras import Camera
+from cagefield.errors import CagefieldError
+from cagefield.scene import Scene
+from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.session import Session
+from cagefield.server.protocol import common, server_messages
+from cagefield.server.protocol.conversion import vec3
+from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.web.app import application
+from cagefield.server.web.security import Guard
+
+
+def open_hub(path: Path, device: str = "auto") -> tuple[Hub, server_messages.Hello]:
+    """The editor of a scene folder, and what its pages are told first; what a crash left is restored.
+
+    Raises CagefieldError for a folder that is no scene.
+    """
+    scene = Scene.open(path)
+    keeper = Keeper(scene, path)
+    session = Session(keeper.document(), scene.field.bounds, scene.field.sample_spacing)
+    hub = Hub(session, keeper, device)
+    recovered = keeper.recovered()
+    if recovered is not None:
+        session.restore(recovered)
+        hub.greeting = "changes that had not been saved were restored; undo takes them back"
+    return hub, hello_of(scene, path.resolve().name)
+
+
+def hello_of(scene: Scene, name: str) -> server_messages.Hello:
+    """What a page is told first."""
+    cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
+    first = cameras[0] if cameras else _from_outside(scene)
+    lower, upper = scene.field.bounds
+    poses = [camera.c2w for camera in cameras]
+    every = [camera.c2w for group in scene.cameras.values() for camera in group]
+    return server_messages.Hello(
+        version=cagefield.__version__,
+        page=0,
+        name=name,
+        bounds=(vec3(lower), vec3(upper)),
+        voxel=scene.field.sample_spacing,
+        up=vec3(shared_up(np.stack(every))) if every else (0.0, 0.0, 1.0),
+        start=common.CameraMessage(
+            seq=0,
+            c2w=first.c2w.reshape(-1).tolist(),
+            width=min(max(first.width, 16), 4096),
+            height=min(max(first.height, 16), 4096),
+            fov_y_deg=math.degrees(2.0 * math.atan(0.5 * first.height / first.fy)),
+        ),
+        cameras=[pose.reshape(-1).tolist() for pose in poses],
+    )
+
+
+def _from_outside(scene: Scene) -> Camera:
+    """A camera that sees the whole field."""
+    lower, upper = scene.field.bounds
+    size = float(((upper - lower) ** 2).sum()) ** 0.5
+    middle = 0.5 * (lower + upper)
+    return Camera.look_at(
+        middle + size * np.array([0.9, -0.9, 0.6]), middle, width=800, height=800, fov_x=0.9
+    )
+
+
+def bound_socket(host: str, port: int) -> socket.socket:
+    """A listening socket; port 0 takes any that is free.
+
+    Raises:
+        CagefieldError: the port is taken, or the host is not an address of this machine.
+    """
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    except OSError as error:
+        raise CagefieldError(
+            f"--host {host} is no address ({error.strerror}); give one of this machine's"
+        ) from None
+    reason: str | None = None
+    for family, _, _, _, address in found:
+        listening = socket.socket(family)
+        try:
+            if os.name == "posix":
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listening.bind(address)
+            listening.listen(128)
+            return listening
+        except OSError as error:
+            listening.close()
+            reason = error.strerror
+    raise CagefieldError(
+        f"cannot listen on {host}:{port} ({reason}); give another --port, or 0 for a free one"
+    )
+
+
+def serve(hub: Hub, hello: server_messages.Hello, guard: Guard, listening: socket.socket) -> None:
+    """Runs the web server to its end (Ctrl+C, or a signal to terminate)."""
+    config = uvicorn.Config(
+        application(hub, hello, guard),
+        log_level="warning",
+        ws_max_size=common.MOST_BYTES,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listening])

@@ -1,0 +1,130 @@
+"""One WebSocket per page: reads, checks and hands on messages; sends what waits. Knows nothing of editing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections.abc import Coroutine, Iterator
+from typing import Any
+
+from pydantic import ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from cagefield.errors import CagefieldError
+from cagefield.server.protocol import client_messages, common, server_messages
+from cagefield.server.protocol.message_queues import Inbox
+from cagefield.server.protocol.validation_errors import refusal
+from cagefield.server.render_queue.coordinator import Hub, Page
+from cagefield.server.web.handlers import Speaker
+from cagefield.server.web.security import Allowance
+
+TOO_BIG, TOO_MANY = 1009, 1008
+"""Close codes of RFC 6455: message too big, policy violation."""
+
+_log = logging.getLogger(__name__)
+
+MOST_REFUSED = 2000
+"""Messages over the rate after which the socket is closed."""
+
+
+async def attend(socket: WebSocket, hub: Hub, hello: server_messages.Hello) -> None:
+    """Serves one page until it is gone."""
+    try:
+        await socket.accept()
+    except (WebSocketDisconnect, ConnectionError):
+        return
+    page = hub.join(hello)
+    inbox = Inbox()
+    tasks = [
+        asyncio.ensure_future(work)
+        for work in (_read(socket, page, inbox), _do(Speaker(hub, page), page, inbox), _send(socket, page))
+    ]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        ends = await asyncio.gather(*tasks, return_exceptions=True)
+        hub.leave(page)
+    for end in ends:
+        if isinstance(end, Exception) and not _is_parting(socket, end):
+            _log.error("a page's socket failed", exc_info=end)
+
+
+def _is_parting(socket: WebSocket, error: Exception) -> bool:
+    """Whether the error says no more than that the page is gone, or that its socket was closed."""
+    if isinstance(error, RuntimeError):
+        return WebSocketState.DISCONNECTED in (socket.application_state, socket.client_state)
+    return isinstance(error, (WebSocketDisconnect, ConnectionError))
+
+
+async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
+    allowance, refused = Allowance(), 0
+    while True:
+        received = await socket.receive()
+        if received["type"] == "websocket.disconnect":
+            return
+        text = received.get("text")
+        if text is None:
+            page.notice("error", "a message must be text, one JSON object")
+            continue
+        if len(text.encode()) > common.MOST_BYTES:
+            await socket.close(TOO_BIG, "message too big")
+            return
+        if not allowance.take(time.monotonic()):
+            refused += 1
+            if refused == 1:
+                page.notice("error", "too many messages; some were passed over")
+            if refused > MOST_REFUSED:
+                await socket.close(TOO_MANY, "too many messages")
+                return
+            continue
+        try:
+            inbox.put(client_messages.page_messages.validate_json(text))
+        except ValidationError as error:
+            page.notice("error", refusal(error))
+
+
+async def _do(speaker: Speaker, page: Page, inbox: Inbox) -> None:
+    waiting: set[asyncio.Task[None]] = set()
+    try:
+        while True:
+            message = await inbox.get()
+            with _told(page):
+                rest = speaker.hear(message)
+                if rest is not None:
+                    task = asyncio.ensure_future(_finish(rest, page))
+                    waiting.add(task)
+                    task.add_done_callback(waiting.discard)
+            await asyncio.sleep(0)
+    finally:
+        for task in waiting:
+            task.cancel()
+
+
+async def _finish(rest: Coroutine[Any, Any, None], page: Page) -> None:
+    with _told(page):
+        await rest
+
+
+@contextlib.contextmanager
+def _told(page: Page) -> Iterator[None]:
+    """What cannot be done becomes a line for the page's user."""
+    try:
+        yield
+    except (CagefieldError, OSError) as error:
+        page.notice("error", str(error))
+    except Exception as error:
+        _log.exception("a message could not be followed")
+        page.notice("error", f"the server could not do that ({type(error).__name__}: {error}); see its log")
+
+
+async def _send(socket: WebSocket, page: Page) -> None:
+    while True:
+        content = await page.outbox.get()
+        if isinstance(content, bytes):
+            await socket.send_bytes(content)
+        else:
+            await socket.send_text(content)
