@@ -27,7 +27,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[Guard]:
     """The guards of the editors that would have been served; nothing is."""
     guards: list[Guard] = []
 
-    def serve(hub: object, hello: object, guard: Guard, listening: socket.socket) -> None:
+    def serve(coordinator: object, hello: object, guard: Guard, listening: socket.socket) -> None:
         listening.close()
         guards.append(guard)
 
@@ -132,8 +132,8 @@ def test_the_demo_ends_by_offering_the_editor(
 
 
 def test_a_page_is_told_where_up_is_and_where_to_begin(scene: Path) -> None:
-    hub, hello = launch.open_hub(scene)
-    assert hub.session.saved and hello.name == "scene"
+    coordinator, hello = launch.open_scene(scene)
+    assert coordinator.session.saved and hello.name == "scene"
     assert hello.up == (0.0, 0.0, 1.0)
     camera = ball_scene().cameras["test"][0]
     assert hello.start.c2w == camera.c2w.reshape(-1).tolist()

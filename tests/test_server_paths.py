@@ -19,10 +19,10 @@ from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe
 from cagefield.server.protocol import client_messages, server_messages
 from cagefield.server.protocol.validation_errors import refusal
-from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
-from cagefield.server.web.handlers import Speaker
-from cagefield.server.web.launch import open_hub
+from cagefield.server.web.handlers import MessageHandlers
+from cagefield.server.web.launch import open_scene
 from cagefield.server.web.security import Guard
 from scenes import ball_scene
 
@@ -44,10 +44,12 @@ def key(**changed: Any) -> dict[str, Any]:
     return {"c2w": POSE, "fov_y_deg": 50.0, "seconds": 2.0, "parts": {"1": 0.5}} | changed
 
 
-def said(hub: Hub, hello: server_messages.Hello, text: str) -> str | None:
+def said(coordinator: Coordinator, hello: server_messages.Hello, text: str) -> str | None:
     """What the page's user is told of a message; None where it is followed."""
     try:
-        Speaker(hub, hub.join(hello)).hear(client_messages.page_messages.validate_json(text))
+        MessageHandlers(coordinator, coordinator.join(hello)).handle(
+            client_messages.page_messages.validate_json(text)
+        )
     except ValidationError as error:
         return refusal(error)
     except CagefieldError as error:
@@ -76,37 +78,37 @@ def said(hub: Hub, hello: server_messages.Hello, text: str) -> str | None:
     ],
 )  # fmt: skip
 def test_a_bad_value_in_a_message_is_named_with_its_cure(scene: Path, text: str, told: str) -> None:
-    hub, hello = open_hub(scene)
-    line = said(hub, hello, text)
+    coordinator, hello = open_scene(scene)
+    line = said(coordinator, hello, text)
     assert line is not None and line.startswith(f"the camera path is not taken: {told}"), line
     assert "\n" not in line
-    assert hub.session.document.keys == ()
+    assert coordinator.session.document.keys == ()
 
 
 def test_a_good_path_is_taken_and_told_to_pages(scene: Path) -> None:
-    hub, hello = open_hub(scene)
+    coordinator, hello = open_scene(scene)
     widest = key(fov_y_deg=178, seconds=3600, parts={"1": 1})
-    assert said(hub, hello, set_path(key(fov_y_deg=0.2, seconds=0.01), widest, loop=True)) is None
-    state = hub.state()
+    assert said(coordinator, hello, set_path(key(fov_y_deg=0.2, seconds=0.01), widest, loop=True)) is None
+    state = coordinator.state()
     assert [k.model_dump(mode="json") for k in state.keys][1] == widest and state.loop
 
 
 def test_other_malformed_messages_say_what_to_do(scene: Path) -> None:
-    line = said(*open_hub(scene), '{"type": "undo"}')
+    line = said(*open_scene(scene), '{"type": "undo"}')
     assert line is not None and line.startswith("malformed message: ") and line.endswith("; reload the page")
 
 
 @pytest.mark.parametrize("length", [None, 200])
 def test_a_camera_paths_file_is_not_read_as_edits(scene: Path, length: int | None) -> None:
-    hub, hello = open_hub(scene)
+    coordinator, hello = open_scene(scene)
     text = dump_path((Keyframe(tuple(POSE), 50.0),), loop=False)[:length]
-    line = said(hub, hello, json.dumps({"type": "load_edits", "text": text}))
+    line = said(coordinator, hello, json.dumps({"type": "load_edits", "text": text}))
     assert line is not None and line.startswith(
         "this is a camera path, and no edits; save it as camera_path.json"
     )
     edits = dump_edits(EditStack([BALL, BALL]), format="json")
-    assert said(hub, hello, json.dumps({"type": "load_edits", "text": edits})) is None
-    assert len(hub.session.document.entries) == 2
+    assert said(coordinator, hello, json.dumps({"type": "load_edits", "text": edits})) is None
+    assert len(coordinator.session.document.entries) == 2
 
 
 def test_a_scene_whose_path_is_damaged_is_not_opened(scene: Path) -> None:
@@ -116,24 +118,24 @@ def test_a_scene_whose_path_is_damaged_is_not_opened(scene: Path) -> None:
     with pytest.raises(
         CameraError, match=r"camera_path\.json: keyframes\[0\]: the part of edit 1 is 7; give 0"
     ):
-        open_hub(scene)
+        open_scene(scene)
 
 
 def test_a_path_that_is_too_long_for_a_file_changes_no_file(scene: Path) -> None:
-    hub, hello = open_hub(scene)
+    coordinator, hello = open_scene(scene)
     hour = key(seconds=3600)
-    assert said(hub, hello, set_path(hour, hour, hour)) is None
+    assert said(coordinator, hello, set_path(hour, hour, hour)) is None
     edits = (scene / "edits.yaml").read_bytes()
-    hub.session.preserve_opacity(False)
-    hub.session.remove(1)
+    coordinator.session.preserve_opacity(False)
+    coordinator.session.remove(1)
     with pytest.raises(CameraError, match="make it shorter"):
-        hub.save()
+        coordinator.save()
     assert (scene / "edits.yaml").read_bytes() == edits and not (scene / "camera_path.json").exists()
-    answer = asyncio.run(fetched(hub, hello, "/camera_path.json"))
+    answer = asyncio.run(fetched(coordinator, hello, "/camera_path.json"))
     assert answer.status_code == 409 and "make it shorter" in answer.text
 
 
-async def fetched(hub: Hub, hello: server_messages.Hello, path: str) -> httpx.Response:
-    transport = httpx.ASGITransport(application(hub, hello, Guard("localhost", 80)))
+async def fetched(coordinator: Coordinator, hello: server_messages.Hello, path: str) -> httpx.Response:
+    transport = httpx.ASGITransport(application(coordinator, hello, Guard("localhost", 80)))
     async with httpx.AsyncClient(transport=transport, base_url="http://localhost:80") as client:
         return await client.get(path)

@@ -21,9 +21,9 @@ from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common
 from cagefield.server.protocol.conversion import MOST_STILLS, STILLS_PER_SECOND, stills_of
 from cagefield.server.render_worker.tasks import PictureTask, Shown, values_of
-from cagefield.server.web.handlers import Speaker
-from cagefield.server.web.launch import open_hub
-from cagefield.server.web.websocket import Inbox
+from cagefield.server.web.handlers import MessageHandlers
+from cagefield.server.web.launch import open_scene
+from cagefield.server.web.websocket import ReceiveQueue
 from scenes import ball_scene
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
@@ -185,25 +185,25 @@ def test_pages_are_told_the_cameras_of_the_video() -> None:
 
 
 class Played:
-    """A hub with two pages that look at a ball, and no renderer."""
+    """A coordinator with two pages that look at a ball, and no renderer."""
 
     def __init__(self, path: Path) -> None:
-        self.hub, self._hello = open_hub(path, "cpu")
-        self.pages = [self.hub.join(self._hello) for _ in range(2)]
-        self.speakers = [Speaker(self.hub, page) for page in self.pages]
+        self.coordinator, self._hello = open_scene(path, "cpu")
+        self.pages = [self.coordinator.join(self._hello) for _ in range(2)]
+        self.speakers = [MessageHandlers(self.coordinator, page) for page in self.pages]
         for n in range(2):
             self.say(n, "camera", **{**self._hello.start.model_dump(exclude={"type"}), "seq": 1})
         self.heard()
 
     def say(self, page: int, kind: str, **values: Any) -> None:
         message = client_messages.page_messages.validate_python({"type": kind, **values})
-        rest = self.speakers[page].hear(message)
+        rest = self.speakers[page].handle(message)
         assert rest is None
 
     def heard(self) -> list[list[dict[str, Any]]]:
         """What each page was told since it was asked last."""
         return [
-            [json.loads(asyncio.run(page.outbox.get())) for _ in range(len(page.outbox))]
+            [json.loads(asyncio.run(page.send_queue.get())) for _ in range(len(page.send_queue))]
             for page in self.pages
         ]
 
@@ -215,11 +215,11 @@ class Played:
 
     def rendered(self) -> PictureTask:
         """The next picture, which is not rendered."""
-        request = self.hub.desk.scheduler.next(1e9)
+        request = self.coordinator.dispatcher.scheduler.next(1e9)
         assert request is not None
-        task, stamp = self.hub.picture_task(request, 0)
-        assert stamp.revision == self.hub.session.revision
-        self.hub.desk.scheduler.abandoned(request, again=False)
+        task, stamp = self.coordinator.picture_task(request, 0)
+        assert stamp.revision == self.coordinator.session.revision
+        self.coordinator.dispatcher.scheduler.abandoned(request, again=False)
         return task
 
 
@@ -227,46 +227,46 @@ class Played:
 def played(tmp_path: Path) -> Played:
     ball_scene().with_edits(EditStack([ARM, STILL])).save(tmp_path / "ball")
     found = Played(tmp_path / "ball")
-    found.hub.session.set_path(KEYS, False)
-    found.hub.changed()
+    found.coordinator.session.set_path(KEYS, False)
+    found.coordinator.changed()
     found.heard()
     return found
 
 
 def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(played: Played) -> None:
-    hub = played.hub
+    coordinator = played.coordinator
     played.say(0, "play_begin", play=4)
     assert played.previews() == [[(1, 4, True)]] * 2
     played.say(0, "play", play=4, seconds=1.0)
     assert played.previews() == [[], []]
-    expected = Shown(values_of(blended(hub.session.document, {1: 0.5})))
-    assert hub.shown() != Shown(values_of((ARM, STILL)))
+    expected = Shown(values_of(blended(coordinator.session.document, {1: 0.5})))
+    assert coordinator.shown() != Shown(values_of((ARM, STILL)))
     np.testing.assert_allclose(
-        [e["operations"][0].by for e in hub.shown().edits],
+        [e["operations"][0].by for e in coordinator.shown().edits],
         [e["operations"][0].by for e in expected.edits],
     )
     for task in (played.rendered(), played.rendered()):  # one for each page
-        assert task.shown == hub.shown() and task.moving and not task.exact
-    late = hub.join(played._hello)
-    told = [json.loads(asyncio.run(late.outbox.get())) for _ in range(len(late.outbox))]
+        assert task.shown == coordinator.shown() and task.moving and not task.exact
+    late = coordinator.join(played._hello)
+    told = [json.loads(asyncio.run(late.send_queue.get())) for _ in range(len(late.send_queue))]
     assert [m["play"] for m in told if m["type"] == "preview"] == [4]
     played.say(0, "play_end", play=4)
-    assert hub.shown() == Shown(values_of((ARM, STILL)))
+    assert coordinator.shown() == Shown(values_of((ARM, STILL)))
     (state,) = [m for m in played.heard()[1] if m["type"] == "state"]
     assert state["pictured"] == state["revision"] and state["history"] == ["Open", "Camera path"]
 
 
 def test_chores_wait_for_the_preview(played: Played) -> None:
-    scheduler = played.hub.desk.scheduler
+    scheduler = played.coordinator.dispatcher.scheduler
     for page in played.pages:
         scheduler.leave(page.number)
     assert scheduler.idle()
-    played.hub.session.play_begin(1, 1)
-    played.hub.pages.clear()
-    played.hub.pump()
+    played.coordinator.session.play_begin(1, 1)
+    played.coordinator.pages.clear()
+    played.coordinator.pump()
     assert not scheduler.idle()
-    played.hub.session.play_end(1)
-    played.hub.pump()
+    played.coordinator.session.play_end(1)
+    played.coordinator.pump()
     assert scheduler.idle()
 
 
@@ -281,7 +281,7 @@ def test_pages_are_told_that_something_else_has_ended_it(played: Played, how: st
     elif how == "taken over":
         played.say(1, "play_begin", play=1)
     else:
-        played.hub.leave(played.pages[0])
+        played.coordinator.leave(played.pages[0])
     more = [(2, 1, True)] if how == "taken over" else []
     assert played.previews()[1] == [(1, 1, False), *more]
 
@@ -293,10 +293,10 @@ def test_a_page_whose_preview_cannot_begin_or_go_on_is_told(played: Played) -> N
         played.say(0, "play_begin", play=2)
     assert played.previews() == [[(1, 2, False)], []]
     played.say(1, "drag_cancel", drag=1)
-    played.hub.session.load_edits(dump_edits(EditStack([TURNED])), append=False)
-    number = played.hub.session.document.entries[0].id
-    played.hub.session.set_path((key(0.0), key(1.0, **{f"e{number}": 0.0})), False)
-    played.hub.changed()
+    played.coordinator.session.load_edits(dump_edits(EditStack([TURNED])), append=False)
+    number = played.coordinator.session.document.entries[0].id
+    played.coordinator.session.set_path((key(0.0), key(1.0, **{f"e{number}": 0.0})), False)
+    played.coordinator.changed()
     played.say(0, "play_begin", play=3)
     played.heard()
     with pytest.raises(CagefieldError, match="is not possible at 50%"):
@@ -305,7 +305,7 @@ def test_a_page_whose_preview_cannot_begin_or_go_on_is_told(played: Played) -> N
 
 
 def test_of_messages_on_the_way_along_the_path_only_the_newest_wait() -> None:
-    inbox = Inbox()
+    receive_queue = ReceiveQueue()
     pose = np.eye(4).reshape(-1).tolist()
 
     def camera(seq: int) -> common.CameraMessage:
@@ -318,6 +318,6 @@ def test_of_messages_on_the_way_along_the_path_only_the_newest_wait() -> None:
         end,
         camera(9),
     ):
-        inbox.put(message)
-    waiting = list(inbox._waiting)
+        receive_queue.put(message)
+    waiting = list(receive_queue._waiting)
     assert waiting == [begin, client_messages.Play(play=1, seconds=4), camera(4), end, camera(9)]

@@ -351,7 +351,7 @@ def test_what_the_server_did_not_expect_is_told_too(caplog: pytest.LogCaptureFix
         raise ZeroDivisionError("by zero")
     with _told(one):
         raise CagefieldError("a line\nwith its cure")
-    first, second = (json.loads(asyncio.run(one.outbox.get())) for _ in range(2))
+    first, second = (json.loads(asyncio.run(one.send_queue.get())) for _ in range(2))
     assert "could not do that (ZeroDivisionError: by zero)" in first["text"] and "by zero" in caplog.text
     assert second["text"] == "a line with its cure"
 

@@ -20,18 +20,17 @@ from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.metrics import psnr
 from cagefield.scene import Scene
 from cagefield.server.editor.cage_placement import fitted
-from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
-from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.damage import WHOLE, Showing
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_queue.splat_extent import spread
 from cagefield.server.render_worker.pictures import Look, Region
-from cagefield.server.render_worker.renderer_cache import Studio
+from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
-from cagefield.server.render_worker.task_handlers import Working
+from cagefield.server.render_worker.task_handlers import TaskHandlers
 from cagefield.server.render_worker.tasks import (
-    WARM_STAGES,
     Answered,
     ErrorTask,
     FitTask,
@@ -41,10 +40,11 @@ from cagefield.server.render_worker.tasks import (
     Shown,
     Stopped,
     SurfaceTask,
+    WarmStage,
     WarmTask,
     values_of,
 )
-from cagefield.server.web.launch import hello_of, open_hub
+from cagefield.server.web.launch import hello_of, open_scene
 from sent_pictures import pixels_of
 from splat_scenes import ball_of_splats, splat_scene
 
@@ -57,9 +57,9 @@ PART = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
+def renderers() -> RendererCache:
     devices.start("cpu")
-    return Studio(splat_scene())
+    return RendererCache(splat_scene())
 
 
 @pytest.fixture
@@ -72,26 +72,26 @@ def task(*edits: Edit, look: Look = Look(), moving: bool = False, exact: bool = 
     return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, look, moving, exact, 0)
 
 
-def picture(studio: Studio, asked: PictureTask) -> np.ndarray[Any, Any]:
-    done = studio.picture(asked, lambda: False)
+def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
+    done = renderers.picture(asked, lambda: False)
     assert isinstance(done, PictureDone)
     return pixels_of(done.picture, done.format, SIDE, SIDE).astype(float)
 
 
 @pytest.mark.parametrize("edits", [(), (MOVED,), (COPY,), (MOVED, COPY), (Edit.delete(INNER),)])
 def test_pictures_are_those_of_the_scene_at_rest_and_near_them_in_a_drag(
-    studio: Studio, edits: tuple[Edit, ...]
+    renderers: RendererCache, edits: tuple[Edit, ...]
 ) -> None:
-    frame = studio.scene.with_edits(EditStack(edits)).render(CAMERA)
-    assert np.array_equal(picture(studio, task(*edits)), frame.rgb8())
-    quick = picture(studio, task(*edits, moving=True, exact=False))
+    frame = renderers.scene.with_edits(EditStack(edits)).render(CAMERA)
+    assert np.array_equal(picture(renderers, task(*edits)), frame.rgb8())
+    quick = picture(renderers, task(*edits, moving=True, exact=False))
     # Long steps of the flow, 1e-4 of the scene: a hundredth of a pixel.
     assert psnr(quick / 255.0, frame.rgb8() / 255.0) > 45
 
 
-def test_views(studio: Studio) -> None:
+def test_views(renderers: RendererCache) -> None:
     depth, opacity, normals = (
-        picture(studio, task(MOVED, look=Look(view=view))) for view in ("depth", "opacity", "normals")
+        picture(renderers, task(MOVED, look=Look(view=view))) for view in ("depth", "opacity", "normals")
     )
     solid = opacity[..., 0] > 200
     assert 300 < solid.sum() < 1500 and (opacity[0, 0] == 0).all()
@@ -102,11 +102,11 @@ def test_views(studio: Studio) -> None:
     assert np.corrcoef(row, normals[solid][:, 2])[0, 1] < -0.7
 
 
-def test_the_surface_under_the_mouse(studio: Studio) -> None:
-    working = Working(studio)
+def test_the_surface_under_the_mouse(renderers: RendererCache) -> None:
+    handlers = TaskHandlers(renderers)
 
     def surface(x: float, y: float, *edits: Edit) -> Any:
-        done = working.do(SurfaceTask(1, Shown(values_of(edits)), CAMERA, x, y), lambda _: False)
+        done = handlers.do(SurfaceTask(1, Shown(values_of(edits)), CAMERA, x, y), lambda _: False)
         assert isinstance(done, Answered)
         return done.value
 
@@ -121,11 +121,11 @@ def test_the_surface_under_the_mouse(studio: Studio) -> None:
     assert surface(x, y, Edit.delete(INNER)) is None
 
 
-def test_a_cage_is_fitted_to_the_splats_in_it(studio: Studio) -> None:
-    working = Working(studio)
+def test_a_cage_is_fitted_to_the_splats_in_it(renderers: RendererCache) -> None:
+    handlers = TaskHandlers(renderers)
 
     def fit(cage: Cage, *edits: Edit) -> Cage:
-        done = working.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
+        done = handlers.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
         assert isinstance(done, Answered)
         return fitted(cage, np.array(done.value))
 
@@ -165,40 +165,40 @@ def test_fog_is_not_dense_and_many_faint_splats_are() -> None:
     assert not dense(cage, splats(((5.0, 0.5, 0.5), (0.1, 0.1, 0.1), 1.0))).any()
 
 
-def test_lattices_have_no_error_and_warming_up_is_possible(studio: Studio) -> None:
-    working = Working(studio)
-    done = working.do(ErrorTask(7, values_of((MOVED,))[0], 0), lambda _: False)
+def test_lattices_have_no_error_and_warming_up_is_possible(renderers: RendererCache) -> None:
+    handlers = TaskHandlers(renderers)
+    done = handlers.do(ErrorTask(7, values_of((MOVED,))[0], 0), lambda _: False)
     assert done == Answered(7, (0.0, 0.0))
-    for stage in range(WARM_STAGES):
-        assert working.do(WarmTask(1, stage), lambda _: False) == Answered(1)
+    for stage in WarmStage:
+        assert handlers.do(WarmTask(1, stage), lambda _: False) == Answered(1)
 
 
-def test_edits_in_a_drag_keep_their_lattices_and_are_given_up(studio: Studio) -> None:
-    renderer = studio.renderer(Shown(values_of((MOVED,))), exact=False)
+def test_edits_in_a_drag_keep_their_lattices_and_are_given_up(renderers: RendererCache) -> None:
+    renderer = renderers.renderer(Shown(values_of((MOVED,))), exact=False)
     assert renderer.edits[0].lattice == 128
     far = MOVED.translate((0.01, 0, 0))
-    assert studio.picture(task(far), lambda: True) == Stopped(1)
+    assert renderers.picture(task(far), lambda: True) == Stopped(1)
 
 
-def test_jobs_write_their_pictures(studio: Studio, tmp_path: Path) -> None:
-    working = Working(studio)
+def test_jobs_write_their_pictures(renderers: RendererCache, tmp_path: Path) -> None:
+    handlers = TaskHandlers(renderers)
     asked = FrameTask(
         1, 1, 0, 1, "test_views", str(tmp_path), 24.0, Shown(values_of((MOVED,))), Still(CAMERA, {}), 0
     )
-    assert working.do(asked, lambda _: False) == Answered(1)
+    assert handlers.do(asked, lambda _: False) == Answered(1)
     written = np.asarray(Image.open(tmp_path / "0000.png"))
-    assert np.array_equal(written, studio.scene.with_edits(EditStack([MOVED])).render(CAMERA).rgb8())
+    assert np.array_equal(written, renderers.scene.with_edits(EditStack([MOVED])).render(CAMERA).rgb8())
 
 
 def test_a_page_is_told_of_the_field_and_edits_are_saved(folder: Path) -> None:
-    _, hello = open_hub(folder)
+    _, hello = open_scene(folder)
     field = ball_of_splats()
     assert hello.voxel == pytest.approx(field.sample_spacing) and hello.bounds[1] == (1.0, 1.0, 1.0)
     assert hello_of(Scene.open(folder), "ball").start.width == 24
-    keeper = Keeper(Scene.open(folder).with_edits(EditStack([MOVED])), folder)
-    session = Session(keeper.document(), field.bounds, field.sample_spacing)
+    store = SceneStore(Scene.open(folder).with_edits(EditStack([MOVED])), folder)
+    session = Session(store.document(), field.bounds, field.sample_spacing)
     assert [entry.edit.name for entry in session.document.entries] == ["ball"]
-    keeper.save(session)
+    store.save(session)
     again = Scene.open(folder)
     assert isinstance(again.field, SplatField) and again.edits == EditStack([MOVED])
     np.testing.assert_array_equal(again.field.means, field.means)
@@ -206,12 +206,14 @@ def test_a_page_is_told_of_the_field_and_edits_are_saved(folder: Path) -> None:
 
 def test_what_differs_is_as_much_larger_as_splats_reach(folder: Path) -> None:
     scene = Scene.open(folder)
-    keeper = Keeper(scene, folder)
-    hub = Hub(Session(keeper.document(), scene.field.bounds, scene.field.sample_spacing), keeper)
+    store = SceneStore(scene, folder)
+    coordinator = Coordinator(
+        Session(store.document(), scene.field.bounds, scene.field.sample_spacing), store
+    )
     reach = spread(scene.field)
     size = 2.5 * 0.5 / np.sqrt(600)  # of the ball's discs
     assert reach == pytest.approx(3.0 * size, rel=1e-3)
-    assert hub._spread == reach and hub.desk.scheduler._whole_at_rest
+    assert coordinator._spread == reach and coordinator.dispatcher.scheduler._whole_at_rest
     assert spread(scene.field.take(np.zeros(0, int))) == 0.0
 
 

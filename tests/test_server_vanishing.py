@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from cagefield.server.web.launch import open_hub
+from cagefield.server.web.launch import open_scene
 from cagefield.server.web.websocket import attend
 from editor_server import PATIENCE, EditorServer, editor_server, page
 from scenes import ball_scene
@@ -153,9 +153,9 @@ def test_a_page_that_is_gone_is_no_error(
     tmp_path: Path, receiving: Exception | None, sending: Exception | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     ball_scene().save(tmp_path / "ball")
-    hub, hello = open_hub(tmp_path / "ball")
-    asyncio.run(asyncio.wait_for(attend(played_socket(receiving, sending), hub, hello), PATIENCE))
-    assert hub.pages == {} and caplog.text == ""
+    coordinator, hello = open_scene(tmp_path / "ball")
+    asyncio.run(asyncio.wait_for(attend(played_socket(receiving, sending), coordinator, hello), PATIENCE))
+    assert coordinator.pages == {} and caplog.text == ""
 
 
 @pytest.mark.parametrize("error", [RuntimeError("broken"), ValueError("broken")])
@@ -163,7 +163,7 @@ def test_an_error_that_no_lost_page_explains_is_logged_and_the_page_leaves(
     tmp_path: Path, error: Exception, caplog: pytest.LogCaptureFixture
 ) -> None:
     ball_scene().save(tmp_path / "ball")
-    hub, hello = open_hub(tmp_path / "ball")
+    coordinator, hello = open_scene(tmp_path / "ball")
     with caplog.at_level(logging.ERROR):
-        asyncio.run(asyncio.wait_for(attend(played_socket(None, error), hub, hello), PATIENCE))
-    assert hub.pages == {} and "a page's socket failed" in caplog.text and "broken" in caplog.text
+        asyncio.run(asyncio.wait_for(attend(played_socket(None, error), coordinator, hello), PATIENCE))
+    assert coordinator.pages == {} and "a page's socket failed" in caplog.text and "broken" in caplog.text

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cagefield.server.render_worker.process import Worker, serve
-from cagefield.server.render_worker.tasks import Answered, Ready, Result, WarmTask
+from cagefield.server.render_worker.tasks import Answered, Ready, Result, WarmStage, WarmTask
 from scenes import ball_scene
 
 PATIENCE = 120.0
@@ -25,7 +25,7 @@ def test_it_ends_by_itself_and_keeps_the_kernels_that_it_compiled(
     worker.start()
     try:
         assert results.get(timeout=PATIENCE) == Ready()
-        worker.send(WarmTask(1, 2))
+        worker.send(WarmTask(1, WarmStage.EXACT_EDIT))
         assert results.get(timeout=PATIENCE) == Answered(1)
     finally:
         worker.close()
@@ -72,7 +72,7 @@ def test_a_process_that_dies_while_it_is_started_is_lost_and_nothing_more(
     monkeypatch.setattr(worker._context.Process, "start", dies)
     worker.start()
     assert lost.get(timeout=PATIENCE)
-    worker.send(WarmTask(1, 0))
+    worker.send(WarmTask(1, WarmStage.COARSE_EDIT))
     worker.close()
     assert lost.empty()
 
@@ -88,6 +88,6 @@ def test_a_process_that_is_killed_is_lost_once_and_may_be_sent_to_and_closed(
     os.kill(worker.pid, signal.SIGKILL)
     assert results.get(timeout=PATIENCE) is None
     for number in range(3):
-        worker.send(WarmTask(number, 0))
+        worker.send(WarmTask(number, WarmStage.COARSE_EDIT))
     worker.close()
     assert results.empty() and capfd.readouterr().err == ""

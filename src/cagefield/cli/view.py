@@ -34,10 +34,10 @@ class View:
             raise CagefieldError(f"--port is {self.port}; give a number from 0 to 65535")
         if self.token is not None and len(self.token) < 8:
             raise CagefieldError("--token is too short to keep anybody out; give 8 characters or more")
-        from cagefield.server.web.launch import bound_socket, open_hub, serve
+        from cagefield.server.web.launch import bound_socket, open_scene, serve
         from cagefield.server.web.security import Guard, is_loopback, new_token
 
-        hub, hello = open_hub(self.scene, self.device)
+        coordinator, hello = open_scene(self.scene, self.device)
         listening = bound_socket(self.host, self.port)
         port = int(listening.getsockname()[1])
         token = self.token or (None if is_loopback(self.host) else new_token())
@@ -45,7 +45,7 @@ class View:
         print(f"editing {self.scene}: open {link}  (Ctrl+C ends)", flush=True)
         if not self.no_browser:
             webbrowser.open(link)
-        serve(hub, hello, Guard(self.host, port, token), listening)
+        serve(coordinator, hello, Guard(self.host, port, token), listening)
 
 
 def _shown(host: str) -> str:

@@ -27,7 +27,7 @@ CAMERA_PATH = "camera_path.json"
 _EDITS = "edits.yaml"
 
 
-class Keeper:
+class SceneStore:
     """Where a session is kept: the scene's folder, and the autosave beside it.
 
     `origin` is the folder whose field is rendered, `path` the one that is saved to.

@@ -23,6 +23,7 @@ from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.drags import Drags
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
 from cagefield.server.editor.history import History
+from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.labels import fresh_name, named, of
 from cagefield.server.editor.mirror import mirrored
 from cagefield.server.editor.path_edits import blended
@@ -48,7 +49,7 @@ class Session:
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
-        self._problems: list[tuple[Edit, str | None]] = []
+        self._problems: IdentityCache[Edit, str | None] = IdentityCache(64)
 
     # ---- what is there ----
 
@@ -74,12 +75,9 @@ class Session:
 
     def problem(self, edit: Edit) -> str | None:
         """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
-        for known, found in self._problems:
-            if known is edit:
-                return found
-        found = problem(edit) if edit.changes_anything else None
-        self._problems = [*self._problems[-63:], (edit, found)]
-        return found
+        if edit in self._problems:
+            return self._problems[edit]
+        return self._problems.put(edit, problem(edit) if edit.changes_anything else None)
 
     def drawn(self) -> tuple[Edit, ...]:
         """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
@@ -108,7 +106,7 @@ class Session:
     def drag(self, page: int, number: int, operation: Operation) -> Moved:
         """How far the drag could follow its operation since the beginning; it shows that."""
         moved = self.drags.move(page, number, operation)
-        self._problems = [*self._problems[-63:], (moved.edit, moved.problem)]
+        self._problems.put(moved.edit, moved.problem)
         self.revision += 1
         return moved
 

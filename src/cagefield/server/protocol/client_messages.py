@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, TypeAdapter
 
@@ -54,6 +54,9 @@ class DragMove(Message):
     seq: Annotated[int, Field(ge=0)]
     operation: OperationMessage
 
+    def redundancy_key(self) -> str:
+        return f"drag {self.drag}"
+
 
 class DragEnd(Message):
     """The drag ends with this operation, which becomes one entry of the history."""
@@ -62,6 +65,9 @@ class DragEnd(Message):
     drag: int
     seq: Annotated[int, Field(ge=0)]
     operation: OperationMessage
+
+    def supersedes(self) -> str:
+        return f"drag {self.drag}"
 
 
 class DragCancel(Message):
@@ -84,6 +90,10 @@ class Play(Message):
     type: Literal["play"] = "play"
     play: int
     seconds: Annotated[float, Field(ge=0, le=1e7)]
+    ordered: ClassVar[bool] = False
+
+    def redundancy_key(self) -> str:
+        return f"play {self.play}"
 
 
 class PlayEnd(Message):

@@ -18,7 +18,7 @@ pages are told with `preview` that it began, and that it is over, also where som
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
@@ -47,6 +47,17 @@ class Message(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    ordered: ClassVar[bool] = True
+    """False where newer messages may be done before this one: it says only what pictures are of."""
+
+    def redundancy_key(self) -> str | None:
+        """Of the waiting messages with one key only the newest counts; None where every one does."""
+        return None
+
+    def supersedes(self) -> str | None:
+        """The key of the waiting messages that are not needed any more once this one is there."""
+        return self.redundancy_key()
+
 
 class CameraMessage(Message):
     """What the page looks from; `moving` while the mouse turns the view."""
@@ -58,6 +69,10 @@ class CameraMessage(Message):
     height: Annotated[int, Field(ge=16, le=4096)]
     fov_y_deg: Annotated[float, Field(gt=0.1, lt=179.0)]
     moving: bool = False
+    ordered: ClassVar[bool] = False
+
+    def redundancy_key(self) -> str:
+        return self.type
 
 
 class Key(Message):

@@ -5,17 +5,17 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 
-from cagefield.server.protocol import client_messages, common, server_messages
+from cagefield.server.protocol import client_messages, server_messages
 
 MOST_WAITING = 200
-"""Lines that wait for a page that takes none; older ones are dropped."""
+"""Messages that wait for a page that takes none; older ones are dropped."""
 
 
-class Outbox:
-    """Messages in order; a waiting state, drag answer or job's progress gives way to a newer one."""
+class SendQueue:
+    """Messages to a page in order; those that a newer one supersedes are not sent."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[str, str | bytes]] = deque()
+        self._waiting: deque[tuple[str | None, str | bytes]] = deque()
         self._some = asyncio.Event()
 
     def __len__(self) -> int:
@@ -23,19 +23,17 @@ class Outbox:
 
     def put(self, message: server_messages.ServerMessage) -> None:
         """One message more."""
-        key: str = message.type
-        if isinstance(message, server_messages.Job):
-            key = f"job {message.job}"
-        if isinstance(message, (server_messages.State, server_messages.Dragged, server_messages.Job)):
-            self._waiting = deque(item for item in self._waiting if item[0] != key)
+        superseded = message.supersedes()
+        if superseded is not None:
+            self._waiting = deque(item for item in self._waiting if item[0] != superseded)
         elif len(self._waiting) >= MOST_WAITING:
             self._waiting.popleft()
-        self._waiting.append((key, message.model_dump_json()))
+        self._waiting.append((message.redundancy_key(), message.model_dump_json()))
         self._some.set()
 
     def put_picture(self, content: bytes) -> None:
         """One picture more; there are never more than two on their way."""
-        self._waiting.append(("picture", content))
+        self._waiting.append((None, content))
         self._some.set()
 
     async def get(self) -> str | bytes:
@@ -46,8 +44,8 @@ class Outbox:
         return self._waiting.popleft()[1]
 
 
-class Inbox:
-    """Messages that wait to be done; of drag, camera or play messages in a row only the newest waits."""
+class ReceiveQueue:
+    """Messages from a page in order; those that a newer one supersedes are not done."""
 
     def __init__(self) -> None:
         self._waiting: deque[client_messages.PageMessage] = deque()
@@ -55,11 +53,12 @@ class Inbox:
 
     def put(self, message: client_messages.PageMessage) -> None:
         """One message more."""
+        superseded = message.supersedes()
         for n in range(len(self._waiting) - 1, -1, -1):
-            if _replaces(message, self._waiting[n]):
+            if superseded is not None and self._waiting[n].redundancy_key() == superseded:
                 del self._waiting[n]
                 break
-            if not isinstance(self._waiting[n], (common.CameraMessage, client_messages.Play)):
+            if self._waiting[n].ordered:
                 break
         self._waiting.append(message)
         self._some.set()
@@ -70,13 +69,3 @@ class Inbox:
             self._some.clear()
             await self._some.wait()
         return self._waiting.popleft()
-
-
-def _replaces(new: client_messages.PageMessage, old: client_messages.PageMessage) -> bool:
-    if isinstance(new, common.CameraMessage):
-        return isinstance(old, common.CameraMessage)
-    if isinstance(new, client_messages.Play):
-        return isinstance(old, client_messages.Play) and old.play == new.play
-    if isinstance(new, (client_messages.DragMove, client_messages.DragEnd)):
-        return isinstance(old, client_messages.DragMove) and old.drag == new.drag
-    return False

@@ -80,6 +80,9 @@ class State(Message):
     keys: list[Key]
     loop: bool
 
+    def redundancy_key(self) -> str:
+        return self.type
+
 
 class Dragged(Message):
     """What became of a `drag`: `part` of the operation was followed; `why` where that is less than all."""
@@ -92,6 +95,9 @@ class Dragged(Message):
     inner: Corners
     deformed: Corners
     outer: Corners | None
+
+    def redundancy_key(self) -> str:
+        return self.type
 
 
 class Still(Message):
@@ -153,6 +159,9 @@ class Job(Message):
     total: int
     out: str
     text: str = ""
+
+    def redundancy_key(self) -> str:
+        return f"job {self.job}"
 
 
 ServerMessage: TypeAlias = Annotated[

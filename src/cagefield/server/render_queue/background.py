@@ -1,5 +1,7 @@
-"""Chores: what the rendering process does when no page waits for a picture. Making its kernels ready, then
-measuring the lattices of edits, then the pictures of background jobs."""
+"""What the rendering process does when no page waits for a picture.
+
+It makes its kernels ready, then measures the lattices of edits, then renders the pictures of background jobs.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +10,21 @@ from pathlib import Path
 
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.identity_cache import IdentityCache
+from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, server_messages
 from cagefield.server.render_queue import jobs
-from cagefield.server.render_queue.dispatcher import Chore
+from cagefield.server.render_queue.dispatcher import BackgroundTask
 from cagefield.server.render_queue.jobs import Job
 from cagefield.server.render_worker.tasks import (
-    WARM_STAGES,
     Answered,
     EndJobTask,
     ErrorTask,
     Failed,
     Result,
     Stopped,
+    WarmStage,
     WarmTask,
     values_of,
 )
@@ -29,52 +32,52 @@ from cagefield.server.render_worker.tasks import (
 Errors = tuple[float, float]
 
 
-class Chores:
-    """Hands out one chore after the other."""
+class BackgroundWork:
+    """Hands out one background task after the other."""
 
     def __init__(
         self,
         session: Session,
-        keeper: Keeper,
+        store: SceneStore,
         measured: Callable[[], None],
         tell: Callable[[server_messages.ServerMessage], None],
     ) -> None:
         """`measured` is called when a lattice was, `tell` with jobs' progress for all pages."""
-        self._session, self._keeper = session, keeper
+        self._session, self._store = session, store
         self._measured, self._tell = measured, tell
-        self._warmed, self._warming = 0, 0
-        self._errors: list[tuple[Edit, Errors | None]] = []
+        self._warmed = 0
+        self._warming = list(WarmStage)
+        self._errors: IdentityCache[Edit, Errors | None] = IdentityCache(64)
         self._jobs: list[Job] = []
         self._ending: list[EndJobTask] = []
         self._numbers = 0
 
-    def next(self, generation: int) -> Chore | None:
+    def next(self, generation: int) -> BackgroundTask | None:
         """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
-        if self._warming < WARM_STAGES:
+        if self._warming:
             return self._warm()
         edit = self._unmeasured()
         if edit is not None:
             return self._measure(edit, generation)
         if self._ending:
             task = self._ending.pop(0)
-            return Chore(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
+            return BackgroundTask(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
         return self._picture(generation) if self._jobs else None
 
     # ---- kernels ----
 
     def preparing(self) -> server_messages.Preparing:
-        """How many of the stages of `Studio.warm` are done."""
-        return server_messages.Preparing(done=self._warmed, of=WARM_STAGES)
+        """How many of the stages of `RendererCache.warm` are done."""
+        return server_messages.Preparing(done=self._warmed, of=len(WarmStage))
 
-    def _warm(self) -> Chore:
-        stage = self._warming
-        self._warming += 1
+    def _warm(self) -> BackgroundTask:
+        stage = self._warming.pop(0)
 
         def done(_: Result) -> None:
             self._warmed += 1
             self._tell(self.preparing())
 
-        return Chore(lambda number: WarmTask(number, stage), done)
+        return BackgroundTask(lambda number: WarmTask(number, stage), done)
 
     # ---- lattices ----
 
@@ -82,30 +85,29 @@ class Chores:
         """(max, mean) error of each edit's lattice by its number, voxels, where it is known."""
         found = {}
         for entry in self._session.shown.entries:
-            for edit, error in self._errors:
-                if edit is entry.edit and error is not None:
-                    found[entry.id] = error
+            error = self._errors.get(entry.edit)
+            if error is not None:
+                found[entry.id] = error
         return found
 
     def _unmeasured(self) -> Edit | None:
         if self._session.moving:
             return None
-        known = [edit for edit, _ in self._errors]
         edits = (edit for edit in self._session.drawn() if edit.lattice and edit.adjustment == "continuous")
-        return next((edit for edit in edits if not any(edit is other for other in known)), None)
+        return next((edit for edit in edits if edit not in self._errors), None)
 
-    def _measure(self, edit: Edit, generation: int) -> Chore:
+    def _measure(self, edit: Edit, generation: int) -> BackgroundTask:
         values = values_of((edit,))[0]
 
         def done(result: Result) -> None:
             if isinstance(result, Stopped):
                 return
             error = result.value if isinstance(result, Answered) else None
-            self._errors = [*self._errors[-63:], (edit, error)]
+            self._errors.put(edit, error)
             if error is not None:
                 self._measured()
 
-        return Chore(lambda number: ErrorTask(number, values, generation), done)
+        return BackgroundTask(lambda number: ErrorTask(number, values, generation), done)
 
     # ---- jobs ----
 
@@ -117,13 +119,13 @@ class Chores:
         """Begins a job. Raises CagefieldError where it could not write its result."""
         out = Path(message.out).expanduser()
         if not out.is_absolute():
-            out = self._keeper.path.parent / out
+            out = self._store.path.parent / out
         self._numbers += 1
         document, size = self._session.document, (message.width, message.height)
         if message.what == "camera_path":
             job = jobs.camera_path(self._numbers, document, out, size, message.fps, message.overwrite)
         else:
-            cameras = self._keeper.scene.cameras
+            cameras = self._store.scene.cameras
             views = cameras.get("test") or next((c for c in cameras.values() if c), ())
             job = jobs.test_views(self._numbers, document, views, out, size, message.overwrite)
         self._jobs.append(job)
@@ -136,7 +138,7 @@ class Chores:
             raise CagefieldError(f"job {number} is over already")
         self._end(job, "cancelled", "")
 
-    def _picture(self, generation: int) -> Chore | None:
+    def _picture(self, generation: int) -> BackgroundTask | None:
         job = self._jobs[0]
         try:
             job.task(0, generation)
@@ -156,7 +158,7 @@ class Chores:
                 else:
                     self._tell(_message(job, "running"))
 
-        return Chore(lambda number: job.task(number, generation), done)
+        return BackgroundTask(lambda number: job.task(number, generation), done)
 
     def _end(self, job: Job, state: str, text: str) -> None:
         self._jobs.remove(job)

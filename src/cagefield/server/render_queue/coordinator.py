@@ -1,4 +1,4 @@
-"""Hub: one session, several pages, one rendering process. Says what is rendered, and to whom it goes."""
+"""One session, several pages, one rendering process: which picture is rendered, and to which page it goes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
-from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.conversion import state_of
-from cagefield.server.protocol.message_queues import Outbox
-from cagefield.server.render_queue.background import Chores
+from cagefield.server.protocol.message_queues import SendQueue
+from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_queue.damage import WHOLE, Rect, seen
-from cagefield.server.render_queue.dispatcher import Chore, Desk, Level, Stamp
+from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Level, Stamp
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.splat_extent import spread
 from cagefield.server.render_worker.pictures import Look
@@ -31,7 +31,7 @@ class Page:
     """An open page: what it looks at and what waits to be sent to it."""
 
     number: int
-    outbox: Outbox = field(default_factory=Outbox)
+    send_queue: SendQueue = field(default_factory=SendQueue)
     camera: Camera | None = None
     look: Look = field(default_factory=Look)
     drag: int = 0
@@ -39,21 +39,21 @@ class Page:
 
     def notice(self, level: Level, text: str) -> None:
         """A line for this page's user."""
-        self.outbox.put(server_messages.Notice(level=level, text=" ".join(text.split())))
+        self.send_queue.put(server_messages.Notice(level=level, text=" ".join(text.split())))
 
 
-class Hub:
+class Coordinator:
     """See the module."""
 
-    def __init__(self, session: Session, keeper: Keeper, device: str = "auto") -> None:
+    def __init__(self, session: Session, store: SceneStore, device: str = "auto") -> None:
         self.session = session
-        self.keeper = keeper
+        self.store = store
         self.pages: dict[int, Page] = {}
-        shown = keeper.scene.field
+        shown = store.scene.field
         self._spread = spread(shown) if isinstance(shown, SplatField) else 0.0
         """How far beside where an edit maps points its content shows, world units."""
-        self.desk = Desk(str(keeper.origin), device, self, whole_at_rest=self._spread > 0.0)
-        self.chores = Chores(session, keeper, self._measured, self.broadcast)
+        self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self._spread > 0.0)
+        self.background = BackgroundWork(session, store, self._measured, self.broadcast)
         self.greeting: str | None = None
         """A line for the pages that come."""
         self._pages = 0
@@ -77,16 +77,18 @@ class Hub:
         self._pages += 1
         page = Page(self._pages)
         self.pages[page.number] = page
-        self.desk.scheduler.join(page.number)
-        page.outbox.put(hello.model_copy(update={"page": page.number}))
-        page.outbox.put(self.state())
+        self.dispatcher.scheduler.join(page.number)
+        page.send_queue.put(hello.model_copy(update={"page": page.number}))
+        page.send_queue.put(self.state())
         if self.greeting is not None:
             page.notice("info", self.greeting)
         if self._preview is not None:
-            page.outbox.put(server_messages.Preview(page=self._preview[0], play=self._preview[1], on=True))
-        page.outbox.put(self.chores.preparing())
-        for job in self.chores.jobs():
-            page.outbox.put(job)
+            page.send_queue.put(
+                server_messages.Preview(page=self._preview[0], play=self._preview[1], on=True)
+            )
+        page.send_queue.put(self.background.preparing())
+        for job in self.background.jobs():
+            page.send_queue.put(job)
         return page
 
     def leave(self, page: Page) -> None:
@@ -94,25 +96,27 @@ class Hub:
         self.pages.pop(page.number, None)
         self.session.drag_cancel(page.number)
         self.session.play_end(page.number)
-        self.desk.scheduler.leave(page.number)
+        self.dispatcher.scheduler.leave(page.number)
         self.changed()
 
     def look(self, page: Page, look: Look) -> None:
         """A page shows another view."""
         page.look = look
-        self.desk.scheduler.look(page.number, look, time.monotonic())
+        self.dispatcher.scheduler.look(page.number, look, time.monotonic())
         self.pump()
 
     def camera(self, page: Page, camera: Camera, seq: int, moving: bool) -> None:
         """A page looks from another camera."""
         page.camera = camera
-        self.desk.scheduler.camera(page.number, seq, camera.width, camera.height, moving, time.monotonic())
+        self.dispatcher.scheduler.camera(
+            page.number, seq, camera.width, camera.height, moving, time.monotonic()
+        )
         self.pump()
 
     def presented(self, page: Page, picture: int) -> None:
         """A page has shown a picture."""
-        self.desk.scheduler.presented(page.number, picture)
-        self.desk.pump()
+        self.dispatcher.scheduler.presented(page.number, picture)
+        self.dispatcher.pump()
 
     def notice(self, level: Level, text: str) -> None:
         """A line for every page."""
@@ -123,42 +127,42 @@ class Hub:
         """A message for every page, but one."""
         for page in self.pages.values():
             if page is not but:
-                page.outbox.put(message)
+                page.send_queue.put(message)
 
     # ---- the session ----
 
     def state(self) -> server_messages.State:
         """Everything that pages show of the edits."""
         self._look_again()
-        return state_of(self.session, str(self.keeper.path), self._pictured, self.chores.errors())
+        return state_of(self.session, str(self.store.path), self._pictured, self.background.errors())
 
     def changed(self, but: Page | None = None) -> None:
         """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
-        self.keeper.autosave(self.session)
-        if self.keeper.trouble is not None and self.keeper.trouble != self._trouble:
-            self.notice("warning", self.keeper.trouble)
-        self._trouble = self.keeper.trouble
+        self.store.autosave(self.session)
+        if self.store.trouble is not None and self.store.trouble != self._trouble:
+            self.notice("warning", self.store.trouble)
+        self._trouble = self.store.trouble
         if any(page is not but for page in self.pages.values()):
             self.broadcast(self.state(), but)
         self.pump()
 
     def save(self) -> None:
         """Saves what is edited where it came from."""
-        self.keeper.save(self.session)
-        self.notice("info", f"saved to {self.keeper.path}")
+        self.store.save(self.session)
+        self.notice("info", f"saved to {self.store.path}")
 
     def save_as(self, path: str, overwrite: bool) -> None:
         """Saves the scene with its edits as another folder, which is edited from then on."""
-        self.keeper.save_as(self.session, path, overwrite)
-        self.desk.worker.scene = str(self.keeper.path)
-        self.notice("info", f"saved to {self.keeper.path}")
+        self.store.save_as(self.session, path, overwrite)
+        self.dispatcher.worker.scene = str(self.store.path)
+        self.notice("info", f"saved to {self.store.path}")
 
     # ---- rendering ----
 
     async def ask(self, make: Callable[[int], Task]) -> Any:
         """What the rendering process answers to a task. Raises CagefieldError."""
-        self.desk.interrupt()
-        return await self.desk.ask(make)
+        self.dispatcher.interrupt()
+        return await self.dispatcher.ask(make)
 
     def shown(self) -> Shown:
         """What pictures show now."""
@@ -168,8 +172,8 @@ class Hub:
         """Has rendered what is new to see."""
         self._tell_preview()
         self._look_again()
-        self.desk.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
-        self.desk.pump()
+        self.dispatcher.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
+        self.dispatcher.pump()
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         """The task of a picture that the scheduler wants."""
@@ -205,11 +209,11 @@ class Hub:
         """A picture for a page."""
         page = self.pages.get(request.page)
         if page is not None:
-            page.outbox.put_picture(_packed(request, stamp, done))
+            page.send_queue.put_picture(_packed(request, stamp, done))
 
-    def chore(self) -> Chore | None:
+    def background_task(self) -> BackgroundTask | None:
         """What may be done now that no page waits for anything."""
-        return self.chores.next(self.desk.scheduler.generation)
+        return self.background.next(self.dispatcher.scheduler.generation)
 
     def _tell_preview(self) -> None:
         """Tells the pages which preview is over, and which has begun."""
@@ -241,7 +245,7 @@ class Hub:
 
     def _keep_stack(self) -> None:
         """Remembers what is shown, before it is something else."""
-        wanted = self.desk.scheduler.remembered()
+        wanted = self.dispatcher.scheduler.remembered()
         self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
         self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity
 

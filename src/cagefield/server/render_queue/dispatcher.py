@@ -1,4 +1,4 @@
-"""Desk: gives the rendering process its tasks, one at a time, and passes on what comes back.
+"""Gives the rendering process its tasks, one at a time, and passes on what comes back.
 
 Answers that somebody waits for come first, then pictures as the scheduler wants them, then what can wait.
 Everything here runs in the server's event loop; the rendering process answers through
@@ -49,15 +49,15 @@ class Stamp:
 
 
 @dataclass(frozen=True)
-class Chore:
+class BackgroundTask:
     """What can wait: a task, made when there is time for it, and what is done with its result."""
 
     make: Make
     done: Callable[[Result], None]
 
 
-class Office(Protocol):
-    """Who the desk works for."""
+class TaskSource(Protocol):
+    """Where the dispatcher gets its tasks, and what it reports to."""
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         """The task of a picture that the scheduler wants."""
@@ -71,7 +71,7 @@ class Office(Protocol):
     def notice(self, level: Level, text: str) -> None:
         """A line for the users."""
 
-    def chore(self) -> Chore | None:
+    def background_task(self) -> BackgroundTask | None:
         """What may be done now that no page waits for anything."""
 
 
@@ -83,14 +83,14 @@ class _Running:
     done: Callable[[Result], None] | None = None
 
 
-class Desk:
+class Dispatcher:
     """See the module."""
 
-    def __init__(self, scene: str, device: str, office: Office, *, whole_at_rest: bool = False) -> None:
+    def __init__(self, scene: str, device: str, source: TaskSource, *, whole_at_rest: bool = False) -> None:
         """`whole_at_rest` as for `Scheduler`."""
-        self.scheduler = Scheduler(office.differing, whole_at_rest=whole_at_rest)
+        self.scheduler = Scheduler(source.differing, whole_at_rest=whole_at_rest)
         self.worker = Worker(scene, device, self._from_thread(self._result), self._from_thread(self._lost))
-        self._office = office
+        self._source = source
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = False
         self._closing = False
@@ -149,7 +149,7 @@ class Desk:
         self.worker.send(running.task)
 
     def interrupt(self) -> None:
-        """Abandons a chore that is being done: it has to wait after all."""
+        """Abandons a background task that is being done: it has to wait after all."""
         if self._running is not None and self._running.request is None:
             self.scheduler.generation += 1
 
@@ -158,10 +158,14 @@ class Desk:
             return self._queue.popleft()
         request = self.scheduler.next(now)
         if request is not None:
-            task, stamp = self._office.picture_task(request, self.scheduler.generation)
+            task, stamp = self._source.picture_task(request, self.scheduler.generation)
             return _Running(task, request, stamp)
-        chore = self._office.chore() if self.scheduler.idle() else None
-        return None if chore is None else _Running(chore.make(self._number()), done=chore.done)
+        background_task = self._source.background_task() if self.scheduler.idle() else None
+        return (
+            None
+            if background_task is None
+            else _Running(background_task.make(self._number()), done=background_task.done)
+        )
 
     def _number(self) -> int:
         """Numbers of tasks that are no pictures; those have the scheduler's."""
@@ -180,7 +184,7 @@ class Desk:
             self._ready = True
         elif result.number == 0:
             if isinstance(result, Failed):
-                self._office.notice("error", result.text)
+                self._source.notice("error", result.text)
         elif self._running is not None and self._running.task.number == result.number:
             running, self._running = self._running, None
             self._finish(running, result)
@@ -199,11 +203,11 @@ class Desk:
                 result.render_seconds + result.encode_seconds,
                 result.map_seconds,
             )
-            self._office.deliver(running.request, running.stamp, result)
+            self._source.deliver(running.request, running.stamp, result)
             return
         self.scheduler.abandoned(running.request, again=isinstance(result, Stopped))
         if isinstance(result, Failed):
-            self._office.notice("error", result.text)
+            self._source.notice("error", result.text)
 
     def _lost(self) -> None:
         running, self._running = self._running, None
@@ -215,13 +219,13 @@ class Desk:
         if len(self._losses) > RESTARTS:
             self._give_up()
             return
-        self._office.notice("warning", "the renderer was lost and is started again; no edits are lost")
+        self._source.notice("warning", "the renderer was lost and is started again; no edits are lost")
         self.scheduler.refresh(now)
         self.worker.start()
 
     def _give_up(self) -> None:
         self._given_up = True
-        self._office.notice("error", _GIVEN_UP)
+        self._source.notice("error", _GIVEN_UP)
         while self._queue:
             waiting = self._queue.popleft()
             self._finish(waiting, Failed(waiting.task.number, _GIVEN_UP))

@@ -8,12 +8,9 @@ from typing import Any
 
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import video_writer, write_png
+from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.encoding import BEHIND
 from cagefield.server.render_worker.tasks import FrameTask
-
-
-class _GivenUpError(Exception):
-    """Ends a video that is not to be kept."""
 
 
 class JobFiles:
@@ -43,8 +40,8 @@ class JobFiles:
         if keep:
             context.__exit__(None, None, None)
             return
-        error = _GivenUpError()
-        with suppress(_GivenUpError):
+        error = GivenUpError()
+        with suppress(GivenUpError):
             context.__exit__(type(error), error, None)
 
     def close(self) -> None:

@@ -30,12 +30,12 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from cagefield import devices
     from cagefield.scene import Scene
-    from cagefield.server.render_worker.renderer_cache import Studio
-    from cagefield.server.render_worker.task_handlers import Working
+    from cagefield.server.render_worker.renderer_cache import RendererCache
+    from cagefield.server.render_worker.task_handlers import TaskHandlers
 
     try:
         devices.start(device)
-        working = Working(Studio(Scene.open(scene)))
+        handlers = TaskHandlers(RendererCache(Scene.open(scene)))
     except CagefieldError as error:
         _sent(connection, Failed(0, str(error)))
         return
@@ -45,8 +45,8 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
             task = connection.recv()
         except _LOST:
             break
-        going_on = task is not None and _sent(connection, _done(working, task, generation))
-    working.close()
+        going_on = task is not None and _sent(connection, _done(handlers, task, generation))
+    handlers.close()
 
 
 def _sent(connection: Connection, content: Any) -> bool:
@@ -58,9 +58,9 @@ def _sent(connection: Connection, content: Any) -> bool:
     return True
 
 
-def _done(working: Any, task: Task, generation: ctypes.c_ulong) -> Result:
+def _done(handlers: Any, task: Task, generation: ctypes.c_ulong) -> Result:
     try:
-        return working.do(task, lambda wanted: generation.value > wanted)
+        return handlers.do(task, lambda wanted: generation.value > wanted)
     except CagefieldError as error:
         return Failed(task.number, str(error))
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Studio: a scene and its renderers, kept ready between pictures. Lives in the rendering process."""
+"""A scene and its renderers, kept ready between pictures. Lives in the rendering process."""
 
 from __future__ import annotations
 
@@ -17,9 +17,18 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.frame import Float32, Frame
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
+from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker import encoding
+from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
 from cagefield.server.render_worker.pictures import Look, Region
-from cagefield.server.render_worker.tasks import EditValues, PictureDone, PictureTask, Shown, Stopped
+from cagefield.server.render_worker.tasks import (
+    EditValues,
+    PictureDone,
+    PictureTask,
+    Shown,
+    Stopped,
+    WarmStage,
+)
 
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer
@@ -39,8 +48,6 @@ KEPT_EDITS = 64
 MOST_DEPTHS = 120_000
 """Depths sent with a picture, at most."""
 
-Stop = Callable[[], bool]
-
 
 @dataclass(frozen=True)
 class _Kept:
@@ -50,8 +57,8 @@ class _Kept:
     renderer: AnyRenderer
 
 
-class Studio:
-    """Pictures of one field under any edits."""
+class RendererCache:
+    """Pictures of one field under any edits; renderers of the last edits are kept."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -59,7 +66,7 @@ class Studio:
         self._is_sampled = isinstance(scene.field, VoxelField)
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
-        self._coarse: list[tuple[Edit, Edit]] = []
+        self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
         self._exact: list[_Kept] = []
         self._quick: list[_Kept] = []
         lower, upper = scene.field.bounds
@@ -110,19 +117,19 @@ class Studio:
             return None
         return self._frame(task, renderer, stopping)
 
-    def warm(self, stage: int) -> None:
-        """Makes the kernels of one stage ready, 0 to `WARM_STAGES` - 1, on a small edit."""
+    def warm(self, stage: WarmStage) -> None:
+        """Makes the kernels of one stage ready, on a small edit."""
         if not self._is_sampled:
             _warm_splats(stage)
             return
         voxel = self.scene.field.sample_spacing
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
-        if stage == 3:
+        if stage is WarmStage.DELETION:
             self.plain.with_edits(EditStack([Edit.delete(inner)]))
             return
-        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage < 2)
-        if stage == 1:
+        renderer = self.plain.with_edits(EditStack([edit]), coarse=stage is not WarmStage.EXACT_EDIT)
+        if stage is WarmStage.PICTURE:
             size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
             camera = Camera.look_at(
                 self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
@@ -203,16 +210,13 @@ class Studio:
         """The edit with a coarser lattice, kept as long as the edit is."""
         if edit.adjustment != "continuous" or (edit.lattice or 512) <= QUICK_LATTICE:
             return edit
-        for known, quick in self._coarse:
-            if known is edit:
-                return quick
-        quick = edit.replace(lattice=QUICK_LATTICE)
-        self._coarse = [*self._coarse[-31:], (edit, quick)]
-        return quick
+        if edit in self._coarse:
+            return self._coarse[edit]
+        return self._coarse.put(edit, edit.replace(lattice=QUICK_LATTICE))
 
 
-def _warm_splats(stage: int) -> None:
-    """Makes the kernels of splats ready: of plain pictures, of moving ones, of those at rest, of normals."""
+def _warm_splats(stage: WarmStage) -> None:
+    """Makes the kernels of splats ready: under a coarse edit, in plain pictures, at rest, with normals."""
     chance = np.random.default_rng(0)
     count = 64
     field = SplatField(
@@ -224,24 +228,10 @@ def _warm_splats(stage: int) -> None:
     )
     inner = Cage.box((0.0, 0.0, 0.0), 0.5)
     turned = Edit(inner, inner.grown(0.4)).rotate((0.0, 0.0, 0.3))
-    edits = EditStack([turned, turned, Edit.delete(inner)]) if stage else EditStack()
-    renderer = renderer_of(field).with_edits(edits, coarse=stage == 1)
+    edits = EditStack() if stage is WarmStage.PICTURE else EditStack([turned, turned, Edit.delete(inner)])
+    renderer = renderer_of(field).with_edits(edits, coarse=stage is WarmStage.COARSE_EDIT)
     camera = Camera.look_at((4.0, 0.0, 1.0), (0.0, 0.0, 0.0), width=32, height=32, fov_x=0.5)
-    renderer.render(camera, normals=stage == 3)
-
-
-class GivenUpError(Exception):
-    """What was being made ready is not wanted any more."""
-
-
-def giving_up(stop: Stop) -> Callable[[], None]:
-    """A `proceed` that gives up what is being made ready where `stop` says so, by raising GivenUpError."""
-
-    def proceed() -> None:
-        if stop():
-            raise GivenUpError
-
-    return proceed
+    renderer.render(camera, normals=stage is WarmStage.DELETION)
 
 
 def _beside(left: Frame, right: Frame) -> Frame:

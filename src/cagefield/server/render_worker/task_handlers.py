@@ -12,11 +12,12 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
+from cagefield.server.render_worker.cancellation import GivenUpError, giving_up
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.pictures import Look
-from cagefield.server.render_worker.renderer_cache import GivenUpError, Studio, giving_up
+from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
 from cagefield.server.render_worker.tasks import (
     Answered,
@@ -43,17 +44,17 @@ SAMPLES = 2_000
 Abandoned = Callable[[int], bool]
 
 
-class Working:
-    """Does tasks, one after the other, on one studio."""
+class TaskHandlers:
+    """Does tasks, one after the other, on one scene."""
 
-    def __init__(self, studio: Studio) -> None:
-        self._studio = studio
+    def __init__(self, renderers: RendererCache) -> None:
+        self._renderers = renderers
         self._files = JobFiles()
 
     def do(self, task: Task, abandoned: Abandoned) -> Result:
         """The task's result. Raises CagefieldError where it cannot be done."""
         if isinstance(task, PictureTask):
-            return self._studio.picture(task, lambda: abandoned(task.generation))
+            return self._renderers.picture(task, lambda: abandoned(task.generation))
         if isinstance(task, FrameTask):
             return self._frame(task, lambda: abandoned(task.generation))
         if isinstance(task, ErrorTask):
@@ -72,25 +73,25 @@ class Working:
         if isinstance(task, StillTask):
             return self._still(task)
         if isinstance(task, WarmTask):
-            return self._studio.warm(task.stage)
+            return self._renderers.warm(task.stage)
         if isinstance(task, EndJobTask):
             return self._files.end(task.job, task.keep)
         return grid_lines(Edit(**task.edit))
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:
         """(max, mean) error of an edit's lattice, voxels; none for splats, which take no lattice."""
-        if isinstance(self._studio.scene.field, SplatField):
+        if isinstance(self._renderers.scene.field, SplatField):
             return Answered(task.number, (0.0, 0.0))
         try:
-            (edit,) = self._studio.edits((task.edit,))
+            (edit,) = self._renderers.edits((task.edit,))
             most, mean = edit.lattice_error(samples=SAMPLES, proceed=giving_up(stop))
         except GivenUpError:
             return Stopped(task.number)
-        voxel = self._studio.scene.field.sample_spacing
+        voxel = self._renderers.scene.field.sample_spacing
         return Answered(task.number, (most / voxel, mean / voxel))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
-        frame = self._studio.still(task.shown, task.still.camera, Look(), stop)
+        frame = self._renderers.still(task.shown, task.still.camera, Look(), stop)
         if frame is None:
             return Stopped(task.number)
         self._files.add(task, frame)
@@ -98,17 +99,17 @@ class Working:
 
     def _still(self, task: StillTask) -> bytes:
         """The picture as a PNG."""
-        frame = self._studio.still(task.shown, task.camera, task.look)
+        frame = self._renderers.still(task.shown, task.camera, task.look)
         if frame is None:
             raise CagefieldError("the picture was given up; try again")
-        return png(picture_of(frame, task.look.view, self._studio.reach(task.camera)))
+        return png(picture_of(frame, task.look.view, self._renderers.reach(task.camera)))
 
     def _surface(self, task: SurfaceTask) -> tuple[list[float], list[float]] | None:
         """(point, normal) of the surface at a pixel; None where the picture is half empty."""
         camera = task.camera
         x = min(int(task.x * camera.width), camera.width - 1)
         y = min(int(task.y * camera.height), camera.height - 1)
-        renderer = self._studio.renderer(task.shown, False)
+        renderer = self._renderers.renderer(task.shown, False)
         frame = renderer.render(camera, normals=True, region=(x, y, 1, 1))
         if frame is None or frame.normals is None or frame.opacity[0, 0] < 0.5:
             return None
@@ -118,14 +119,14 @@ class Working:
 
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
-        field = self._studio.scene.field
+        field = self._renderers.scene.field
         if isinstance(field, SplatField):
-            edits = EditStack(self._studio.edits(task.shown.edits))
+            edits = EditStack(self._renderers.edits(task.shown.edits))
             return dense(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.warps.device_stack import DeviceStack
 
         points = probes(task.cage)
-        stack = DeviceStack.from_stack(EditStack(self._studio.edits(task.shown.edits)))
+        stack = DeviceStack.from_stack(EditStack(self._renderers.edits(task.shown.edits)))
         along = np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1))
         canonical, _, _, emptied = stack.to_canonical(points.astype(np.float32), along)
         sigma, _ = field(canonical.astype(np.float64), along)

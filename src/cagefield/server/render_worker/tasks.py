@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from enum import Enum
 from typing import Any, Literal, TypeAlias
 
 from cagefield.cages import Cage
@@ -12,8 +13,15 @@ from cagefield.edits import Edit
 from cagefield.keyframes import Still
 from cagefield.server.render_worker.pictures import Look, Region
 
-WARM_STAGES = 4
-"""Steps in which the kernels of edited pictures are made ready."""
+
+class WarmStage(Enum):
+    """Steps in which the kernels of edited pictures are made ready, soonest needed first."""
+
+    COARSE_EDIT = "coarse edit"
+    PICTURE = "picture"
+    EXACT_EDIT = "exact edit"
+    DELETION = "deletion"
+
 
 EditValues: TypeAlias = Mapping[str, Any]
 
@@ -81,7 +89,7 @@ class WarmTask:
     """One of the renderer's kernels is to be made ready, so that no drag has to wait for it."""
 
     number: int
-    stage: int
+    stage: WarmStage
 
 
 @dataclass(frozen=True)

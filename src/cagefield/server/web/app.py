@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol import server_messages
-from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_worker.tasks import StillTask
 from cagefield.server.web.security import Guard
 from cagefield.server.web.websocket import attend
@@ -36,25 +36,25 @@ _HEADERS = {
 }
 
 
-def application(hub: Hub, hello: server_messages.Hello, guard: Guard) -> ASGIApp:
+def application(coordinator: Coordinator, hello: server_messages.Hello, guard: Guard) -> ASGIApp:
     """The application of one editor; starts the rendering process and ends it."""
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
-        hub.desk.start()
+        coordinator.dispatcher.start()
         yield
-        hub.desk.close()
+        coordinator.dispatcher.close()
 
     async def socket(websocket: WebSocket) -> None:
-        await attend(websocket, hub, hello)
+        await attend(websocket, coordinator, hello)
 
     async def edits(_: Request) -> Response:
-        return _download(dump_edits(hub.session.document.stack), "edits.yaml", "application/yaml")
+        return _download(dump_edits(coordinator.session.document.stack), "edits.yaml", "application/yaml")
 
     async def camera_path(_: Request) -> Response:
         from cagefield.keyframe_files import dump_path
 
-        document = hub.session.document
+        document = coordinator.session.document
         try:
             text = dump_path(document.placed_keys, loop=document.loop)
         except CagefieldError as error:
@@ -62,15 +62,15 @@ def application(hub: Hub, hello: server_messages.Hello, guard: Guard) -> ASGIApp
         return _download(text, "camera_path.json", "application/json")
 
     async def screenshot(request: Request) -> Response:
-        newest = max(hub.pages, default=0)
-        page = hub.pages.get(_number(request.query_params.get("page", str(newest))))
+        newest = max(coordinator.pages, default=0)
+        page = coordinator.pages.get(_number(request.query_params.get("page", str(newest))))
         if page is None:
             return PlainTextResponse("give ?page=, the number of an open page", 404)
-        camera, look, shown = page.camera, page.look, hub.shown()
+        camera, look, shown = page.camera, page.look, coordinator.shown()
         if camera is None:
             return PlainTextResponse("this page has sent no camera yet", 409)
         try:
-            content = await hub.ask(lambda number: StillTask(number, shown, camera, look))
+            content = await coordinator.ask(lambda number: StillTask(number, shown, camera, look))
         except CagefieldError as error:
             return PlainTextResponse(str(error), 500)
         return _download(content, "screenshot.png", "image/png")

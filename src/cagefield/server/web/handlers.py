@@ -1,15 +1,16 @@
-"""What each message from a page does: one function per message, looked up by its class."""
+"""What each message from a page does: one method per message, found by the message's class."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from cagefield.cages import Cage
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.protocol.conversion import (
     cage_of,
@@ -20,44 +21,73 @@ from cagefield.server.protocol.conversion import (
     stills_of,
     view_height,
 )
-from cagefield.server.render_queue.coordinator import Hub, Page
+from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.pictures import Look
 from cagefield.server.render_worker.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
 
+Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
+Method = TypeVar("Method", bound=Handler)
 
-class Speaker:
-    """Hears one page's messages. Raises CagefieldError where a message cannot be followed."""
+_HANDLERS: dict[type[common.Message], Handler] = {}
+"""The method of `MessageHandlers` for each class of messages that pages send."""
 
-    def __init__(self, hub: Hub, page: Page) -> None:
-        self._hub, self._page = hub, page
-        self._session = hub.session
 
-    def hear(self, message: client_messages.PageMessage) -> Coroutine[Any, Any, None] | None:
+def _handles(message: type[common.Message]) -> Callable[[Method], Method]:
+    """Makes a method the handler of a class of messages."""
+
+    def registered(method: Method) -> Method:
+        _HANDLERS[message] = method
+        return method
+
+    return registered
+
+
+_SESSION_COMMANDS: dict[str, Callable[[Session], None]] = {"undo": Session.undo, "redo": Session.redo}
+
+_EDIT_COMMANDS: dict[str, Callable[[Session, int], int | None]] = {
+    "duplicate": Session.duplicate,
+    "remove": Session.remove,
+    "reset_operations": Session.reset_operations,
+    "remove_last_operation": Session.remove_last_operation,
+}
+
+
+class MessageHandlers:
+    """Does what one page's messages say. Raises CagefieldError where a message cannot be followed."""
+
+    def __init__(self, coordinator: Coordinator, page: Page) -> None:
+        self._coordinator, self._page = coordinator, page
+        self._session = coordinator.session
+
+    def handle(self, message: client_messages.PageMessage) -> Coroutine[Any, Any, None] | None:
         """Does what a message says and tells the pages what came of it.
 
         Returns the rest where it has to wait for the rendering process; other messages need not wait.
         """
-        act: Callable[[Any], Coroutine[Any, Any, None] | None] = getattr(self, f"_{message.type}")
-        return act(message)
+        return _HANDLERS[type(message)](self, message)
 
     # ---- seeing ----
 
+    @_handles(common.CameraMessage)
     def _camera(self, message: common.CameraMessage) -> None:
-        self._hub.camera(self._page, camera_of(message), message.seq, message.moving)
+        self._coordinator.camera(self._page, camera_of(message), message.seq, message.moving)
 
+    @_handles(client_messages.LookMessage)
     def _look(self, message: client_messages.LookMessage) -> None:
-        self._hub.look(self._page, Look(message.view, message.before, message.split))
+        self._coordinator.look(self._page, Look(message.view, message.before, message.split))
 
+    @_handles(client_messages.PresentedMessage)
     def _presented(self, message: client_messages.PresentedMessage) -> None:
-        self._hub.presented(self._page, message.picture)
+        self._coordinator.presented(self._page, message.picture)
 
+    @_handles(client_messages.Ask)
     async def _ask(self, message: client_messages.Ask) -> None:
         try:
             answer = await self._answer(message)
         except Exception:
-            self._page.outbox.put(server_messages.Answer(request=message.request, failed=True))
+            self._page.send_queue.put(server_messages.Answer(request=message.request, failed=True))
             raise
-        self._page.outbox.put(answer)
+        self._page.send_queue.put(answer)
 
     async def _answer(self, message: client_messages.Ask) -> server_messages.Answer:
         if message.what == "edit_text":
@@ -83,78 +113,88 @@ class Speaker:
         if edit.adjustment != "continuous" or self._session.problem(edit) is not None:
             return []
         values = values_of((edit,))[0]
-        return await self._hub.ask(lambda task: GridTask(task, values))
+        return await self._coordinator.ask(lambda task: GridTask(task, values))
 
     async def _surface(self, x: float, y: float) -> Any:
         camera = self._page.camera
         if camera is None:
             raise CagefieldError("the page has sent no camera yet; try again")
-        shown = self._hub.shown()
-        return await self._hub.ask(lambda number: SurfaceTask(number, shown, camera, x, y))
+        shown = self._coordinator.shown()
+        return await self._coordinator.ask(lambda number: SurfaceTask(number, shown, camera, x, y))
 
     # ---- drags ----
 
+    @_handles(client_messages.DragBegin)
     def _drag_begin(self, message: client_messages.DragBegin) -> None:
         self._page.drag, self._page.seq = message.drag, 0
         self._session.drag_begin(self._page.number, message.drag, message.edit, message.target)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.DragMove)
     def _drag(self, message: client_messages.DragMove) -> None:
         moved = self._session.drag(self._page.number, message.drag, operation_of(message.operation))
         self._page.seq = message.seq
-        self._page.outbox.put(dragged_of(message.drag, message.seq, moved))
-        self._hub.changed(but=self._page)
+        self._page.send_queue.put(dragged_of(message.drag, message.seq, moved))
+        self._coordinator.changed(but=self._page)
 
+    @_handles(client_messages.DragEnd)
     def _drag_end(self, message: client_messages.DragEnd) -> None:
         self._page.drag = 0
         try:
             moved = self._session.drag_end(self._page.number, message.drag, operation_of(message.operation))
-            self._page.outbox.put(dragged_of(message.drag, message.seq, moved))
+            self._page.send_queue.put(dragged_of(message.drag, message.seq, moved))
         finally:
-            self._hub.changed()
+            self._coordinator.changed()
 
+    @_handles(client_messages.DragCancel)
     def _drag_cancel(self, message: client_messages.DragCancel) -> None:
         self._page.drag = 0
         self._session.drag_cancel(self._page.number)
-        self._hub.changed()
+        self._coordinator.changed()
 
     # ---- playing ----
 
+    @_handles(client_messages.PlayBegin)
     def _play_begin(self, message: client_messages.PlayBegin) -> None:
         try:
             self._session.play_begin(self._page.number, message.play)
         except CagefieldError:
-            self._page.outbox.put(
+            self._page.send_queue.put(
                 server_messages.Preview(page=self._page.number, play=message.play, on=False)
             )
             raise
         finally:
-            self._hub.changed()
+            self._coordinator.changed()
 
+    @_handles(client_messages.Play)
     def _play(self, message: client_messages.Play) -> None:
         try:
             self._session.play(self._page.number, message.play, message.seconds)
         except CagefieldError:
-            self._hub.changed()
+            self._coordinator.changed()
             raise
-        self._hub.pump()
+        self._coordinator.pump()
 
+    @_handles(client_messages.PlayEnd)
     def _play_end(self, message: client_messages.PlayEnd) -> None:
         self._session.play_end(self._page.number, message.play)
-        self._hub.changed()
+        self._coordinator.changed()
 
     # ---- operations ----
 
+    @_handles(client_messages.Apply)
     def _apply(self, message: client_messages.Apply) -> None:
         self._session.apply(message.edit, message.target, operation_of(message.operation))
-        self._hub.changed()
+        self._coordinator.changed()
 
     # ---- cages ----
 
+    @_handles(client_messages.SetCage)
     def _set_cage(self, message: client_messages.SetCage) -> None:
         self._session.set_cage(message.edit, message.cage, cage_of(message.corners))
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
         camera = self._page.camera
         if camera is None:
@@ -167,77 +207,90 @@ class Speaker:
         point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
         distance = float(np.linalg.norm(point - camera.origin))
         self._session.place(point, view_height(camera, distance))
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.FitInner)
     async def _fit_inner(self, message: client_messages.FitInner) -> None:
         cage: Cage = self._session.document.entry(message.edit).edit.inner
         below = Shown(values_of(self._session.below(message.edit)))
-        dense = await self._hub.ask(lambda number: FitTask(number, below, cage))
+        dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage))
         if self._session.document.entry(message.edit).edit.inner == cage:
             self._session.fit_inner(message.edit, fitted(cage, np.array(dense)))
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.OuterMargin)
     def _outer_margin(self, message: client_messages.OuterMargin) -> None:
         self._session.outer_margin(message.edit, message.margin)
-        self._hub.changed()
+        self._coordinator.changed()
 
     # ---- options and the list ----
 
+    @_handles(client_messages.Change)
     def _change(self, message: client_messages.Change) -> None:
         named = message.model_dump(exclude={"type", "edit"}, exclude_none=True)
         if "lattice" in named:
             named["lattice"] = named["lattice"] or None
         self._session.change(message.edit, **named)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.SceneChange)
     def _scene_change(self, message: client_messages.SceneChange) -> None:
         self._session.preserve_opacity(message.preserve_opacity)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.Command)
     def _command(self, message: client_messages.Command) -> None:
         session = self._session
         if message.name == "select":
             session.select(message.edit)
-        elif message.name in ("undo", "redo"):
-            getattr(session, message.name)()
+        elif message.name in _SESSION_COMMANDS:
+            _SESSION_COMMANDS[message.name](session)
         elif message.name == "save":
-            self._hub.save()
+            self._coordinator.save()
         else:
             if message.edit is None:
                 raise CagefieldError(f"choose an edit to {message.name.replace('_', ' ')}")
-            getattr(session, message.name)(message.edit)
-        self._hub.changed()
+            _EDIT_COMMANDS[message.name](session, message.edit)
+        self._coordinator.changed()
 
+    @_handles(client_messages.Mirror)
     def _mirror(self, message: client_messages.Mirror) -> None:
         self._session.mirror(message.edit, "xyz".index(message.axis))
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.Reorder)
     def _reorder(self, message: client_messages.Reorder) -> None:
         self._session.reorder(message.edit, message.to)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.GoTo)
     def _go_to(self, message: client_messages.GoTo) -> None:
         self._session.go_to(message.entry)
-        self._hub.changed()
+        self._coordinator.changed()
 
     # ---- keeping ----
 
+    @_handles(client_messages.SaveAs)
     def _save_as(self, message: client_messages.SaveAs) -> None:
-        self._hub.save_as(message.path, message.overwrite)
-        self._hub.changed()
+        self._coordinator.save_as(message.path, message.overwrite)
+        self._coordinator.changed()
 
+    @_handles(client_messages.LoadEdits)
     def _load_edits(self, message: client_messages.LoadEdits) -> None:
         self._session.load_edits(message.text, message.append)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.SetPath)
     def _set_path(self, message: client_messages.SetPath) -> None:
         self._session.set_path(keys_of(message), message.loop)
-        self._hub.changed()
+        self._coordinator.changed()
 
+    @_handles(client_messages.RenderJob)
     def _render(self, message: client_messages.RenderJob) -> None:
-        self._hub.chores.render(message)
-        self._hub.pump()
+        self._coordinator.background.render(message)
+        self._coordinator.pump()
 
+    @_handles(client_messages.CancelJob)
     def _cancel_job(self, message: client_messages.CancelJob) -> None:
-        self._hub.chores.cancel(message.job)
-        self._hub.pump()
+        self._coordinator.background.cancel(message.job)
+        self._coordinator.pump()

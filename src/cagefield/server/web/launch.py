@@ -16,29 +16,29 @@ from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.scene import Scene
-from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
-from cagefield.server.render_queue.coordinator import Hub
+from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
 from cagefield.server.web.security import Guard
 
 
-def open_hub(path: Path, device: str = "auto") -> tuple[Hub, server_messages.Hello]:
+def open_scene(path: Path, device: str = "auto") -> tuple[Coordinator, server_messages.Hello]:
     """The editor of a scene folder, and what its pages are told first; what a crash left is restored.
 
     Raises CagefieldError for a folder that is no scene.
     """
     scene = Scene.open(path)
-    keeper = Keeper(scene, path)
-    session = Session(keeper.document(), scene.field.bounds, scene.field.sample_spacing)
-    hub = Hub(session, keeper, device)
-    recovered = keeper.recovered()
+    store = SceneStore(scene, path)
+    session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
+    coordinator = Coordinator(session, store, device)
+    recovered = store.recovered()
     if recovered is not None:
         session.restore(recovered)
-        hub.greeting = "changes that had not been saved were restored; undo takes them back"
-    return hub, hello_of(scene, path.resolve().name)
+        coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
+    return coordinator, hello_of(scene, path.resolve().name)
 
 
 def hello_of(scene: Scene, name: str) -> server_messages.Hello:
@@ -105,10 +105,12 @@ def bound_socket(host: str, port: int) -> socket.socket:
     )
 
 
-def serve(hub: Hub, hello: server_messages.Hello, guard: Guard, listening: socket.socket) -> None:
+def serve(
+    coordinator: Coordinator, hello: server_messages.Hello, guard: Guard, listening: socket.socket
+) -> None:
     """Runs the web server to its end (Ctrl+C, or a signal to terminate)."""
     config = uvicorn.Config(
-        application(hub, hello, guard),
+        application(coordinator, hello, guard),
         log_level="warning",
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,

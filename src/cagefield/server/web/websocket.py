@@ -14,10 +14,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol import client_messages, common, server_messages
-from cagefield.server.protocol.message_queues import Inbox
+from cagefield.server.protocol.message_queues import ReceiveQueue
 from cagefield.server.protocol.validation_errors import refusal
-from cagefield.server.render_queue.coordinator import Hub, Page
-from cagefield.server.web.handlers import Speaker
+from cagefield.server.render_queue.coordinator import Coordinator, Page
+from cagefield.server.web.handlers import MessageHandlers
 from cagefield.server.web.security import Allowance
 
 TOO_BIG, TOO_MANY = 1009, 1008
@@ -29,17 +29,21 @@ MOST_REFUSED = 2000
 """Messages over the rate after which the socket is closed."""
 
 
-async def attend(socket: WebSocket, hub: Hub, hello: server_messages.Hello) -> None:
+async def attend(socket: WebSocket, coordinator: Coordinator, hello: server_messages.Hello) -> None:
     """Serves one page until it is gone."""
     try:
         await socket.accept()
     except (WebSocketDisconnect, ConnectionError):
         return
-    page = hub.join(hello)
-    inbox = Inbox()
+    page = coordinator.join(hello)
+    receive_queue = ReceiveQueue()
     tasks = [
         asyncio.ensure_future(work)
-        for work in (_read(socket, page, inbox), _do(Speaker(hub, page), page, inbox), _send(socket, page))
+        for work in (
+            _read(socket, page, receive_queue),
+            _do(MessageHandlers(coordinator, page), page, receive_queue),
+            _send(socket, page),
+        )
     ]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -47,7 +51,7 @@ async def attend(socket: WebSocket, hub: Hub, hello: server_messages.Hello) -> N
         for task in tasks:
             task.cancel()
         ends = await asyncio.gather(*tasks, return_exceptions=True)
-        hub.leave(page)
+        coordinator.leave(page)
     for end in ends:
         if isinstance(end, Exception) and not _is_parting(socket, end):
             _log.error("a page's socket failed", exc_info=end)
@@ -60,7 +64,7 @@ def _is_parting(socket: WebSocket, error: Exception) -> bool:
     return isinstance(error, (WebSocketDisconnect, ConnectionError))
 
 
-async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
+async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> None:
     allowance, refused = Allowance(), 0
     while True:
         received = await socket.receive()
@@ -82,18 +86,18 @@ async def _read(socket: WebSocket, page: Page, inbox: Inbox) -> None:
                 return
             continue
         try:
-            inbox.put(client_messages.page_messages.validate_json(text))
+            receive_queue.put(client_messages.page_messages.validate_json(text))
         except ValidationError as error:
             page.notice("error", refusal(error))
 
 
-async def _do(speaker: Speaker, page: Page, inbox: Inbox) -> None:
+async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue) -> None:
     waiting: set[asyncio.Task[None]] = set()
     try:
         while True:
-            message = await inbox.get()
+            message = await receive_queue.get()
             with _told(page):
-                rest = speaker.hear(message)
+                rest = handlers.handle(message)
                 if rest is not None:
                     task = asyncio.ensure_future(_finish(rest, page))
                     waiting.add(task)
@@ -123,7 +127,7 @@ def _told(page: Page) -> Iterator[None]:
 
 async def _send(socket: WebSocket, page: Page) -> None:
     while True:
-        content = await page.outbox.get()
+        content = await page.send_queue.get()
         if isinstance(content, bytes):
             await socket.send_bytes(content)
         else:

@@ -1,4 +1,4 @@
-"""The desk between the scheduler and the rendering process, with a process that the tests play."""
+"""The dispatcher between the scheduler and the rendering process, with a process that the tests play."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.server.render_queue import dispatcher as module
 from cagefield.server.render_queue.damage import WHOLE, Rect
-from cagefield.server.render_queue.dispatcher import RESTARTS, Chore, Desk, Stamp
+from cagefield.server.render_queue.dispatcher import RESTARTS, BackgroundTask, Dispatcher, Stamp
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_worker.tasks import (
     Answered,
@@ -25,6 +25,7 @@ from cagefield.server.render_worker.tasks import (
     Stopped,
     SurfaceTask,
     Task,
+    WarmStage,
     WarmTask,
 )
 
@@ -55,12 +56,12 @@ class PlayedWorker:
 
 
 class PlayedOffice:
-    """Notes down what the desk tells it."""
+    """Notes down what the dispatcher tells it."""
 
     def __init__(self) -> None:
         self.delivered: list[int] = []
         self.notices: list[str] = []
-        self.chores: list[Chore] = []
+        self.background: list[BackgroundTask] = []
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         task = PictureTask(
@@ -84,29 +85,31 @@ class PlayedOffice:
     def notice(self, level: str, text: str) -> None:
         self.notices.append(text)
 
-    def chore(self) -> Chore | None:
-        return self.chores.pop(0) if self.chores else None
+    def background_task(self) -> BackgroundTask | None:
+        return self.background.pop(0) if self.background else None
 
 
 @pytest.fixture
-def office() -> PlayedOffice:
+def source() -> PlayedOffice:
     return PlayedOffice()
 
 
 def play(
-    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch, script: Callable[[Desk, Any], Awaitable[None]]
+    source: PlayedOffice,
+    monkeypatch: pytest.MonkeyPatch,
+    script: Callable[[Dispatcher, Any], Awaitable[None]],
 ) -> None:
-    """Runs a script with a desk whose rendering process is ready."""
+    """Runs a script with a dispatcher whose rendering process is ready."""
     monkeypatch.setattr(module, "Worker", PlayedWorker)
 
     async def run() -> None:
-        desk = Desk("scene", "cpu", office)
-        desk.start()
-        worker: Any = desk.worker
+        dispatcher = Dispatcher("scene", "cpu", source)
+        dispatcher.start()
+        worker: Any = dispatcher.worker
         worker.answer(Ready())
         await settle()
-        await script(desk, worker)
-        desk.close()
+        await script(dispatcher, worker)
+        dispatcher.close()
 
     asyncio.run(run())
 
@@ -125,123 +128,125 @@ def surface(number: int) -> SurfaceTask:
 
 
 def test_one_task_at_a_time_and_answers_before_pictures(
-    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
-        desk.scheduler.join(1)
-        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
-        desk.pump()
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        dispatcher.scheduler.join(1)
+        dispatcher.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        dispatcher.pump()
         (picture,) = worker.tasks
-        asked = asyncio.ensure_future(desk.ask(surface))
-        desk.scheduler.camera(1, 2, 64, 64, True, 0.0)
+        asked = asyncio.ensure_future(dispatcher.ask(surface))
+        dispatcher.scheduler.camera(1, 2, 64, 64, True, 0.0)
         await settle()
         assert worker.tasks == [picture]
         worker.answer(done(picture))
         await settle()
-        assert isinstance(worker.tasks[-1], SurfaceTask) and office.delivered == [picture.number]
+        assert isinstance(worker.tasks[-1], SurfaceTask) and source.delivered == [picture.number]
         worker.answer(Answered(worker.tasks[-1].number, "point"))
         await settle()
         assert await asked == "point"
-        desk.scheduler.presented(1, picture.number)
-        desk.pump()
+        dispatcher.scheduler.presented(1, picture.number)
+        dispatcher.pump()
         assert isinstance(worker.tasks[-1], PictureTask) and len(worker.tasks) == 3
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)
 
 
-def test_chores_wait_until_no_page_does(office: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
+def test_chores_wait_until_no_page_does(source: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         results: list[Result] = []
-        desk.scheduler.join(1)
-        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
-        office.chores.append(Chore(lambda number: WarmTask(number, 0), results.append))
-        desk.pump()
+        dispatcher.scheduler.join(1)
+        dispatcher.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        source.background.append(
+            BackgroundTask(lambda number: WarmTask(number, WarmStage.COARSE_EDIT), results.append)
+        )
+        dispatcher.pump()
         assert isinstance(worker.tasks[-1], PictureTask)
-        desk.scheduler.camera(1, 1, 64, 64, False, 0.0)
+        dispatcher.scheduler.camera(1, 1, 64, 64, False, 0.0)
         worker.answer(done(worker.tasks[-1]))
         await settle()
         while isinstance(worker.tasks[-1], PictureTask):
-            desk.scheduler.presented(1, worker.tasks[-1].number)
+            dispatcher.scheduler.presented(1, worker.tasks[-1].number)
             worker.answer(done(worker.tasks[-1]))
             await settle()
-        chore = worker.tasks[-1]
-        assert isinstance(chore, WarmTask)
-        generation = desk.scheduler.generation
-        desk.pump()
+        background_task = worker.tasks[-1]
+        assert isinstance(background_task, WarmTask)
+        generation = dispatcher.scheduler.generation
+        dispatcher.pump()
         assert worker.generation == generation
-        desk.scheduler.camera(1, 2, 64, 64, True, 0.0)
-        desk.pump()
+        dispatcher.scheduler.camera(1, 2, 64, 64, True, 0.0)
+        dispatcher.pump()
         assert worker.generation == generation + 1
-        worker.answer(Stopped(chore.number))
+        worker.answer(Stopped(background_task.number))
         await settle()
-        assert results == [Stopped(chore.number)]
+        assert results == [Stopped(background_task.number)]
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)
 
 
-def test_a_failure_is_told_to_who_asked(office: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
-        asked = asyncio.ensure_future(desk.ask(surface))
+def test_a_failure_is_told_to_who_asked(source: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        asked = asyncio.ensure_future(dispatcher.ask(surface))
         await settle()
         worker.answer(Failed(worker.tasks[-1].number, "no surface"))
         with pytest.raises(CagefieldError, match="no surface"):
             await asked
-        desk.scheduler.join(1)
-        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
-        desk.pump()
+        dispatcher.scheduler.join(1)
+        dispatcher.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        dispatcher.pump()
         worker.answer(Failed(worker.tasks[-1].number, "not possible"))
         await settle()
-        assert office.notices == ["not possible"] and len(worker.tasks) == 2
+        assert source.notices == ["not possible"] and len(worker.tasks) == 2
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)
 
 
 def test_a_lost_process_is_started_again_and_its_picture_rendered_again(
-    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
-        desk.scheduler.join(1)
-        desk.scheduler.camera(1, 1, 64, 64, True, 0.0)
-        desk.pump()
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        dispatcher.scheduler.join(1)
+        dispatcher.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        dispatcher.pump()
         worker.lose()
         await settle()
-        assert worker.starts == 2 and "started again" in office.notices[-1]
+        assert worker.starts == 2 and "started again" in source.notices[-1]
         assert len(worker.tasks) == 1  # nothing before it is ready
         worker.answer(Ready())
         await settle()
         assert len(worker.tasks) == 2 and isinstance(worker.tasks[-1], PictureTask)
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)
 
 
 def test_a_process_that_is_lost_again_and_again_is_given_up(
-    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
-        asked = asyncio.ensure_future(desk.ask(surface))
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        asked = asyncio.ensure_future(dispatcher.ask(surface))
         await settle()
-        waiting = asyncio.ensure_future(desk.ask(surface))
+        waiting = asyncio.ensure_future(dispatcher.ask(surface))
         for _ in range(RESTARTS + 1):
             worker.lose()
             await settle()
         assert worker.starts == RESTARTS + 1
-        assert "ends again and again" in office.notices[-1]
+        assert "ends again and again" in source.notices[-1]
         with pytest.raises(CagefieldError, match="interrupted; try again"):
             await asked
         with pytest.raises(CagefieldError, match="restart the editor"):
             await waiting
         with pytest.raises(CagefieldError, match="restart the editor"):
-            await desk.ask(surface)
+            await dispatcher.ask(surface)
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)
 
 
 def test_a_scene_that_the_process_cannot_read_is_told(
-    office: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def script(desk: Desk, worker: PlayedWorker) -> None:
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         worker.answer(Failed(0, "scene x does not exist"))
         await settle()
-        assert office.notices == ["scene x does not exist"]
+        assert source.notices == ["scene x does not exist"]
 
-    play(office, monkeypatch, script)
+    play(source, monkeypatch, script)

@@ -16,7 +16,7 @@ from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, joined, p
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
 from cagefield.server.render_worker.pictures import Look, Region
-from cagefield.server.render_worker.renderer_cache import Studio
+from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from scenes import ball_scene
 from sent_pictures import pixels_of
@@ -248,9 +248,9 @@ def test_revisions_that_a_page_may_show_are_remembered() -> None:
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
+def renderers() -> RendererCache:
     devices.start("cpu")
-    return Studio(ball_scene())
+    return RendererCache(ball_scene())
 
 
 STACKS = {
@@ -264,9 +264,9 @@ STACKS = {
 
 
 @pytest.mark.parametrize("name", STACKS)
-def test_pictures_are_the_same_outside_what_is_rendered(studio: Studio, name: str) -> None:
+def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache, name: str) -> None:
     before, after = (EditStack(stack) for stack in STACKS[name])
-    first, second = (studio.plain.with_edits(stack).render(CAMERA) for stack in (before, after))
+    first, second = (renderers.plain.with_edits(stack).render(CAMERA) for stack in (before, after))
     assert first is not None and second is not None
     x, y, w, h = pixels(seen(CAMERA, after.changed_boxes(before)), SIDE, SIDE)
     difference = np.abs(first.rgb - second.rgb).max(axis=2)
@@ -277,13 +277,13 @@ def test_pictures_are_the_same_outside_what_is_rendered(studio: Studio, name: st
 
 
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
-def test_a_part_over_the_last_picture_is_the_whole_picture(studio: Studio, view: Any) -> None:
+def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCache, view: Any) -> None:
     before, after = STACKS["under another"]
     look = Look(view, split=0.55)
 
     def shown(edits: tuple[Edit, ...], region: Region) -> np.ndarray[Any, Any]:
         task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, False, True, 0)
-        done = studio.picture(task, lambda: False)
+        done = renderers.picture(task, lambda: False)
         assert isinstance(done, PictureDone)
         return pixels_of(done.picture, done.format, region.width, region.height).astype(float)
 
@@ -298,11 +298,11 @@ def test_a_part_over_the_last_picture_is_the_whole_picture(studio: Studio, view:
 
 
 def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
-    studio = Studio(ball_scene())
+    renderers = RendererCache(ball_scene())
     edits = (PART.translate((0.12, 0, 0)), OTHER)
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
     task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Look(), False, True, 0)
-    expected = Renderer(studio.scene.field, EditStack(edits))
+    expected = Renderer(renderers.scene.field, EditStack(edits))
     for looks in range(1, 6):
         left = looks
 
@@ -311,9 +311,9 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
             left -= 1
             return left <= 0
 
-        assert isinstance(studio.picture(task, stop), Stopped)
+        assert isinstance(renderers.picture(task, stop), Stopped)
         if looks <= 4:  # between the passes; later, between bands of the picture
-            assert studio._exact == []
-    done = studio.picture(task, lambda: False)
+            assert renderers._exact == []
+    done = renderers.picture(task, lambda: False)
     assert isinstance(done, PictureDone)
-    assert np.array_equal(studio._exact[-1].renderer._occupancy.codes, expected._occupancy.codes)
+    assert np.array_equal(renderers._exact[-1].renderer._occupancy.codes, expected._occupancy.codes)

@@ -14,7 +14,7 @@ from cagefield.errors import SceneError
 from cagefield.keyframe_files import load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
-from cagefield.server.editor.persistence import Keeper
+from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from scenes import ball_scene, files_of
 
@@ -29,26 +29,26 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "ball"
 
 
-def opened(path: Path) -> tuple[Keeper, Session]:
+def opened(path: Path) -> tuple[SceneStore, Session]:
     scene = Scene.open(path)
-    keeper = Keeper(scene, path)
-    return keeper, Session(keeper.document(), scene.field.bounds, 0.1)
+    store = SceneStore(scene, path)
+    return store, Session(store.document(), scene.field.bounds, 0.1)
 
 
-def changed(path: Path) -> tuple[Keeper, Session]:
-    keeper, session = opened(path)
+def changed(path: Path) -> tuple[SceneStore, Session]:
+    store, session = opened(path)
     session.apply(1, "field", Translate((0.1, 0, 0)))
     session.change(1, locked=True)
     session.set_path((KEY,), True)
     session.preserve_opacity(False)
-    keeper.autosave(session)
-    return keeper, session
+    store.autosave(session)
+    return store, session
 
 
 def test_saving_writes_everything_and_opening_finds_it(path: Path) -> None:
-    keeper, session = changed(path)
+    store, session = changed(path)
     before = files_of(path)
-    keeper.save(session)
+    store.save(session)
     assert session.saved and session.document.entry(1).locked
     scene = Scene.open(path)
     assert scene.edits[0] == BALL.translate((0.1, 0, 0)) and not scene.preserve_opacity
@@ -60,8 +60,8 @@ def test_saving_writes_everything_and_opening_finds_it(path: Path) -> None:
 
 def test_an_autosave_is_restored_as_one_entry_and_saving_removes_it(path: Path) -> None:
     _, session = changed(path)
-    keeper, fresh = opened(path)
-    found = keeper.recovered()
+    store, fresh = opened(path)
+    found = store.recovered()
     assert found is not None
     fresh.restore(found)
     assert fresh.document.stack == session.document.stack
@@ -70,91 +70,91 @@ def test_an_autosave_is_restored_as_one_entry_and_saving_removes_it(path: Path) 
     fresh.undo()
     assert fresh.saved and fresh.document.stack == EditStack([BALL])
     fresh.redo()
-    keeper.save(fresh)
-    assert not keeper.autosave_path.exists() and opened(path)[0].recovered() is None
+    store.save(fresh)
+    assert not store.autosave_path.exists() and opened(path)[0].recovered() is None
 
 
 def test_undoing_everything_removes_the_autosave(path: Path) -> None:
-    keeper, session = changed(path)
-    assert keeper.autosave_path.exists()
+    store, session = changed(path)
+    assert store.autosave_path.exists()
     session.go_to(0)
-    keeper.autosave(session)
-    assert not keeper.autosave_path.exists()
+    store.autosave(session)
+    assert not store.autosave_path.exists()
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"version": 2}', "[1]", '{"version": 1, "edits": {"edits": 3}}'])
 def test_a_damaged_autosave_is_passed_over(path: Path, text: str) -> None:
-    keeper, _ = opened(path)
-    keeper.autosave_path.write_text(text)
-    assert keeper.recovered() is None
+    store, _ = opened(path)
+    store.autosave_path.write_text(text)
+    assert store.recovered() is None
 
 
 def test_keyframes_name_edits_by_their_place_in_files(path: Path) -> None:
-    keeper, session = opened(path)
+    store, session = opened(path)
     number = session.duplicate(1)
     session.remove(1)
     session.set_path((Keyframe(KEY.c2w, 45.0, 2.0, {number: 0.25, 1: 0.5}),), False)
-    keeper.save(session)
+    store.save(session)
     assert load_keys(path / "camera_path.json")[0][0].parts == {1: 0.25}
 
 
 def test_edits_that_another_program_changed_are_replaced_only_when_asked_twice(path: Path) -> None:
-    keeper, session = changed(path)
+    store, session = changed(path)
     save_edits(EditStack([]), path / "edits.yaml")
     with pytest.raises(SceneError, match="changed by another program; save again to replace it"):
-        keeper.save(session)
+        store.save(session)
     assert len(load_edits(path / "edits.yaml")) == 0
-    keeper.save(session)
+    store.save(session)
     assert len(load_edits(path / "edits.yaml")) == 1
     save_edits(EditStack([]), path / "edits.yaml")
     with pytest.raises(SceneError, match="save again"):
-        keeper.save(session)
+        store.save(session)
 
 
 def test_saving_as_leaves_the_first_scene_alone_and_goes_on_with_the_new_one(path: Path) -> None:
-    keeper, session = changed(path)
+    store, session = changed(path)
     before = files_of(path)
-    keeper.save_as(session, "copy", overwrite=False)
+    store.save_as(session, "copy", overwrite=False)
     assert files_of(path) == before
-    assert keeper.path == path.parent / "copy" and session.saved
-    assert Scene.open(keeper.path).edits[0].operations
+    assert store.path == path.parent / "copy" and session.saved
+    assert Scene.open(store.path).edits[0].operations
     assert sorted(file.name for file in path.parent.iterdir()) == ["ball", "copy"]
     session.undo()
-    keeper.save(session)
+    store.save(session)
     assert files_of(path) == before
 
 
 def test_saving_as_replaces_nothing_that_it_was_not_asked_to(path: Path, tmp_path: Path) -> None:
-    keeper, session = changed(path)
+    store, session = changed(path)
     ball_scene().save(tmp_path / "other")
     before = files_of(tmp_path / "other")
     with pytest.raises(SceneError, match=r"exists already; give a new folder, or choose to overwrite"):
-        keeper.save_as(session, str(tmp_path / "other"), overwrite=False)
+        store.save_as(session, str(tmp_path / "other"), overwrite=False)
     assert files_of(tmp_path / "other") == before and not session.saved
-    keeper.save_as(session, str(tmp_path / "other"), overwrite=True)
+    store.save_as(session, str(tmp_path / "other"), overwrite=True)
     assert len(Scene.open(tmp_path / "other").edits) == 1
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(SceneError, match="holds no scene and is left as it is"):
-        keeper.save_as(session, str(tmp_path / "mine"), overwrite=True)
+        store.save_as(session, str(tmp_path / "mine"), overwrite=True)
 
 
 def test_a_scene_that_is_gone_says_what_helps(path: Path) -> None:
-    keeper, session = changed(path)
+    store, session = changed(path)
     path.rename(path.with_name("elsewhere"))
     with pytest.raises(SceneError, match="not there any more; use Save as"):
-        keeper.save(session)
+        store.save(session)
 
 
 def test_an_autosave_that_cannot_be_written_is_told(path: Path) -> None:
-    keeper, session = opened(path)
-    keeper.autosave_path.mkdir()
+    store, session = opened(path)
+    store.autosave_path.mkdir()
     session.apply(1, "field", Translate((0.1, 0, 0)))
-    keeper.autosave(session)
-    assert keeper.trouble is not None and "save often" in keeper.trouble
-    keeper.autosave_path.rmdir()
+    store.autosave(session)
+    assert store.trouble is not None and "save often" in store.trouble
+    store.autosave_path.rmdir()
     session.undo()
     session.redo()
     session.apply(1, "field", Translate((0.1, 0, 0)))
-    keeper.autosave(session)
-    assert keeper.trouble is None and json.loads(keeper.autosave_path.read_text())["version"] == 1
+    store.autosave(session)
+    assert store.trouble is None and json.loads(store.autosave_path.read_text())["version"] == 1

@@ -21,13 +21,12 @@ from cagefield.server.editor.cage_placement import PROBES, fitted, probes
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.render_queue import jobs
-from cagefield.server.render_queue.background import Chores
+from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.pictures import Look, Region
-from cagefield.server.render_worker.renderer_cache import Studio
-from cagefield.server.render_worker.task_handlers import SAMPLES, Working
+from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.task_handlers import SAMPLES, TaskHandlers
 from cagefield.server.render_worker.tasks import (
-    WARM_STAGES,
     Answered,
     EndJobTask,
     ErrorTask,
@@ -37,6 +36,7 @@ from cagefield.server.render_worker.tasks import (
     PictureTask,
     Shown,
     Stopped,
+    WarmStage,
     WarmTask,
     values_of,
 )
@@ -52,9 +52,9 @@ WHOLE = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 
 
 @pytest.fixture(scope="module")
-def studio() -> Studio:
+def renderers() -> RendererCache:
     devices.start("cpu")
-    return Studio(ball_scene())
+    return RendererCache(ball_scene())
 
 
 def task(
@@ -67,27 +67,29 @@ def task(
     return PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, moving, exact, 0)
 
 
-def picture(studio: Studio, asked: PictureTask) -> np.ndarray[Any, Any]:
-    done = studio.picture(asked, lambda: False)
+def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
+    done = renderers.picture(asked, lambda: False)
     assert isinstance(done, PictureDone)
     return pixels_of(done.picture, done.format, asked.region.width, asked.region.height).astype(float)
 
 
-def test_pictures_are_those_of_the_scene(studio: Studio) -> None:
-    frame = studio.scene.with_edits(EditStack([MOVED])).render(CAMERA)
+def test_pictures_are_those_of_the_scene(renderers: RendererCache) -> None:
+    frame = renderers.scene.with_edits(EditStack([MOVED])).render(CAMERA)
     # JPEG at quality 95 with full-resolution colour: errors of a few levels.
-    assert np.abs(picture(studio, task(MOVED)) - frame.rgb8()).mean() < 2.0
+    assert np.abs(picture(renderers, task(MOVED)) - frame.rgb8()).mean() < 2.0
 
 
-def test_tiles_put_together_are_the_whole_picture(studio: Studio) -> None:
-    whole = studio._part(task(MOVED), studio.renderer(task(MOVED).shown, exact=True), WHOLE, lambda: False)
+def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> None:
+    whole = renderers._part(
+        task(MOVED), renderers.renderer(task(MOVED).shown, exact=True), WHOLE, lambda: False
+    )
     assert whole is not None
     joined = np.zeros_like(whole.rgb)
     for x, width in ((0, 16), (16, 13), (29, 19)):
         for y, height in ((0, 21), (21, 27)):
-            part = studio._part(
+            part = renderers._part(
                 task(MOVED),
-                studio.renderer(task(MOVED).shown, exact=True),
+                renderers.renderer(task(MOVED).shown, exact=True),
                 Region(x, y, width, height, SIDE, SIDE),
                 lambda: False,
             )
@@ -97,56 +99,56 @@ def test_tiles_put_together_are_the_whole_picture(studio: Studio) -> None:
 
 
 @pytest.mark.parametrize("edits", [(MOVED,), (COPY,), (MOVED, COPY)], ids=["continuous", "copy", "both"])
-def test_quick_pictures_show_the_same(studio: Studio, edits: tuple[Edit, ...]) -> None:
+def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edit, ...]) -> None:
     shown = Shown(values_of(edits))
-    quick = studio._part(task(*edits), studio.renderer(shown, exact=False), WHOLE, lambda: False)
-    exact = studio._part(task(*edits), studio.renderer(shown, exact=True), WHOLE, lambda: False)
+    quick = renderers._part(task(*edits), renderers.renderer(shown, exact=False), WHOLE, lambda: False)
+    exact = renderers._part(task(*edits), renderers.renderer(shown, exact=True), WHOLE, lambda: False)
     assert quick is not None and exact is not None
     # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty.
     np.testing.assert_array_equal(quick.rgb, exact.rgb)
 
 
-def test_a_quick_lattice_is_coarser_and_close(studio: Studio) -> None:
+def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:
     fine = MOVED.replace(lattice=96)
-    quick = studio.renderer(Shown(values_of((fine,))), exact=False)
+    quick = renderers.renderer(Shown(values_of((fine,))), exact=False)
     assert quick.edits[0].lattice == 32
-    near = studio._part(task(fine), quick, WHOLE, lambda: False)
+    near = renderers._part(task(fine), quick, WHOLE, lambda: False)
     assert near is not None
-    exact = studio.scene.with_edits(EditStack([fine])).render(CAMERA)
+    exact = renderers.scene.with_edits(EditStack([fine])).render(CAMERA)
     assert np.abs(near.rgb - exact.rgb).mean() < 0.003
 
 
-def test_before_leaves_the_edits_out_left_of_the_split(studio: Studio) -> None:
-    plain, edited = picture(studio, task()), picture(studio, task(MOVED))
+def test_before_leaves_the_edits_out_left_of_the_split(renderers: RendererCache) -> None:
+    plain, edited = picture(renderers, task()), picture(renderers, task(MOVED))
     assert np.abs(plain - edited).max() > 100
-    half = picture(studio, task(MOVED, look=Look(split=0.5)))
+    half = picture(renderers, task(MOVED, look=Look(split=0.5)))
     # Blocks of 8 pixels beside the split mix in a JPEG.
     assert np.abs(half[:, :16] - plain[:, :16]).max() < 12
     assert np.abs(half[:, 32:] - edited[:, 32:]).max() < 12
-    assert np.abs(picture(studio, task(MOVED, look=Look(before=True))) - plain).max() < 12
+    assert np.abs(picture(renderers, task(MOVED, look=Look(before=True))) - plain).max() < 12
     tile = Region(32, 0, 16, SIDE, SIDE, SIDE)
-    right = picture(studio, task(MOVED, region=tile, look=Look(split=0.5)))
+    right = picture(renderers, task(MOVED, region=tile, look=Look(split=0.5)))
     assert np.abs(right - edited[:, 32:]).max() < 12
 
 
-def test_views(studio: Studio) -> None:
-    frame = studio.plain.render(CAMERA, background="white", normals=True)
+def test_views(renderers: RendererCache) -> None:
+    frame = renderers.plain.render(CAMERA, background="white", normals=True)
     assert frame is not None and frame.normals is not None
-    opacity = picture(studio, task(look=Look("opacity")))
+    opacity = picture(renderers, task(look=Look("opacity")))
     assert np.abs(opacity[..., 0] / 255 - frame.opacity).mean() < 0.01
-    normals = picture(studio, task(look=Look("normals"))) / 127.5 - 1.0
+    normals = picture(renderers, task(look=Look("normals"))) / 127.5 - 1.0
     seen = frame.opacity > 0.99
     assert np.abs(normals[seen] - frame.normals[seen]).mean() < 0.05
-    depth = picture(studio, task(look=Look("depth")))[..., 0]
+    depth = picture(renderers, task(look=Look("depth")))[..., 0]
     middle, edge = depth[SIDE // 2, SIDE // 2], depth[SIDE // 2, np.flatnonzero(seen[SIDE // 2])[0]]
     assert middle > edge > 0 and depth[0, 0] < 5
 
 
-def test_depths_are_distances_along_the_rays(studio: Studio) -> None:
-    done = studio.picture(task(), lambda: False)
+def test_depths_are_distances_along_the_rays(renderers: RendererCache) -> None:
+    done = renderers.picture(task(), lambda: False)
     assert isinstance(done, PictureDone)
     depth = np.frombuffer(done.depth, "<u2").reshape(SIDE, SIDE)
-    frame = studio.plain.render(CAMERA)
+    frame = renderers.plain.render(CAMERA)
     assert frame is not None
     seen = frame.opacity > 0.5
     assert ((depth == 65535) == ~seen).all()
@@ -154,36 +156,37 @@ def test_depths_are_distances_along_the_rays(studio: Studio) -> None:
     assert np.abs(depth[seen] * done.depth_scale - frame.depth[seen]).max() <= done.depth_scale * 1.01
 
 
-def test_a_tile_nobody_wants_any_more_is_stopped(studio: Studio) -> None:
-    assert isinstance(studio.picture(task(MOVED), lambda: True), Stopped)
+def test_a_tile_nobody_wants_any_more_is_stopped(renderers: RendererCache) -> None:
+    assert isinstance(renderers.picture(task(MOVED), lambda: True), Stopped)
 
 
-def test_edits_that_stay_are_not_prepared_again(studio: Studio) -> None:
-    first = studio.edits(values_of((MOVED, COPY)))
-    again = studio.edits(values_of((MOVED, COPY.translate((0.1, 0, 0)))))
+def test_edits_that_stay_are_not_prepared_again(renderers: RendererCache) -> None:
+    first = renderers.edits(values_of((MOVED, COPY)))
+    again = renderers.edits(values_of((MOVED, COPY.translate((0.1, 0, 0)))))
     assert again[0] is first[0] and again[1] is not first[1]
     shown = Shown(values_of((MOVED,)))
-    assert studio.renderer(shown, exact=True) is studio.renderer(shown, exact=False)
+    assert renderers.renderer(shown, exact=True) is renderers.renderer(shown, exact=False)
 
 
-def test_an_impossible_edit_is_an_error(studio: Studio) -> None:
+def test_an_impossible_edit_is_an_error(renderers: RendererCache) -> None:
     with pytest.raises(EditError, match="outer cage must contain"):
-        studio.picture(task(MOVED.translate((0.4, 0, 0))), lambda: False)
+        renderers.picture(task(MOVED.translate((0.4, 0, 0))), lambda: False)
 
 
-def test_warming_up_is_possible_for_every_stage(studio: Studio) -> None:
-    working = Working(studio)
-    for stage in range(WARM_STAGES):
-        assert isinstance(working.do(WarmTask(1, stage), lambda _: False), Answered)
+def test_warming_up_is_possible_for_every_stage(renderers: RendererCache) -> None:
+    handlers = TaskHandlers(renderers)
+    for stage in WarmStage:
+        assert isinstance(handlers.do(WarmTask(1, stage), lambda _: False), Answered)
 
 
-def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(studio: Studio) -> None:
-    working = Working(studio)
+def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(renderers: RendererCache) -> None:
+    handlers = TaskHandlers(renderers)
     cage = Cage.box((0, 0, 0), 1.9)
     low, high = (
         fitted(cage, np.array(found.value)).aabb
         for found in (
-            working.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False) for edits in ((), (MOVED,))
+            handlers.do(FitTask(1, Shown(values_of(edits)), cage), lambda _: False)
+            for edits in ((), (MOVED,))
         )
         if isinstance(found, Answered)
     )
@@ -220,53 +223,53 @@ def test_the_grid_bends_with_the_edit() -> None:
     assert grid_lines(COPY) == []
 
 
-def test_the_error_of_a_lattice_is_told_in_voxels(studio: Studio) -> None:
-    found = Working(studio).do(ErrorTask(1, values_of((MOVED,))[0], 0), lambda _: False)
+def test_the_error_of_a_lattice_is_told_in_voxels(renderers: RendererCache) -> None:
+    found = TaskHandlers(renderers).do(ErrorTask(1, values_of((MOVED,))[0], 0), lambda _: False)
     assert isinstance(found, Answered)
     most, mean = MOVED.lattice_error(samples=SAMPLES)
     np.testing.assert_allclose(found.value, (most / 0.125, mean / 0.125))
 
 
-def test_measuring_a_lattice_is_given_up_and_done_again_later(studio: Studio) -> None:
+def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: RendererCache) -> None:
     task = ErrorTask(1, values_of((MOVED,))[0], 0)
-    stopped = Working(studio).do(task, lambda _: True)
+    stopped = TaskHandlers(renderers).do(task, lambda _: True)
     assert isinstance(stopped, Stopped)
     session: Any = SimpleNamespace(moving=False, drawn=lambda: (MOVED,))
     measured = []
-    chores = Chores(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
-    chores._warming = WARM_STAGES
-    chore = chores.next(0)
-    assert chore is not None
-    chore.done(stopped)
-    again = chores.next(1)
+    background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
+    background._warming = []
+    background_task = background.next(0)
+    assert background_task is not None
+    background_task.done(stopped)
+    again = background.next(1)
     assert again is not None and again.make(2) == replace(task, number=2, generation=1)
     again.done(Answered(2, (0.5, 0.1)))
-    assert measured == [1] and chores.next(2) is None
+    assert measured == [1] and background.next(2) is None
 
 
 def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
-    studio: Studio, tmp_path: Path
+    renderers: RendererCache, tmp_path: Path
 ) -> None:
-    working = Working(studio)
+    handlers = TaskHandlers(renderers)
     still = Still(CAMERA, {})
 
     def frame(job: int, index: int, what: Any, out: Path, generation: int = 0) -> FrameTask:
         return FrameTask(1, job, index, 3, what, str(out), 10.0, Shown(()), still, generation)
 
     for index in range(3):
-        working.do(frame(1, index, "test_views", tmp_path / "views"), lambda _: False)
-        working.do(frame(2, index, "camera_path", tmp_path / "a.mp4"), lambda _: False)
-        working.do(frame(3, index, "camera_path", tmp_path / "b.mp4"), lambda _: False)
+        handlers.do(frame(1, index, "test_views", tmp_path / "views"), lambda _: False)
+        handlers.do(frame(2, index, "camera_path", tmp_path / "a.mp4"), lambda _: False)
+        handlers.do(frame(3, index, "camera_path", tmp_path / "b.mp4"), lambda _: False)
     assert not (tmp_path / "a.mp4").exists()
-    working.do(EndJobTask(1, 2, keep=True), lambda _: False)
-    working.do(EndJobTask(1, 3, keep=False), lambda _: False)
+    handlers.do(EndJobTask(1, 2, keep=True), lambda _: False)
+    handlers.do(EndJobTask(1, 3, keep=False), lambda _: False)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "views"]
     shots = sorted((tmp_path / "views").iterdir())
     assert [file.name for file in shots] == ["0000.png", "0001.png", "0002.png"]
-    expected = studio.scene.render(CAMERA).rgb8()
+    expected = renderers.scene.render(CAMERA).rgb8()
     np.testing.assert_array_equal(np.asarray(Image.open(shots[0])), expected)
     assert isinstance(
-        working.do(frame(4, 0, "test_views", tmp_path / "no", generation=0), lambda wanted: True), Stopped
+        handlers.do(frame(4, 0, "test_views", tmp_path / "no", generation=0), lambda wanted: True), Stopped
     )
     assert not (tmp_path / "no").exists()
 

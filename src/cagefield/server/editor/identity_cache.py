@@ -1,0 +1,35 @@
+"""What was worked out about an object, remembered by the object itself: equal ones are not the same."""
+
+from __future__ import annotations
+
+from typing import Generic, TypeVar
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class IdentityCache(Generic[K, V]):
+    """Values of the last `capacity` objects that were put in. Keeps the objects alive."""
+
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._items: dict[int, tuple[K, V]] = {}
+
+    def __contains__(self, key: K) -> bool:
+        return id(key) in self._items
+
+    def __getitem__(self, key: K) -> V:
+        """Raises KeyError where nothing is known of this object."""
+        return self._items[id(key)][1]
+
+    def get(self, key: K) -> V | None:
+        """The value, or None where nothing is known of this object."""
+        return self[key] if key in self else None
+
+    def put(self, key: K, value: V) -> V:
+        """Remembers a value; the oldest is forgotten where there are too many."""
+        self._items.pop(id(key), None)
+        self._items[id(key)] = key, value
+        if len(self._items) > self._capacity:
+            del self._items[next(iter(self._items))]
+        return value
