@@ -24,7 +24,8 @@ class IdentityCache(Generic[K, V]):
 
     def get(self, key: K) -> V | None:
         """The value, or None where nothing is known of this object."""
-        return self[key] if key in self else None
+        item = self._items.get(id(key))
+        return None if item is None else item[1]
 
     def put(self, key: K, value: V) -> V:
         """Remembers a value; the oldest is forgotten where there are too many."""
