@@ -17,9 +17,9 @@ from cagefield.benchmarking.compare import continuous
 from cagefield.benchmarking.distortion import between
 from cagefield.cages import Cage
 from cagefield.edits import Edit
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_shell
-from cagefield.warps.extended import Extended
+from cagefield.warps.extended_coordinates import Extended
 
 BOX, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 ASIDE = Cage.box((0.25, -0.1, 0.1), 0.6, (0.2, 0.1, 0.3))

@@ -40,10 +40,11 @@ from cagefield.edits.operations import (
     Translate,
 )
 from cagefield.errors import CagefieldError
-from cagefield.hexahedron import Array, Mask
-from cagefield.warps import FlowShell, flow_device, flow_table
-from cagefield.warps.extended import Extended
-from cagefield.warps.inverting import inverted
+from cagefield.trilinear_hex import Array, Mask
+from cagefield.warps import FlowShell, flow_table
+from cagefield.warps.extended_coordinates import Extended
+from cagefield.warps.kernels import flow_shell
+from cagefield.warps.newton_inverse import inverted
 
 vec3 = qd.math.vec3
 Points = qd.types.ndarray(dtype=vec3, ndim=1)
@@ -84,7 +85,7 @@ def _map(points: Points, out: Points, table: Points):
         for a in range(3):
             d = vec3(0.0, 0.0, 0.0)
             d[a] = 1.0
-            q, v = flow_device.flow_sample(points[n], d, table, 0)
+            q, v = flow_shell.flow_sample(points[n], d, table, 0)
             out[4 * n] = q
             out[4 * n + 1 + a] = v
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.colmap_files import check_whole
-from cagefield.datasets.nerf_worlds import in_unit_cube
+from cagefield.datasets.normalisation import in_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 

@@ -12,7 +12,7 @@ import pytest
 
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.nerf_worlds import Similarity
+from cagefield.datasets.normalisation import Similarity
 from cagefield.datasets.points import points_of, random_points, training_points
 from cagefield.datasets.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints

@@ -19,7 +19,7 @@ from cagefield.rendering.deformed_splats import DeformedSplats, deformed_splats,
 from cagefield.rendering.deformed_splats_reference import deformed_splats_reference
 from cagefield.rendering.kernels.splat_deforming import polar_rotation
 from cagefield.rendering.moved_splats import moved_splats
-from cagefield.rendering.sampled import render_sampled
+from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.warps import forward
 from splat_scenes import random_splats

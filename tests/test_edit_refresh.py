@@ -107,15 +107,15 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int
 
 
 def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.rendering import smooth_occupancy
+    from cagefield.rendering import occupancy_continuous
     from cagefield.warps import flow_lattice
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
         start = Renderer(field(), stack)
         counts = [
             counted(monkeypatch, flow_lattice, "sample"),
-            counted(monkeypatch, smooth_occupancy, "images_of"),
-            counted(monkeypatch, smooth_occupancy, "_refined"),
+            counted(monkeypatch, occupancy_continuous, "images_of"),
+            counted(monkeypatch, occupancy_continuous, "_refined"),
         ]
         # Another edit each time: an equal one would find its lattice there.
         start.with_edits(stack.set(number, stack[number].translate((0.01 * len(stack), 0, 0))))
@@ -149,10 +149,10 @@ def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
     monkeypatch: pytest.MonkeyPatch, place: int
 ) -> None:
-    from cagefield.rendering import smooth_occupancy
+    from cagefield.rendering import occupancy_continuous
 
     mapped: list[tuple[int, int]] = []
-    images = smooth_occupancy.images_of
+    images = occupancy_continuous.images_of
 
     def counting(grid: Any, stack: Any, *rest: Any) -> Any:
         found = images(grid, stack, *rest)
@@ -167,7 +167,7 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
             renderer = renderer.with_edits(stack.set(number, moved), coarse=True)
         return renderer, list(mapped)
 
-    monkeypatch.setattr(smooth_occupancy, "images_of", counting)
+    monkeypatch.setattr(occupancy_continuous, "images_of", counting)
     chain = EditStack(HALF.rotate((0, 0, 0.02 * number)) for number in range(10))
     _, alone = drag(EditStack([HALF]), 0)
     quick, together = drag(chain, place)

@@ -7,9 +7,9 @@ import pytest
 
 from cagefield.cages import Cage
 from cagefield.errors import CageError
-from cagefield.hexahedron import Array
-from cagefield.warps.bends import _middles, bends_one_to_one, forms
-from cagefield.warps.extended import Extended
+from cagefield.trilinear_hex import Array
+from cagefield.warps.extended_coordinates import Extended
+from cagefield.warps.trilinear_bend import _middles, bends_one_to_one, forms
 from random_cages import dragged, trilinear, unit_vectors
 
 BOX = Cage.box((0.1, 0.2, 0.3), (1.0, 0.7, 0.8), (0.3, 0.5, 0.1))

@@ -16,11 +16,11 @@ from cagefield.edits.edit import largest_safe
 from cagefield.edits.limits import along, flow_reach
 from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
 from cagefield.errors import CageError, EditError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps import Falloff, FlowShell
-from cagefield.warps.bends import bends_one_to_one, forms, stay_one_to_one
-from cagefield.warps.extended import Extended, straightened_slope
-from cagefield.warps.flow_motion import TIMES
+from cagefield.warps.cage_motion import TIMES
+from cagefield.warps.extended_coordinates import Extended, straightened_slope
+from cagefield.warps.trilinear_bend import bends_one_to_one, forms, stay_one_to_one
 from random_cages import can_be_evaluated, dragged, examples, random_operation, seeds
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.warps.joined import Joined
+from cagefield.warps.buffer_pool import Joined
 
 
 def part(value: float, rows: int = 4) -> np.ndarray:

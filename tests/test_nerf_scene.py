@@ -169,7 +169,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 from cagefield.cameras import Camera  # noqa: E402
 from cagefield.formats.nerf_pytorch import Checkpoint, read_checkpoint  # noqa: E402
 from cagefield.formats.nerf_pytorch_import import import_nerf, shifted  # noqa: E402
-from cagefield.rendering.agreement import agreement  # noqa: E402
+from cagefield.rendering.bake_fidelity import agreement  # noqa: E402
 from cagefield.rendering.nerf import Rays, render_nerf, trace  # noqa: E402
 
 

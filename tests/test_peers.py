@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.benchmarking.distortion import distortion, shell_points
 from cagefield.benchmarking.methods import MAPS, METHODS, check_known, exact_map, peers
 from cagefield.benchmarking.peers import PEERS, HarmonicShell
@@ -19,9 +19,9 @@ from cagefield.benchmarking.peers.mean_value import ClosedMesh, cube_surface
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.warps.inner_map import HexahedronMap
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 EDIT = Edit(INNER, OUTER)
@@ -153,8 +153,8 @@ def test_shells_are_the_identity_outside_and_phi_inside(name: str, edit: Edit) -
     # mean value: read 3e-7 of the mesh beside the face; harmonic: the box's faces are rows of nodes
     off = 5e-6 if name == "mean value" else 1e-12
     np.testing.assert_allclose(to_canonical(outside)[0], outside, atol=off)
-    canonical = hexahedron.points(edit.inner.corners, u)
-    inside = hexahedron.points(edit.deformed.corners, u)
+    canonical = trilinear_hex.points(edit.inner.corners, u)
+    inside = trilinear_hex.points(edit.deformed.corners, u)
     error = np.linalg.norm(to_canonical(inside)[0] - canonical, axis=1)
     on_edge = (np.abs(u - 0.5) > 0.4).sum(axis=1) > 1
     if name == "harmonic":  # a fifth of the spacing of 0.025; more at edges, where slopes are not bounded

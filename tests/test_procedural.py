@@ -28,7 +28,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import DatasetError, SceneError
 from cagefield.rendering.images import read_image
 from cagefield.rendering.metrics import psnr
-from cagefield.rendering.sampled import render_sampled
+from cagefield.rendering.reference_renderer import render_sampled
 
 ELL = ((-0.4, -0.3), (0.4, -0.3), (0.4, 0.0), (0.0, 0.0), (0.0, 0.35), (-0.4, 0.35))
 LATHE = ((0.0, -0.4), (0.3, -0.4), (0.15, 0.0), (0.35, 0.4), (0.0, 0.4))

@@ -12,8 +12,8 @@ from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import occupancy
 from cagefield.rendering.metrics import psnr
+from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
-from cagefield.rendering.sampled import render_sampled
 
 devices.start("cpu")
 

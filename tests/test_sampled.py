@@ -13,7 +13,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import FieldError
 from cagefield.fields.analytic import AnalyticField, GaussianBlob, UniformBox, UniformSphere
 from cagefield.rendering import compositing
-from cagefield.rendering.sampled import intersect_box, render_sampled
+from cagefield.rendering.reference_renderer import intersect_box, render_sampled
 
 
 def camera(size: int = 12, eye: tuple[float, float, float] = (3.0, 1.0, 0.8), fov_x: float = 0.5) -> Camera:

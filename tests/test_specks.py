@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.fields.voxel import VoxelField
-from cagefield.training.specks import LARGEST_SPECK, without_specks
+from cagefield.training.floaters import LARGEST_SPECK, without_specks
 
 N = 64
 

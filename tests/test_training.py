@@ -14,7 +14,7 @@ from cagefield import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
-from cagefield.training.filling import OPAQUE
+from cagefield.training.inpaint import OPAQUE
 from cagefield.training.progress import Snapshots
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig

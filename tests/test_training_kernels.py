@@ -14,10 +14,10 @@ devices.start("cpu")
 
 from cagefield.rendering.grid import ivec3, to_device, vec3  # noqa: E402
 from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
-from cagefield.training.march_kernel import MOST_SAMPLES, SAMPLE, march_batch  # noqa: E402
+from cagefield.training.kernels.accumulators import HEAD  # noqa: E402
+from cagefield.training.kernels.march import MOST_SAMPLES, SAMPLE, march_batch  # noqa: E402
+from cagefield.training.kernels.update import gauss_newton, laplacian  # noqa: E402
 from cagefield.training.photos import Photos  # noqa: E402
-from cagefield.training.records import HEAD  # noqa: E402
-from cagefield.training.update_kernels import gauss_newton, laplacian  # noqa: E402
 
 SIZE = 8
 N = 9

@@ -10,7 +10,7 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.datasets import Dataset
-from cagefield.datasets.nerf_worlds import in_ndc_world, in_unit_cube, ndc_box, why_not_ndc
+from cagefield.datasets.normalisation import in_ndc_world, in_unit_cube, ndc_box, why_not_ndc
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.contraction import contract

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cagefield.cameras import turntable
-from cagefield.datasets.nerf_worlds import Similarity
+from cagefield.datasets.normalisation import Similarity
 from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.rendering.metrics import psnr

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.hexahedron import Array
-from cagefield.warps.inverting import inverted
+from cagefield.trilinear_hex import Array
+from cagefield.warps.newton_inverse import inverted
 
 
 def bent(x: Array) -> tuple[Array, Array]:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.errors import CageError
-from cagefield.hexahedron import Array, Mask
+from cagefield.trilinear_hex import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
 
@@ -68,7 +68,7 @@ class Cage:
         """A box: centre [3], full edge lengths [3] (or one for a cube), intrinsic XYZ rotation in radians."""
         c = vector(center, "cage center")
         s = factors(size, "cage size")
-        offsets = (hexahedron.BITS - 0.5) * s
+        offsets = (trilinear_hex.BITS - 0.5) * s
         theta = vector(rotation, "cage rotation")
         if theta.any():
             offsets = offsets @ rotation_matrix(theta).T
@@ -108,14 +108,14 @@ class Cage:
     @cached_property
     def affine(self) -> tuple[Array, Array]:
         """(A [3,3], b [3]) with x(u) = b + A u: exact where `is_affine`, else the least-squares fit."""
-        C = hexahedron.coefficients(self.corners)
+        C = trilinear_hex.coefficients(self.corners)
         A = 2.0 * C[[1, 2, 4]].T
         return A, C[0] - A.sum(axis=1) / 2.0
 
     @cached_property
     def is_affine(self) -> bool:
         """True when the cage is a parallelepiped, to 1e-12 of its extent."""
-        C = hexahedron.coefficients(self.corners)
+        C = trilinear_hex.coefficients(self.corners)
         return bool(np.abs(C[[3, 5, 6, 7]]).max() <= 1e-12 * np.abs(C[[1, 2, 4]]).max())
 
     @property
@@ -137,7 +137,7 @@ class Cage:
         origin, edges = self.frame
         lengths = np.linalg.norm(edges, axis=0)
         origin = origin - edges @ (m / lengths)
-        return Cage(origin + hexahedron.BITS @ (edges * (1.0 + 2.0 * m / lengths)).T)
+        return Cage(origin + trilinear_hex.BITS @ (edges * (1.0 + 2.0 * m / lengths)).T)
 
     @property
     def axes(self) -> Array:
@@ -159,8 +159,8 @@ class Cage:
         low, high = self.aabb
         slack = 1e-9 * (high - low)
         near = np.flatnonzero(((p >= low - slack) & (p <= high + slack)).all(axis=1))
-        u[near], found = hexahedron.inverse(self.corners, p[near])
-        mask[near] = hexahedron.inside(u[near], found)
+        u[near], found = trilinear_hex.inverse(self.corners, p[near])
+        mask[near] = trilinear_hex.inside(u[near], found)
         return u, mask
 
     def contains(self, points: ArrayLike) -> Mask:
@@ -349,18 +349,18 @@ def are_valid(corners: Array) -> Mask:
     """Mask [B] of the corners [B,8,3] that a `Cage` may have."""
     bernstein, lengths = _orientation(corners)
     floor = _FLAT * lengths.prod(axis=1)
-    return (floor > 0.0) & hexahedron.are_positive(bernstein - floor[:, None, None, None])
+    return (floor > 0.0) & trilinear_hex.are_positive(bernstein - floor[:, None, None, None])
 
 
 def _orientation(corners: Array) -> tuple[Array, Array]:
     """(Bernstein coefficients [B,3,3,3] of the determinants, mean edges [B,3] along each axis)."""
     tails, heads = np.array(EDGES).T
     lengths = np.linalg.norm(corners[:, heads] - corners[:, tails], axis=2)
-    return hexahedron.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
+    return trilinear_hex.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
 
 
 def _check_orientation(corners: Array) -> None:
-    """Raise `CageError` where the Jacobian determinant is not positive over the whole hexahedron."""
+    """Raise `CageError` where the Jacobian determinant is not positive over the whole trilinear_hex."""
     if are_valid(corners[None])[0]:
         return
     bernstein, lengths = (each[0] for each in _orientation(corners[None]))
@@ -381,9 +381,9 @@ def _check_orientation(corners: Array) -> None:
     if at_corners.min() > floor:
         g = np.linspace(0.0, 1.0, 17)
         u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
-        det = np.linalg.det(hexahedron.jacobian(corners, u))
+        det = np.linalg.det(trilinear_hex.jacobian(corners, u))
         worst = int(np.argmin(det))
-        k = int(np.argmin(((hexahedron.BITS - u[worst]) ** 2).sum(axis=1)))
+        k = int(np.argmin(((trilinear_hex.BITS - u[worst]) ** 2).sum(axis=1)))
         raise CageError(
             f"cage is inside out between its corners, nearest to corner {k} at {format_vector(corners[k])}:"
             f" the Jacobian determinant there falls to {det[worst]:.3g} and must stay positive; move corner"

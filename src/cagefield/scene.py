@@ -278,7 +278,7 @@ class Scene:
 
     def _render_exact(self, camera: Camera, background: Background, normals: bool) -> Frame:
         from cagefield.fields.protocol import Field
-        from cagefield.rendering.sampled import render_sampled
+        from cagefield.rendering.reference_renderer import render_sampled
 
         if self.original is not None:
             return self._render_original(self.original, camera, background, normals)

@@ -59,7 +59,7 @@ class Score:
 
     `frame_ratio` is the time of an edited frame over that of an unedited one. Only a continuous edit has a
     distortion and a time of its map; `lpips` is that of the unedited and the edited pictures, where measured.
-    Of a discrete edit, `unseen` is the share of pixels that show what no training photo showed, and
+    Of a discrete edit, `visibility` is the share of pixels that show what no training photo showed, and
     `lost_seen` the PSNR lost on the others.
     """
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
-from cagefield.hexahedron import Array
-from cagefield.rendering.sampled import PointMap
+from cagefield.rendering.reference_renderer import PointMap
+from cagefield.trilinear_hex import Array
 from cagefield.warps.device_stack import DeviceStack
 
 _WITH_KERNEL = ("flow", "trilinear")

@@ -19,7 +19,7 @@ from cagefield.benchmarking.methods import BackwardMap, exact_map
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell
 

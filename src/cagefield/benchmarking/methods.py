@@ -14,9 +14,9 @@ from cagefield.benchmarking.peers import PEERS, PeerShell
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps import SHELLS, Falloff, Shell
-from cagefield.warps.maps import Mapped
+from cagefield.warps.interfaces import Mapped
 
 
 def _as_shell(name: str) -> Callable[[Cage, Cage, Cage, Falloff], Shell]:

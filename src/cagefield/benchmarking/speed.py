@@ -16,7 +16,7 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
-from cagefield.rendering.sampled import intersect_box
+from cagefield.rendering.reference_renderer import intersect_box
 from cagefield.scene import Scene
 
 COVERED = 0.25

@@ -33,7 +33,7 @@ from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import replaced_whole
-from cagefield.rendering.sampled import render_sampled
+from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.splat_config import SplatConfig
@@ -47,8 +47,8 @@ Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("datasets/procedural", "cameras.py")
 _MAPPED = (
-    "edits", "warps", "cages.py", "hexahedron.py", "rendering/sampled.py", "benchmarking/exact.py",
-    "benchmarking/peers", "benchmarking/methods.py",
+    "edits", "warps", "cages.py", "trilinear_hex.py", "rendering/reference_renderer.py",
+    "benchmarking/exact.py", "benchmarking/peers", "benchmarking/methods.py",
 )  # fmt: skip
 
 SOFTNESS = 0.004

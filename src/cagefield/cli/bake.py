@@ -88,7 +88,7 @@ def bake_scene(
 
     from cagefield.fields.splat import SplatField
     from cagefield.fields.voxel import VoxelField
-    from cagefield.rendering.agreement import agreement
+    from cagefield.rendering.bake_fidelity import agreement
     from cagefield.scene import Scene
 
     began = time.perf_counter()

@@ -16,11 +16,11 @@ from cagefield.edits import operations as ops
 from cagefield.edits.limits import flow_reach
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps import FALLOFFS, SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
-from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
 Adjustment: TypeAlias = Literal["continuous", "discrete"]

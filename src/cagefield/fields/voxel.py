@@ -10,7 +10,7 @@ Notation: a grid of nx x ny x nz *vertices* spans `bounds`; vertex (i, j, k) has
 With `contracted`, `bounds` is the box of interest and the grid spans the contracted cube (-2, 2)^3 of
 `cagefield.fields.contraction`, hence all of space.
 
-This module is the readable float64 reference. `cagefield.rendering.march` is the fused version.
+This module is the readable float64 reference. `cagefield.rendering.kernels.march` is the fused version.
 """
 
 from __future__ import annotations

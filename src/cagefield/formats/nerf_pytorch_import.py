@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets import Dataset
 from cagefield.datasets.llff import POSES_FILE
-from cagefield.datasets.nerf_worlds import Similarity, all_cameras, ndc_box, ndc_ratios, to_mean_camera
+from cagefield.datasets.normalisation import Similarity, all_cameras, ndc_box, ndc_ratios, to_mean_camera
 from cagefield.errors import FieldError
 from cagefield.fields.nerf import NerfField
 from cagefield.formats.nerf_pytorch import Checkpoint

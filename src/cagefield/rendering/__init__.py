@@ -2,6 +2,6 @@
 
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.metrics import psnr, ssim
-from cagefield.rendering.sampled import render_sampled
+from cagefield.rendering.reference_renderer import render_sampled
 
 __all__ = ["Frame", "psnr", "render_sampled", "ssim"]

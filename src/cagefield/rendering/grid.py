@@ -18,7 +18,7 @@ from cagefield import devices
 from cagefield import sh as harmonics
 from cagefield.devices import floats
 from cagefield.fields.voxel import VoxelField
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 
 BRICK = 4
 
@@ -88,7 +88,7 @@ def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -
 
 
 def transform_of(field: VoxelField) -> tuple[Array, Array, Array]:
-    """Origin, scale and half as in `cagefield.rendering.march`."""
+    """Origin, scale and half as in `cagefield.rendering.kernels.march`."""
     n = np.array(field.resolution)
     if field.contracted:
         origin, scale = field.center, 1.0 / field.half_size

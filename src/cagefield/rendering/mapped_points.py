@@ -10,7 +10,7 @@ from cagefield.devices import ints
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.rendering.grid import U8, DeviceGrid, ivec3, to_grid, to_world, transform_of, vec3
 from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.edit_device import Nodes, Params, map_sample
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
 
 UNKNOWN = 1e30
 """Image of a point that was not mapped."""

@@ -18,7 +18,7 @@ from cagefield.rendering.frame import Background, Frame
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
-    from cagefield.rendering.links import Chain
+    from cagefield.rendering.incremental_occupancy import Chain
     from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
@@ -93,11 +93,11 @@ class Renderer:
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> None:
-        from cagefield.rendering.deformed_occupancy import Known, deform
         from cagefield.rendering.grid import for_kernels
-        from cagefield.rendering.links import Chain, replaced
+        from cagefield.rendering.incremental_occupancy import Chain, replaced
+        from cagefield.rendering.occupancy_deformed import Known, deform
         from cagefield.warps.device_stack import DeviceStack
-        from cagefield.warps.rows import widened
+        from cagefield.warps.packing import widened
 
         stack = DeviceStack.from_stack(self.edits)
         jumps = _jumps(self.edits)
@@ -134,7 +134,7 @@ class Renderer:
         takes the place of the renderer's own.
         """
         from cagefield.loops import deal_of
-        from cagefield.rendering import march
+        from cagefield.rendering.kernels import march
 
         field = self.field
         x, y, width, height = _checked_region(region, camera)

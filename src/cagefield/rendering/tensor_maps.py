@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps.device_stack import DeviceStack, PackedStack
-from cagefield.warps.edit_device import Nodes, Params, map_sample
-from cagefield.warps.hexahedron_device import read3
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.trilinear_hex import read3
 
 
 class TensorMap:

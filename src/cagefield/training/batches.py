@@ -13,9 +13,9 @@ from cagefield.devices import floats, ints
 from cagefield.loops import deal_of
 from cagefield.training.exposure import Exposure
 from cagefield.training.grid_state import GridState
-from cagefield.training.march_kernel import MOST_SAMPLES, SAMPLE, march_batch
+from cagefield.training.kernels.march import MOST_SAMPLES, SAMPLE, march_batch
+from cagefield.training.kernels.update import gauss_newton, laplacian
 from cagefield.training.photos import Photos
-from cagefield.training.update_kernels import gauss_newton, laplacian
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_defaults import Settings
 from cagefield.training.voxel_space import VoxelSpace

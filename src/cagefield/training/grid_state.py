@@ -16,7 +16,7 @@ from scipy import ndimage
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import brick_order, to_device
-from cagefield.training.records import HEAD
+from cagefield.training.kernels.accumulators import HEAD
 
 CHUNK = 2**18
 """Vertices that are interpolated at once."""
@@ -33,7 +33,7 @@ class GridState:
         bounds: [2,3] as VoxelField. resolution: vertices per axis. vertices: [M] linear, in slot order.
         contracted: as VoxelField. degree: SH degree.
         density, sh, state, weight, accumulator, index, codes: device arrays; see
-            `march_kernel`, `update_kernels` and `records`.
+            `kernels.march`, `kernels.update` and `kernels.accumulators`.
         threads: of the CPU that may take part. workers: number of accumulators, at most as many.
     """
 

@@ -22,10 +22,10 @@ import numpy as np
 from cagefield.datasets.views import Dataset, View
 from cagefield.fields.nerf import NerfField
 from cagefield.rendering.nerf import Rays, trace
+from cagefield.training.loop import run_to_end
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.nerf_run import NerfProgress, NerfRun, composited
 from cagefield.training.nerf_space import Space
-from cagefield.training.running import run_to_end
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ class NerfProgress:
 
 
 class NerfRun:
-    """A training run; see `running.Run`."""
+    """A training run; see `loop.Run`."""
 
     def __init__(self, dataset: Dataset, config: NerfConfig) -> None:
         self.config, self.space = config, space_of(dataset, config.ndc)

@@ -3,7 +3,7 @@
 | capture | world | samples |
 | --- | --- | --- |
 | bounded | its own | even in depth, between the depths at which its cameras may see its box |
-| forward-facing | NDC's (`datasets.nerf_worlds`) | even in NDC, from the near plane to infinity |
+| forward-facing | NDC's (`datasets.normalisation`) | even in NDC, from the near plane to infinity |
 | any other | its cube of interest is [-1, 1]^3 | even in 1/depth, from `near` to `far` |
 
 The last one's near and far are nerf-pytorch's 0.9 times the nearest and the farthest depth that the capture
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.datasets.nerf_worlds import in_ndc_world, in_unit_cube, why_not_ndc
+from cagefield.datasets.normalisation import in_ndc_world, in_unit_cube, why_not_ndc
 from cagefield.datasets.views import Dataset
 from cagefield.errors import CagefieldError
 

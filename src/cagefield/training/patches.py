@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cagefield.devices import floats, ints
 from cagefield.rendering.grid import F32, I32, ivec3, to_device, vec3
-from cagefield.rendering.traverse import empty_run, safe_inverse, slab
+from cagefield.rendering.kernels.ray_grid import empty_run, safe_inverse, slab
 from cagefield.training.grid_state import GridState
 from cagefield.training.photos import Photos
 from cagefield.training.voxel_space import VoxelSpace

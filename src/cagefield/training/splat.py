@@ -25,7 +25,7 @@ from cagefield.datasets.points import points_cache, points_of
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat import SplatField
 from cagefield.training.evaluation import evaluate_views
-from cagefield.training.running import run_to_end
+from cagefield.training.loop import run_to_end
 from cagefield.training.splat_config import SplatConfig
 
 

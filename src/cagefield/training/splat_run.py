@@ -66,7 +66,7 @@ STEPS_A_MINUTE = 800
 
 
 class SplatRun:
-    """A training run; see `running.Run`."""
+    """A training run; see `loop.Run`."""
 
     def __init__(self, dataset: Dataset, config: SplatConfig) -> None:
         self._config, self._dataset = config, dataset

@@ -2,8 +2,8 @@
 
 A run is a sequence of stages (`schedule`). Each stage is a grid: the stored vertices of the stage before,
 pruned by the largest weight they got in any training ray, cropped to what is left (bounded scenes) and
-refined. Within a stage, batches of pixel patches are marched (`march_kernel`) and every voxel that they met
-is updated (`update_kernels`). Patches that meet no occupied block any more are left out of the batches: their
+refined. Within a stage, batches of pixel patches are marched (`kernels.march`) and every voxel that they met
+is updated (`kernels.update`). Patches that meet no occupied block any more are left out of the batches: their
 gradients are zero. At the end, specks are taken out of a bounded scene's field, and what no photo showed of
 it is filled.
 
@@ -23,9 +23,9 @@ from cagefield import devices
 from cagefield.datasets.views import Dataset
 from cagefield.fields.voxel import VoxelField
 from cagefield.training.evaluation import evaluate_views
-from cagefield.training.filling import filled
+from cagefield.training.inpaint import filled
+from cagefield.training.loop import run_to_end
 from cagefield.training.progress import Progress, Snapshots
-from cagefield.training.running import run_to_end
 from cagefield.training.voxel_config import VoxelConfig
 
 
@@ -66,7 +66,7 @@ def train_voxel(
     """
     devices.start()
     # Modules with kernels: without a device, importing them prints a line.
-    from cagefield.training.unseen import unseen
+    from cagefield.training.visibility import unseen
     from cagefield.training.voxel_run import VoxelRun
 
     run = VoxelRun(dataset, config or VoxelConfig())

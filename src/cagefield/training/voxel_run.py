@@ -17,12 +17,12 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.training.batches import Batches
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.exposure import Exposure
+from cagefield.training.floaters import without_specks
 from cagefield.training.grid_state import GridState
 from cagefield.training.patches import Patches
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress
 from cagefield.training.schedule import Schedule
-from cagefield.training.specks import without_specks
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_defaults import settings
 from cagefield.training.voxel_space import VoxelSpace
@@ -35,7 +35,7 @@ EXPOSURE_EVERY = 50
 
 
 class VoxelRun:
-    """A training run; see `running.Run`.
+    """A training run; see `loop.Run`.
 
     Attributes:
         step: batches so far. seconds: their time. rays: their rays.

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array
-from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.trilinear_hex import Array
+from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.interfaces import Mapped, Shell
 from cagefield.warps.lattice import Lattice
-from cagefield.warps.maps import Mapped, Shell
 
 
 @dataclass(frozen=True)

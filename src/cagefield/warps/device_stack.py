@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps import flow_table
+from cagefield.warps.buffer_pool import Joined
 from cagefield.warps.continuous import ContinuousWarp
-from cagefield.warps.edit_device import Nodes, Params, map_sample
 from cagefield.warps.edit_lattice import nodes_of
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.hexahedron_device import read3
-from cagefield.warps.joined import Joined
-from cagefield.warps.kept import kept
-from cagefield.warps.rows import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.trilinear_hex import read3
+from cagefield.warps.packing import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
+from cagefield.warps.weak_memo import kept
 
 _joined = Joined()
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array
-from cagefield.warps.hexahedron import HexahedronMap
-from cagefield.warps.maps import Mapped
+from cagefield.trilinear_hex import Array
+from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.interfaces import Mapped
 
 
 @dataclass(frozen=True)

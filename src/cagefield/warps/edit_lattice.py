@@ -12,12 +12,12 @@ from cagefield.errors import EditError
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.warps import flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
-from cagefield.warps.edit_device import Nodes, Params, map_edit
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.kept import kept
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_edit
 from cagefield.warps.lattice import Lattice
-from cagefield.warps.rows import RESOLUTION, SIMPLE, PackedEdit, row_of
+from cagefield.warps.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
 from cagefield.warps.trilinear_shell import TrilinearShell
+from cagefield.warps.weak_memo import kept
 
 vec3 = qd.math.vec3
 mat3 = qd.types.matrix(3, 3, qd.f32)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
 

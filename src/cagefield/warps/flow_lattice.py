@@ -1,7 +1,7 @@
 """The lattice of a flow shell, sampled by a Quadrants kernel in float32.
 
-The march of `flow_device`, written for `LANES` nodes at a time: the innermost loops run over them, have no
-branches, and keep each number of all of them in one array, so that compilers use vector instructions. The
+The march of `kernels.flow_shell`, written for `LANES` nodes at a time: the innermost loops run over them, have
+no branches, and keep each number of all of them in one array, so that compilers use vector instructions. The
 table is that of `flow_table`. Two things differ from the march of single samples, by less than the error of
 its steps: it goes on in the outer cage's coordinates z, so that only the start of a way is straightened
 there, and the inner cage's xi are followed by two of Newton's steps a stage, with one slope, not to rounding.
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.devices import floats
 from cagefield.loops import Deal, deal_of, dealt, turns
-from cagefield.warps.flow_device import flow_point
-from cagefield.warps.flow_lanes import bend, inverse, newton, newton_twice, times, weight_at
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import HEADER, MOMENT, table
+from cagefield.warps.kernels.flow_shell import flow_point
+from cagefield.warps.kernels.flow_simd import bend, inverse, newton, newton_twice, times, weight_at
 
 LANES = 64
 lanes = qd.types.vector(LANES, qd.f32)
@@ -38,7 +38,7 @@ LOST = 1e30
 AT_REST = 1.0 - 3e-6
 """Nodes farther out than this, in coordinates of the outer cage, stay: those on its faces, after rounding.
 
-`flow_lanes.NEAR` would let them drift.
+`kernels.flow_simd.NEAR` would let them drift.
 """
 
 FOLLOWED = 0.05

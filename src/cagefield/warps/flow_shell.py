@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from cagefield.cages import Cage, are_valid
-from cagefield.hexahedron import Array, Mask
-from cagefield.warps.bends import bend, bend_slope
-from cagefield.warps.extended import Extended
+from cagefield.trilinear_hex import Array, Mask
+from cagefield.warps.cage_motion import TIMES, Motion, gaps, may_bend
+from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.falloff import Falloff
-from cagefield.warps.flow_motion import TIMES, Motion, gaps, may_bend
-from cagefield.warps.inverting import inverted
+from cagefield.warps.newton_inverse import inverted
+from cagefield.warps.trilinear_bend import bend, bend_slope
 
 POWER = 4
 """Exponent p of the distances' norm."""
@@ -39,7 +39,7 @@ SMOOTH = Falloff()
 class FlowShell:
     """phi' by the flow of a velocity field: v(x, t) = w(x, t) V(x, t), t from 0 (canonical) to 1 (deformed).
 
-    V is the velocity of the inner cage's motion (see `flow_motion`), with which all of space would go along:
+    V is the velocity of the inner cage's motion (see `cage_motion`), with which all of space would go along:
     an affine map of x for a parallelepiped. w is 1 in the cage and 0 outside the outer cage, so a point on
     the one's faces goes with it, and on the other's stays. With xi the coordinates of the inner cage at t, z
     those of the outer cage, h and H the distances of their pairs of faces from their centres,

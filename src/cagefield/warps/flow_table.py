@@ -7,7 +7,7 @@ It is a list of vec3, appended to the lattices' nodes:
     0-3   rows of W_o, c_o              4-6   rows of F_o (p = c_o + F_o Z)
     7     distances H / 2 of the faces  8     steps, affine 0 or 1, 1 / width
     9     a of the weight, outer cage affine 0 or 1, b of the weight
-    10-19 bend and tilts of the outer cage, see `bends.forms`
+    10-19 bend and tilts of the outer cage, see `trilinear_bend.forms`
     20-23 dK/dt of the inner cage
 
 then for each of 2 steps + 1 moments `MOMENT` of them:
@@ -22,9 +22,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.hexahedron import Array
-from cagefield.warps.bends import forms
+from cagefield.trilinear_hex import Array
 from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.trilinear_bend import forms
 
 HEADER, MOMENT = 24, 23
 

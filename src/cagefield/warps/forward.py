@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table_along
-from cagefield.warps.maps import Mapped, Warp
+from cagefield.warps.interfaces import Mapped, Warp
 
 COARSE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) while something moves: as for lattices of 32^3 nodes.

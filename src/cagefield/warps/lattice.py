@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from cagefield.cages import Cage
-from cagefield.hexahedron import BITS, Array
+from cagefield.trilinear_hex import BITS, Array
 
 
 @dataclass(frozen=True)

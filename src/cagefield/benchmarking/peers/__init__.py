@@ -1,8 +1,8 @@
 """Stand-ins, without meshes, for the deformations of published cage methods, under the same handle motion.
 
 Each is a backward shell map: from the shell between the deformed inner cage and the outer cage to canonical
-space, equal to phi on the inner cage and to the identity on the outer one, as `warps.maps.Shell` asks. They
-have no inverse in closed form, and may fold; they are here to be compared with.
+space, equal to phi on the inner cage and to the identity on the outer one, as `warps.interfaces.Shell` asks.
+They have no inverse in closed form, and may fold; they are here to be compared with.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cagefield.benchmarking.peers.harmonic import HarmonicShell
 from cagefield.benchmarking.peers.mean_value import MeanValueShell
 from cagefield.cages import Cage
 from cagefield.errors import EditError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 
 
 class BackwardShell(Protocol):

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array, Mask
-from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.trilinear_hex import Array, Mask
+from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
 RESOLUTION = 65

@@ -17,10 +17,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.cages import FACES, Cage
-from cagefield.hexahedron import Array
-from cagefield.warps.hexahedron import HexahedronMap
+from cagefield.trilinear_hex import Array
+from cagefield.warps.inner_map import HexahedronMap
 
 Int = NDArray[np.intp]
 
@@ -172,9 +172,9 @@ class MeanValueShell:
     def _mesh(self) -> tuple[ClosedMesh, Array]:
         """The deformed shell's surface, and the displacement [V,3] to canonical space of its vertices."""
         (u, inner), (w, outer) = (cube_surface(splits) for splits in self.splits)
-        hole = hexahedron.points(self.inner.deformed.corners, u)
-        moved = hexahedron.points(self.inner.canonical.corners, u) - hole
-        vertices = np.concatenate([hexahedron.points(self.outer.corners, w), hole])
+        hole = trilinear_hex.points(self.inner.deformed.corners, u)
+        moved = trilinear_hex.points(self.inner.canonical.corners, u) - hole
+        vertices = np.concatenate([trilinear_hex.points(self.outer.corners, w), hole])
         mesh = ClosedMesh(vertices, np.concatenate([outer, inner[:, ::-1] + len(w)]))
         return mesh, np.concatenate([np.zeros_like(w), moved])
 

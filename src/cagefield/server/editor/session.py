@@ -14,7 +14,6 @@ from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Operation
 from cagefield.errors import CameraError, EditError
-from cagefield.hexahedron import Array
 from cagefield.keyframe_files import is_path
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.editor.cage_placement import outer_around, pair_around
@@ -29,6 +28,7 @@ from cagefield.server.editor.mirror import mirrored
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.editor.path_preview import Preview
 from cagefield.server.editor.validity import problem
+from cagefield.trilinear_hex import Array
 
 LATTICE = 64
 """Lattice nodes along an axis of a new continuous edit."""

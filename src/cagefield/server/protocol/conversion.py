@@ -12,7 +12,6 @@ from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CameraError
-from cagefield.hexahedron import Array
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
@@ -20,6 +19,7 @@ from cagefield.server.editor.edit_kinds import kind_of
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, operation_messages, server_messages
 from cagefield.server.protocol.common import Corners, Vec3
+from cagefield.trilinear_hex import Array
 
 STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
 """How densely pages are told of a camera path; a longer one has them further apart."""

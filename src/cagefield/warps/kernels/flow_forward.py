@@ -275,7 +275,7 @@ def _slopes(s, share, weight, kept, table, moment):
 
 @njit(inline="always", **FAST)
 def _columns(x, y, z, table, K):
-    """The columns of dy/dxi at xi = (x, y, z), for the form at a row of the table; see `bends`."""
+    """The columns of dy/dxi at xi = (x, y, z), for the form at a row of the table; see `trilinear_bend`."""
     cx, cy, cz = min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0), min(max(z, -1.0), 1.0)
     in_x, in_y, in_z = abs(x) <= 1.0, abs(y) <= 1.0, abs(z) <= 1.0
     a0, a1, a2 = table[K, 0], table[K, 1], table[K, 2]

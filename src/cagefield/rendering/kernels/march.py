@@ -10,7 +10,6 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.grid import (
     F32,
     I32,
@@ -24,8 +23,9 @@ from cagefield.rendering.grid import (
     to_grid,
     vec3,
 )
-from cagefield.rendering.traverse import is_occupied, look_ahead, safe_inverse, slab
-from cagefield.warps.edit_device import Nodes, Params, map_sample
+from cagefield.rendering.kernels.edited_ray import EditedRay, edited_ray, map_along
+from cagefield.rendering.kernels.ray_grid import is_occupied, look_ahead, safe_inverse, slab
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 ivec2 = qd.types.vector(2, qd.i32)

@@ -8,8 +8,8 @@ float64 reference is `lattice.Lattice`.
 
 import quadrants as qd
 
-from cagefield.warps.hexahedron_device import read3, times
-from cagefield.warps.rows import OFFSET, TO_NODES
+from cagefield.warps.kernels.trilinear_hex import read3, times
+from cagefield.warps.packing import OFFSET, TO_NODES
 
 vec3 = qd.math.vec3
 

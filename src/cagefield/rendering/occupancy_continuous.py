@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from cagefield.devices import ints
 from cagefield.loops import Deal, deal_of, dealt, turns
 from cagefield.rendering.grid import F32, I32, U8, DeviceGrid, ivec3, vec3
+from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
 from cagefield.rendering.mapped_points import UNKNOWN, differences, images_of
 from cagefield.rendering.occupancy import BRICK, Occupancy, cubes
-from cagefield.rendering.reach import MOST_CELLS, is_blocked, is_dense
 from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.edit_device import Nodes
+from cagefield.warps.kernels.edit_maps import Nodes
 
 Mask = NDArray[np.bool_]
 

@@ -1,6 +1,6 @@
 """How the inner cage moves from its canonical to its deformed place, for the flow shell.
 
-Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `bends`), is
+Notation: t in [0,1] is the time. The cage at time t, and all of space with it (see `trilinear_bend`), is
 
     x(xi, t) = c(t) + F(t) y_t(xi),    y_t(xi) = xi + B_t(xi) in the cage.
 
@@ -19,11 +19,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array, Mask
-from cagefield.warps.bends import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
-from cagefield.warps.extended import Extended, slope_columns, straightened_slope
+from cagefield.trilinear_hex import Array, Mask
+from cagefield.warps.extended_coordinates import Extended, slope_columns, straightened_slope
+from cagefield.warps.trilinear_bend import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
 
 LEAST_SIZE = 1e-2
 """The cage is shrunk to no less than this on its way."""
@@ -166,7 +166,7 @@ class Motion:
         along = v @ self.confines.inverse.T
         if not self.confines.is_affine:
             columns = slope_columns(self.confines.form, z.reshape(-1, 3).T)
-            along = hexahedron.solve(columns, along.reshape(-1, 3).T).T.reshape(z.shape)
+            along = trilinear_hex.solve(columns, along.reshape(-1, 3).T).T.reshape(z.shape)
         return z, along
 
     @property
@@ -216,7 +216,7 @@ class Motion:
 
 def may_bend(inner: Cage, corners: Array) -> Mask:
     """Mask [B] of the valid cages [B,8,3] that the inner cage can become with its bend one to one."""
-    C = hexahedron.coefficients(corners)
+    C = trilinear_hex.coefficients(corners)
     ends = bends(C, np.transpose(C[:, AXES], (0, 2, 1)))
     start = Extended.of(inner).bend
     if not (start.any() or ends.any()):

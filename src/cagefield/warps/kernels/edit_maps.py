@@ -1,6 +1,7 @@
 """The maps of an edit stack for one sample, inside Quadrants kernels, in float32.
 
-Edits are rows of `params` (see `rows`); their lattices and flow tables lie one after the other in `lattice`.
+Edits are rows of `params` (see `packing`); their lattices and flow tables lie one after the other in
+`lattice`.
 The float64 reference of everything here is `Edit.warp` and `EditStack.to_canonical`.
 """
 
@@ -8,10 +9,10 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 
 import quadrants as qd
 
-from cagefield.warps.flow_device import flow_sample
-from cagefield.warps.hexahedron_device import image, in_box, locate, read3, times
-from cagefield.warps.lattice_device import first_node, interpolate, to_nodes
-from cagefield.warps.rows import (
+from cagefield.warps.kernels.flow_shell import flow_sample
+from cagefield.warps.kernels.lattice import first_node, interpolate, to_nodes
+from cagefield.warps.kernels.trilinear_hex import image, in_box, locate, read3, times
+from cagefield.warps.packing import (
     BOX,
     CENTRE,
     CONTINUOUS,
@@ -117,7 +118,7 @@ def map_edit(
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
-    if qd.static(flows):  # noqa: SIM102  one is decided when the kernel is compiled
+    if qd.static(flows):
         if use_flow == 1:
             q, v = flow_sample(p, d, lattice, first_node(params, e))
     return q, v, emptied

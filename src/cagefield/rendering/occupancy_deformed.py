@@ -1,8 +1,8 @@
 """The occupancy of an edited field, in deformed space.
 
-Only the blocks (2 x 2 x 2 cells) that meet an edit's box are looked at again: by `smooth_occupancy` where no
-edit is discrete, else by `jumping_occupancy`. Where one edit of a stack is replaced, only the blocks are
-looked at that its old and its new map can change.
+Only the blocks (2 x 2 x 2 cells) that meet an edit's box are worked out anew: by `occupancy_continuous`
+where no edit is discrete, else by `occupancy_discontinuous`. Where one edit of a stack is replaced, only the
+blocks are worked out that its old and its new map can change.
 
 The coarse occupancy, for pictures while a cage is being dragged, is the first pass of these alone, by
 bricks; where no edit jumps, by eight of them at a time.
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering import jumping_occupancy as jumping
-from cagefield.rendering import smooth_occupancy as smooth
+from cagefield.rendering import occupancy_continuous as smooth
+from cagefield.rendering import occupancy_discontinuous as jumping
 from cagefield.rendering.grid import DeviceGrid
 from cagefield.rendering.occupancy import BRICK, FEW, FULL, MAX_LEAP, Occupancy, masks_of
 from cagefield.warps.device_stack import DeviceStack
@@ -38,12 +38,12 @@ class Known:
 
 
 class Shortcut(Protocol):
-    """A quicker way to the first pass of a coarse look, as `links.Link` has for one edit of many."""
+    """A quicker way to a coarse pass, as `incremental_occupancy.Link` has for one edit of many."""
 
     def near_bricks(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """As `smooth_occupancy.near_bricks`, coarsely."""
+        """As `occupancy_continuous.near_bricks`, coarsely."""
 
 
 def deform(

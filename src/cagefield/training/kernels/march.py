@@ -37,8 +37,8 @@ from cagefield.rendering.grid import (
     sh_basis,
     vec3,
 )
-from cagefield.rendering.traverse import look_ahead, safe_inverse, slab
-from cagefield.training.records import HEAD, add
+from cagefield.rendering.kernels.ray_grid import look_ahead, safe_inverse, slab
+from cagefield.training.kernels.accumulators import HEAD, add
 
 SAMPLE = 8
 """Floats of a noted sample: t, h, w, T after it, and its colour before the clamp."""

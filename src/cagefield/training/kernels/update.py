@@ -3,7 +3,7 @@
 import quadrants as qd
 
 from cagefield.rendering.grid import F32, I32, ivec3
-from cagefield.training.records import HEAD
+from cagefield.training.kernels.accumulators import HEAD
 
 
 @qd.kernel(fastcache=True)

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.hexahedron import Array, Mask
+from cagefield.trilinear_hex import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class HexahedronMap:
     """phi for a pair of cages: x_c(u(p)), with u(p) the trilinear coordinates of p in the deformed cage.
 
     Where the cage was only transformed (translated, rotated, scaled, sheared) phi is affine and evaluated in
-    closed form; where it was deformed, u(p) comes from Newton's method (`hexahedron.inverse`).
+    closed form; where it was deformed, u(p) comes from Newton's method (`trilinear_hex.inverse`).
 
     Source: Li & Pan, section 3, "trilinear interpolation" of a cage's inside.
     """
@@ -46,14 +46,14 @@ class HexahedronMap:
 
 def between(corners: Array, onto: Array, u: Array) -> tuple[Array, Array]:
     """(x_onto(u) [N,3], Jacobian [N,3,3]) of the map that keeps u, from one hexahedron onto another."""
-    J = hexahedron.jacobian(onto, u) @ hexahedron.invert(hexahedron.jacobian(corners, u))
-    return hexahedron.points(onto, u), J
+    J = trilinear_hex.jacobian(onto, u) @ trilinear_hex.invert(trilinear_hex.jacobian(corners, u))
+    return trilinear_hex.points(onto, u), J
 
 
 def _affine_between(source: Cage, target: Cage) -> tuple[Array, Array] | None:
     """(A, b) that takes the corners of one cage to those of the other, or None."""
-    C, D = hexahedron.coefficients(source.corners), hexahedron.coefficients(target.corners)
-    A = D[[1, 2, 4]].T @ hexahedron.centre_inverse(C)
+    C, D = trilinear_hex.coefficients(source.corners), trilinear_hex.coefficients(target.corners)
+    A = D[[1, 2, 4]].T @ trilinear_hex.centre_inverse(C)
     bend = D[[3, 5, 6, 7]] - C[[3, 5, 6, 7]] @ A.T
     if np.abs(bend).max() > 1e-12 * np.abs(D[[1, 2, 4]]).max():
         return None

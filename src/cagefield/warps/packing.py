@@ -3,7 +3,7 @@
 Its regions are hexahedra, each a record of `RECORD` numbers: an affine flag; W [3,3] and c [3] with
 y = W (p - c); the box of the hexahedron in y; the bend K [4,3] of
 y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta, xi in [-1,1]^3; and the monomial coefficients
-C [8,3] of its image in canonical space (see `cagefield.hexahedron`). Records: 0 is V with its image V^c,
+C [8,3] of its image in canonical space (see `cagefield.trilinear_hex`). Records: 0 is V with its image V^c,
 1 is V^o for a continuous edit and V^c for a discrete one, 2 to 7 are the sides of the trilinear shell.
 """
 
@@ -14,15 +14,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import hexahedron
+from cagefield import trilinear_hex
 from cagefield.errors import EditError
-from cagefield.hexahedron import Array
+from cagefield.trilinear_hex import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.kept import kept
-from cagefield.warps.maps import Warp
+from cagefield.warps.interfaces import Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
+from cagefield.warps.weak_memo import kept
 
 # Columns.
 BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
@@ -108,9 +108,9 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
 
 def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array | None = None) -> None:
     """Write the record of a hexahedron [8,3] and, if it has one, of its image [8,3]."""
-    C = hexahedron.coefficients(corners)
-    D = C if onto is None else hexahedron.coefficients(onto)
-    W = hexahedron.centre_inverse(C)
+    C = trilinear_hex.coefficients(corners)
+    D = C if onto is None else trilinear_hex.coefficients(onto)
+    W = trilinear_hex.centre_inverse(C)
     bend = C[[3, 5, 6, 7]] @ W.T
     y = (corners - C[0]) @ W.T
     # Affine only where the image is, too: an affine record skips the image's bend.

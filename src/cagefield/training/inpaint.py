@@ -41,7 +41,7 @@ MOST_STEPS = 200
 
 
 def filled(field: VoxelField, unseen: NDArray[np.bool_]) -> VoxelField:
-    """The field with its vertices `unseen` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
+    """The field with its vertices `visibility` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
 
     Other unseen vertices stay as they are. Every colour that is filled is the same in all directions.
     """

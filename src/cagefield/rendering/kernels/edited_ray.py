@@ -1,7 +1,7 @@
 """One edit along a whole ray: where the edit is affine and shown by a lattice, so is the ray in it.
 
 A ray that meets one edit only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
-`cagefield.warps.rows`), runs straight through the inner region also in canonical space, and straight
+`cagefield.warps.packing`), runs straight through the inner region also in canonical space, and straight
 through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
 multiplication in the inner region and one lattice lookup in the shell.
 """
@@ -11,11 +11,11 @@ multiplication in the inner region and one lattice lookup in the shell.
 import quadrants as qd
 
 from cagefield.rendering.grid import vec3
-from cagefield.rendering.traverse import safe_inverse, slab, vec2
-from cagefield.warps.edit_device import map_sample
-from cagefield.warps.hexahedron_device import image, read3, times
-from cagefield.warps.lattice_device import displacement, first_node, to_nodes
-from cagefield.warps.rows import (
+from cagefield.rendering.kernels.ray_grid import safe_inverse, slab, vec2
+from cagefield.warps.kernels.edit_maps import map_sample
+from cagefield.warps.kernels.lattice import displacement, first_node, to_nodes
+from cagefield.warps.kernels.trilinear_hex import image, read3, times
+from cagefield.warps.packing import (
     ALONE,
     BOX,
     CENTRE,
@@ -59,7 +59,7 @@ def edited_ray(origin: vec3, d: vec3, params: qd.template(), n_edits: qd.i32):
         if through.x <= through.y:
             met += 1
             e = n
-    if met == 1:  # noqa: SIM102  a kernel's `and` would read params[-1]
+    if met == 1:
         if params[e, SIMPLE] > 0.5 and params[e, ALONE] > 0.5:
             ray.edit = e
             ray.resolution = qd.cast(params[e, RESOLUTION], qd.i32)

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
-from cagefield.rendering import smooth_occupancy as smooth
-from cagefield.rendering.deformed_occupancy import deform
+from cagefield.rendering import occupancy_continuous as smooth
 from cagefield.rendering.grid import DeviceGrid
 from cagefield.rendering.occupancy import Occupancy
+from cagefield.rendering.occupancy_deformed import deform
 from cagefield.warps.device_stack import DeviceStack
 
 
@@ -43,7 +43,7 @@ class Link:
     def near_bricks(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """As `smooth_occupancy.near_bricks` of the whole stack, coarsely."""
+        """As `occupancy_continuous.near_bricks` of the whole stack, coarsely."""
         starts = self.chain.starts(grid, lower, count)
         return smooth.near_bricks(self.chain.below, grid, self.stack, lower, count, starts, coarse=True)
 

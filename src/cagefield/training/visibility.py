@@ -1,7 +1,7 @@
 """What no training photo showed of a field: the inside of things, and the surfaces on which they stand.
 
 A ray of a photo shows what it meets while some of its light comes through. Vertices that no ray reached so
-may have any density and colour, since no photo says anything of them; `cagefield.training.filling` gives
+may have any density and colour, since no photo says anything of them; `cagefield.training.inpaint` gives
 them plausible ones.
 """
 
@@ -31,7 +31,7 @@ from cagefield.rendering.grid import (
     to_device,
     vec3,
 )
-from cagefield.rendering.traverse import is_occupied, safe_inverse, slab
+from cagefield.rendering.kernels.ray_grid import is_occupied, safe_inverse, slab
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 

@@ -1,15 +1,15 @@
 """The map of one hexahedron for one sample, inside Quadrants kernels, in float32, from its record in a row.
 
-The records, and what xi, the bend and the image are, are those of `rows`. The float64 reference is
-`hexahedron.HexahedronMap`.
+The records, and what xi, the bend and the image are, are those of `packing`. The float64 reference is
+`inner_map.HexahedronMap`.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 import quadrants as qd
 
-from cagefield.warps.flow_device import solve_columns
-from cagefield.warps.rows import AFFINE, BEND, CENTRE, IMAGE, LOW, MATRIX
+from cagefield.warps.kernels.flow_shell import solve_columns
+from cagefield.warps.packing import AFFINE, BEND, CENTRE, IMAGE, LOW, MATRIX
 
 vec3 = qd.math.vec3
 

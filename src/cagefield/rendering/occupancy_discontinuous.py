@@ -35,10 +35,10 @@ from cagefield.rendering.grid import (
     uncontract_point,
     vec3,
 )
+from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
 from cagefield.rendering.occupancy import BRICK, Occupancy, cubes
-from cagefield.rendering.reach import MOST_CELLS, is_blocked, is_dense
 from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.edit_device import Nodes, Params, map_sample
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
 
 
 def near_bricks(
