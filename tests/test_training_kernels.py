@@ -12,7 +12,8 @@ from cagefield.loops import deal_of
 
 devices.start("cpu")
 
-from cagefield.rendering.grid import ivec3, to_device, vec3  # noqa: E402
+from cagefield.rendering.grid import to_device  # noqa: E402
+from cagefield.rendering.kernels.grid import ivec3, vec3  # noqa: E402
 from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.kernels.accumulators import HEAD  # noqa: E402
 from cagefield.training.kernels.march import MOST_SAMPLES, SAMPLE, march_batch  # noqa: E402

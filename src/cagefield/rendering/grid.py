@@ -5,7 +5,7 @@ Notation: g = grid coordinates (0 at the first vertex), *cell* = the cube betwee
 lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slot, basis-major, rgb inner.
 """
 
-# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,22 +15,11 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield import sh as harmonics
 from cagefield.devices import floats
 from cagefield.fields.voxel import VoxelField
 from cagefield.trilinear_hex import Array
 
 BRICK = 4
-
-F32 = qd.types.ndarray(dtype=qd.f32, ndim=1)
-I32 = qd.types.ndarray(dtype=qd.i32, ndim=1)
-U8 = qd.types.ndarray(dtype=qd.u8, ndim=1)
-vec3 = qd.types.vector(3, qd.f32)
-ivec3 = qd.types.vector(3, qd.i32)
-vec8 = qd.types.vector(8, qd.f32)
-ivec8 = qd.types.vector(8, qd.i32)
-
-SH_C0, SH_C1, SH_C2, SH_C3 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics.C3
 
 
 def to_device(values: NDArray[np.generic]) -> qd.ndarray:
@@ -68,7 +57,7 @@ class DeviceGrid:
     sh: qd.ndarray
 
     @classmethod
-    def from_field(cls, field: VoxelField) -> "DeviceGrid":
+    def from_field(cls, field: VoxelField) -> DeviceGrid:
         """The arrays of a field, its slots ordered by brick so that neighbours lie close in memory."""
         order = brick_order(field.vertices, field.resolution)
         index = np.zeros(int(np.prod(field.resolution)), np.int32)
@@ -95,123 +84,3 @@ def transform_of(field: VoxelField) -> tuple[Array, Array, Array]:
     else:
         origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
     return floats(origin), floats(scale), floats((n - 1) / 4)
-
-
-@qd.func
-def sh_basis(d: vec3, K: qd.template()):
-    """The K real spherical harmonics of the unit direction d, degree 0 to 3 (as `cagefield.sh.basis`)."""
-    b = qd.Vector.zero(qd.f32, K)
-    b[0] = SH_C0
-    if qd.static(K > 1):
-        b[1] = -SH_C1 * d.y
-        b[2] = SH_C1 * d.z
-        b[3] = -SH_C1 * d.x
-    if qd.static(K > 4):
-        b[4] = SH_C2[0] * d.x * d.y
-        b[5] = SH_C2[1] * d.y * d.z
-        b[6] = SH_C2[2] * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y)
-        b[7] = SH_C2[3] * d.x * d.z
-        b[8] = SH_C2[4] * (d.x * d.x - d.y * d.y)
-    if qd.static(K > 9):
-        b[9] = SH_C3[0] * d.y * (3.0 * d.x * d.x - d.y * d.y)
-        b[10] = SH_C3[1] * d.x * d.y * d.z
-        b[11] = SH_C3[2] * d.y * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)
-        b[12] = SH_C3[3] * d.z * (2.0 * d.z * d.z - 3.0 * d.x * d.x - 3.0 * d.y * d.y)
-        b[13] = SH_C3[4] * d.x * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)
-        b[14] = SH_C3[5] * d.z * (d.x * d.x - d.y * d.y)
-        b[15] = SH_C3[6] * d.x * (d.x * d.x - 3.0 * d.y * d.y)
-    return b
-
-
-@qd.func
-def corner_weights(f: vec3):
-    """The 8 trilinear weights of the fractions f; corner k = 4x + 2y + z, z fastest as in memory."""
-    e = 1.0 - f
-    a = e.x * e.y
-    b = e.x * f.y
-    c = f.x * e.y
-    d = f.x * f.y
-    return vec8(a * e.z, a * f.z, b * e.z, b * f.z, c * e.z, c * f.z, d * e.z, d * f.z)
-
-
-@qd.func
-def corner_slots(index: qd.template(), base: ivec3, ny: qd.i32, nz: qd.i32):
-    """The slots of a cell's 8 corners, in the order of `corner_weights`."""
-    i = (base.x * ny + base.y) * nz + base.z
-    j = i + ny * nz
-    return ivec8(index[i], index[i + 1], index[i + nz], index[i + nz + 1],
-                 index[j], index[j + 1], index[j + nz], index[j + nz + 1])  # fmt: skip
-
-
-@qd.func
-def gather_density(density: qd.template(), slots: ivec8, w: vec8):
-    """Interpolated density, before the clamp at 0."""
-    raw = 0.0
-    for c in qd.static(range(8)):
-        raw += w[c] * density[slots[c]]
-    return raw
-
-
-@qd.func
-def gather_rgb(sh: qd.template(), slots: ivec8, w: vec8, basis: qd.template(), K: qd.template()):
-    """Interpolated colour, 0.5 added, before the clamp to [0, 1]."""
-    rgb = vec3(0.5, 0.5, 0.5)
-    for c in qd.static(range(8)):
-        if slots[c] > 0:
-            at = slots[c] * (3 * K)
-            s = vec3(0.0, 0.0, 0.0)
-            for k in qd.static(range(K)):
-                s += basis[k] * vec3(sh[at + 3 * k], sh[at + 3 * k + 1], sh[at + 3 * k + 2])
-            rgb += w[c] * s
-    return rgb
-
-
-@qd.func
-def to_grid(p: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
-    """Grid coordinates of a position; the transform is that of `transform_of`."""
-    g = (p - lower) * scale
-    if qd.static(contracted):
-        g = (contract_point(g) + 2.0) * half
-    return g
-
-
-@qd.func
-def to_world(g: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
-    """The position at grid coordinates: the inverse of `to_grid`, up to that of `contract_point`."""
-    p = g / scale + lower
-    if qd.static(contracted):
-        p = uncontract_point(g / half - 2.0) / scale + lower
-    return p
-
-
-@qd.func
-def contract_point(q: vec3):
-    """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
-    m = qd.max(qd.abs(q).max(), 1.0)
-    return ((2.0 - 1.0 / m) / m) * q
-
-
-@qd.func
-def uncontract_point(c: vec3):
-    """The inverse of `contract_point`, up to 1e-4 from the surface at infinity."""
-    m = qd.min(qd.abs(c).max(), 2.0 - 1e-4)
-    scale = 1.0
-    if m > 1.0:
-        scale = m / qd.abs(c).max() / (m * (2.0 - m))
-    return c * scale
-
-
-@qd.func
-def contract_velocity(q: vec3, d: vec3):
-    """d/dt of contract(q + t d) at t = 0."""
-    v = d
-    a = qd.abs(q)
-    m = a.max()
-    if m > 1.0:
-        dm = d.x * qd.math.sign(q.x)
-        if a.y >= m:
-            dm = d.y * qd.math.sign(q.y)
-        if a.z >= m:
-            dm = d.z * qd.math.sign(q.z)
-        v = ((2.0 - 1.0 / m) / m) * d + ((-2.0 + 2.0 / m) / (m * m)) * dm * q
-    return v

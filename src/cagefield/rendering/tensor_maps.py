@@ -1,19 +1,17 @@
 """The map of an edit stack for tensors: the same kernel, on the device where the tensors are."""
 
-# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import quadrants as qd
 import torch
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield.loops import Deal, deal_of, dealt, turns
+from cagefield.loops import deal_of
+from cagefield.rendering.kernels.tensor_maps import map_tensors
 from cagefield.warps.device_stack import DeviceStack, PackedStack
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
-from cagefield.warps.kernels.trilinear_hex import read3
 
 
 class TensorMap:
@@ -64,33 +62,5 @@ class TensorMap:
         if len(samples):
             table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
             stack = self._params, self._lattice, self.count, self.flows
-            _map_tensors(table, deal_of(len(samples)), result, *stack, preserve_opacity)
+            map_tensors(table, deal_of(len(samples)), result, *stack, preserve_opacity)
         return out[:, :3], out[:, 3:6], out[:, 6]
-
-
-@qd.kernel(fastcache=True)
-def _map_tensors(
-    samples: Params,
-    deal: Deal,
-    out: Params,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
-    flows: qd.template(),
-    preserve_opacity: qd.template(),
-):
-    for turn in range(turns(deal)):
-        i = dealt(turn, deal)
-        if i < samples.shape[0]:
-            d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
-            length = qd.max(v.norm(), 1e-20)
-            unchanged = (v - d).norm() == 0.0
-            for a in qd.static(range(3)):
-                out[i, a] = q[a]
-                out[i, 3 + a] = d[a] if unchanged else v[a] / length
-            gain = 1.0 - qd.cast(emptied, qd.f32)
-            if qd.static(preserve_opacity):  # noqa: SIM102  decided when the kernel is compiled
-                if not unchanged:
-                    gain *= length / qd.max(d.norm(), 1e-20)
-            out[i, 6] = gain

@@ -1,15 +1,14 @@
 """The order in which a training takes the patches of its photos: every one once an epoch, at random."""
 
-# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+from __future__ import annotations
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield.devices import floats, ints
-from cagefield.rendering.grid import F32, I32, ivec3, to_device, vec3
-from cagefield.rendering.kernels.ray_grid import empty_run, safe_inverse, slab
+from cagefield.rendering.grid import to_device
 from cagefield.training.grid_state import GridState
+from cagefield.training.kernels.patches import touched_patches
 from cagefield.training.photos import Photos
 from cagefield.training.voxel_space import VoxelSpace
 
@@ -73,7 +72,7 @@ class Patches:
         lower, scale = space.to_grid(grid)
         count = len(self._all)
         touched = to_device(np.zeros(count, np.int32))
-        _touched_patches(
+        touched_patches(
             touched,
             to_device(self._all),
             count,
@@ -89,49 +88,3 @@ class Patches:
             space.near,
         )
         return touched.to_numpy() > 0
-
-
-@qd.kernel(fastcache=True)
-def _touched_patches(
-    touched: I32,
-    patches: I32,
-    n_patches: qd.i32,
-    patch_size: qd.i32,
-    views: I32,
-    poses: F32,
-    directions: F32,
-    codes: I32,
-    brick_dims: ivec3,
-    lower: vec3,
-    scale: vec3,
-    resolution: ivec3,
-    near: qd.f32,
-):
-    """Sets touched[p] to 1 where any ray of patch p meets an occupied block of a bounded grid, else 0."""
-    for patch in range(n_patches):
-        found = 0
-        for r in range(patch_size * patch_size):
-            view = patches[3 * patch]
-            column = patches[3 * patch + 1] + r % patch_size
-            row = patches[3 * patch + 2] + r // patch_size
-            if found == 0 and row < views[4 * view + 3] and column < views[4 * view + 1]:
-                m = 12 * view
-                at = 3 * (views[4 * view + 2] + row * views[4 * view + 1] + column)
-                l = vec3(directions[at], directions[at + 1], directions[at + 2])
-                d = vec3(
-                    poses[m] * l.x + poses[m + 1] * l.y + poses[m + 2] * l.z,
-                    poses[m + 4] * l.x + poses[m + 5] * l.y + poses[m + 6] * l.z,
-                    poses[m + 8] * l.x + poses[m + 9] * l.y + poses[m + 10] * l.z,
-                )
-                go = (vec3(poses[m + 3], poses[m + 7], poses[m + 11]) - lower) * scale
-                gd = d * scale
-                inverse = safe_inverse(gd)
-                hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
-                t = qd.max(hit.x, near)
-                nudge = 0.05 / qd.abs(gd).max()
-                while t < hit.y and found == 0:
-                    run = empty_run(codes, go + t * gd, inverse, ivec3(0, 0, 0), brick_dims)
-                    if run < 0.0:
-                        found = 1
-                    t += run + nudge
-        touched[patch] = found

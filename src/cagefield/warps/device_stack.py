@@ -1,24 +1,22 @@
 """An edit stack packed for kernels: its edits' rows, their lattices and flow tables, and their boxes."""
 
-# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield.loops import Deal, deal_of, dealt, turns
+from cagefield.loops import deal_of
 from cagefield.warps import flow_table
 from cagefield.warps.buffer_pool import Joined
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.edit_lattice import nodes_of
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
-from cagefield.warps.kernels.trilinear_hex import read3
+from cagefield.warps.kernels.device_stack import map_samples
 from cagefield.warps.packing import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
 from cagefield.warps.weak_memo import kept
 
@@ -47,7 +45,7 @@ class DeviceStack:
     boxes: NDArray[np.float32]
 
     @classmethod
-    def from_stack(cls, stack: PackedStack) -> "DeviceStack":
+    def from_stack(cls, stack: PackedStack) -> DeviceStack:
         """The stack's enabled edits that change something. Raises `EditError` where one cannot be evaluated.
 
         Lattices are sampled here, by the kernel, and kept for as long as their edit lives.
@@ -89,7 +87,7 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            _map_samples(
+            map_samples(
                 samples, deal_of(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
             )
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
@@ -109,28 +107,3 @@ def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
     low, high = row[BOX : BOX + 3], row[BOX + 3 : BOX + 6]
     meets = (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low)
     return bool(meets.all(axis=1).any())
-
-
-@qd.kernel(fastcache=True)
-def _map_samples(
-    samples: Params,
-    deal: Deal,
-    out: Params,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
-    flows: qd.template(),
-):
-    for turn in range(turns(deal)):
-        i = dealt(turn, deal)
-        if i < samples.shape[0]:
-            d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
-            stretch = 1.0
-            if (v - d).norm() > 0.0:
-                stretch = v.norm()
-            for a in qd.static(range(3)):
-                out[i, a] = q[a]
-                out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
-            out[i, 6] = stretch
-            out[i, 7] = qd.cast(emptied, qd.f32)

@@ -1,26 +1,22 @@
 """The lattice of an edit, sampled by a Quadrants kernel in float32 and kept while the edit lives."""
 
-# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+from __future__ import annotations
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.devices import floats
 from cagefield.errors import EditError
-from cagefield.loops import Deal, deal_of, dealt, turns
+from cagefield.loops import deal_of
 from cagefield.warps import flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_edit
+from cagefield.warps.kernels.edit_lattice import sample_lattice
 from cagefield.warps.lattice import Lattice
 from cagefield.warps.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
 from cagefield.warps.trilinear_shell import TrilinearShell
 from cagefield.warps.weak_memo import kept
-
-vec3 = qd.math.vec3
-mat3 = qd.types.matrix(3, 3, qd.f32)
 
 LATTICE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) for a lattice of up to 32^3 nodes; finer ones take (R / 32)^-1/2 of it.
@@ -62,7 +58,7 @@ def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
     place = (floats(origin), floats(frame), resolution)
     params = row_of(edit)[None].copy()
     params[0, [RESOLUTION, SIMPLE]] = 0.0
-    _sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
+    sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
 
 
@@ -71,18 +67,3 @@ def _warp_and_resolution(edit: PackedEdit) -> tuple[ContinuousWarp, int]:
     if not isinstance(warp, ContinuousWarp) or resolution is None:
         raise EditError("only a continuous edit with a lattice has one")
     return warp, resolution
-
-
-@qd.kernel(fastcache=True)
-def _sample_lattice(
-    nodes: Nodes, deal: Deal, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
-):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
-        if n < nodes.shape[0]:
-            i = n % resolution
-            j = (n // resolution) % resolution
-            k = n // (resolution * resolution)
-            p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
-            q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
-            nodes[n] = q - p

@@ -10,7 +10,7 @@ multiplication in the inner region and one lattice lookup in the shell.
 
 import quadrants as qd
 
-from cagefield.rendering.grid import vec3
+from cagefield.rendering.kernels.grid import vec3
 from cagefield.rendering.kernels.ray_grid import safe_inverse, slab, vec2
 from cagefield.warps.kernels.edit_maps import map_sample
 from cagefield.warps.kernels.lattice import displacement, first_node, to_nodes

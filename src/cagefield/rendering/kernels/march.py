@@ -10,7 +10,8 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.grid import (
+from cagefield.rendering.kernels.edited_ray import EditedRay, edited_ray, map_along
+from cagefield.rendering.kernels.grid import (
     F32,
     I32,
     contract_velocity,
@@ -23,7 +24,6 @@ from cagefield.rendering.grid import (
     to_grid,
     vec3,
 )
-from cagefield.rendering.kernels.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.kernels.ray_grid import is_occupied, look_ahead, safe_inverse, slab
 from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
 

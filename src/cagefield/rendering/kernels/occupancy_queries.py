@@ -7,7 +7,7 @@ Points and reaches r are in grid coordinates; all of the box [point - r, point +
 
 import quadrants as qd
 
-from cagefield.rendering.grid import ivec3, vec3
+from cagefield.rendering.kernels.grid import ivec3, vec3
 
 MOST_CELLS = 12.0
 """Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""

@@ -2,7 +2,7 @@
 
 import quadrants as qd
 
-from cagefield.rendering.grid import contract_point, contract_velocity, ivec3, vec3
+from cagefield.rendering.kernels.grid import contract_point, contract_velocity, ivec3, vec3
 
 vec2 = qd.types.vector(2, qd.f32)
 

@@ -11,8 +11,8 @@ The oracle is `cagefield.rendering.splat_reference`.
 
 import quadrants as qd
 
-from cagefield.rendering.grid import F32, I32, sh_basis, vec3
 from cagefield.rendering.kernels import splat_blending
+from cagefield.rendering.kernels.grid import F32, I32, sh_basis, vec3
 from cagefield.rendering.kernels.splat_blending import SUMS
 from cagefield.rendering.kernels.splat_projection import (
     ALPHA_MAX,

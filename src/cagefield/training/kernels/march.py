@@ -23,7 +23,7 @@ on a CPU.) b_v are trilinear weights.
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.grid import (
+from cagefield.rendering.kernels.grid import (
     F32,
     I32,
     U8,

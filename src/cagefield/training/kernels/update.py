@@ -2,7 +2,7 @@
 
 import quadrants as qd
 
-from cagefield.rendering.grid import F32, I32, ivec3
+from cagefield.rendering.kernels.grid import F32, I32, ivec3
 from cagefield.training.kernels.accumulators import HEAD
 
 

@@ -1,0 +1,37 @@
+"""The kernels of `cagefield.rendering.tensor_maps`."""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+from cagefield.loops import Deal, dealt, turns
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.trilinear_hex import read3
+
+
+@qd.kernel(fastcache=True)
+def map_tensors(
+    samples: Params,
+    deal: Deal,
+    out: Params,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
+    preserve_opacity: qd.template(),
+):
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            length = qd.max(v.norm(), 1e-20)
+            unchanged = (v - d).norm() == 0.0
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = d[a] if unchanged else v[a] / length
+            gain = 1.0 - qd.cast(emptied, qd.f32)
+            if qd.static(preserve_opacity):
+                if not unchanged:
+                    gain *= length / qd.max(d.norm(), 1e-20)
+            out[i, 6] = gain

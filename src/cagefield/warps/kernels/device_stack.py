@@ -1,0 +1,34 @@
+"""The kernels of `cagefield.warps.device_stack`."""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+import quadrants as qd
+
+from cagefield.loops import Deal, dealt, turns
+from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.trilinear_hex import read3
+
+
+@qd.kernel(fastcache=True)
+def map_samples(
+    samples: Params,
+    deal: Deal,
+    out: Params,
+    params: Params,
+    lattice: Nodes,
+    n_edits: qd.i32,
+    flows: qd.template(),
+):
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            stretch = 1.0
+            if (v - d).norm() > 0.0:
+                stretch = v.norm()
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
+            out[i, 6] = stretch
+            out[i, 7] = qd.cast(emptied, qd.f32)
