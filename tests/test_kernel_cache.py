@@ -24,7 +24,7 @@ inner = Cage.box((0, 0, 0), 0.5)
 edit = Edit(inner, inner.grown(0.5), shell="trilinear").translate((0.1, 0, 0))
 packed = device_stack.DeviceStack.from_stack(EditStack([edit]))
 mapped = packed.to_canonical(np.zeros((1, 3)), np.ones((1, 3)))
-seen = device_stack._map_samples._primal.src_ll_cache_observations
+seen = device_stack.map_samples._primal.src_ll_cache_observations
 print(json.dumps([mapped[0].tolist(), seen.cache_stored, seen.cache_loaded]))
 """
 

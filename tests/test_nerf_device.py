@@ -33,7 +33,7 @@ KINDS = [{}, {"lindisp": True}, {"ndc": (0.6, 0.5)}, {"bounded": True}]
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     """What the edits' kernel is called with, which the stand-in cannot run."""
     found: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(tensor_maps, "_map_tensors", lambda *arguments: found.append(arguments))
+    monkeypatch.setattr(tensor_maps, "map_tensors", lambda *arguments: found.append(arguments))
     # How many samples are in bounds is the one number that is asked for.
     monkeypatch.setattr(torch, "nonzero", lambda mask: torch.empty((len(mask), 1), dtype=int, device=FAR))
     return found

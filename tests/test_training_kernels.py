@@ -8,15 +8,24 @@ import pytest
 from cagefield import devices
 from cagefield.cameras import Camera
 from cagefield.datasets.views import View
+from cagefield.devices import floats
 from cagefield.loops import deal_of
 
 devices.start("cpu")
 
 from cagefield.rendering.grid import to_device  # noqa: E402
-from cagefield.rendering.kernels.grid import ivec3, vec3  # noqa: E402
+from cagefield.rendering.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.kernels.accumulators import HEAD  # noqa: E402
-from cagefield.training.kernels.march import MOST_SAMPLES, SAMPLE, march_batch  # noqa: E402
+from cagefield.training.kernels.march import (  # noqa: E402
+    MOST_SAMPLES,
+    SAMPLE,
+    BatchArgs,
+    LossArgs,
+    WorkerArgs,
+    march_batch,
+)
+from cagefield.training.kernels.photos import PatchArgs  # noqa: E402
 from cagefield.training.kernels.update import gauss_newton, laplacian  # noqa: E402
 from cagefield.training.photos import Photos  # noqa: E402
 
@@ -67,44 +76,16 @@ def marched(
     penalties = to_device(np.zeros(rays, np.float32))
     scratch = to_device(np.zeros(grid.workers * MOST_SAMPLES * SAMPLE, np.float32))
     grid.accumulator.fill(0.0)
-    if grid.contracted:
-        lower, scale = np.zeros(3), np.full(3, 1 / 0.8)
-        step = 0.7
-    else:
-        lower, scale = grid.bounds[0], (N - 1) / (grid.bounds[1] - grid.bounds[0])
-        step = 0.7 / scale.max()
+    step = 0.7 if grid.contracted else 0.7 / float(np.max(grid.args.scale))
     march_batch(
-        to_device(patches),
-        len(patches),
-        4,
-        grid.workers,
         deal_of(grid.workers, 1),
-        7,
-        data.views,
-        data.poses,
-        to_device(gains.astype(np.float32)),
-        data.directions,
-        data.pixels,
-        grid.codes,
-        grid.index,
-        grid.density,
-        grid.sh,
-        grid.accumulator,
-        grid.record,
-        scratch,
-        losses,
-        penalties,
-        sums,
-        ivec3(*grid.brick_dims),
-        ivec3(N, N, N),
-        vec3(*lower.tolist()),
-        vec3(*scale.tolist()),
-        float(step),
-        0.05,
-        distortion,
-        0.8,
-        1,
-        vec3(1.0, 1.0, 1.0),
+        PatchArgs(to_device(patches), len(patches), 4),
+        data.args(to_device(gains.astype(np.float32))),
+        grid.args,
+        grid.bricks,
+        WorkerArgs(grid.accumulator, grid.record, scratch, grid.workers),
+        LossArgs(losses, penalties, sums),
+        BatchArgs(step, 0.05, distortion, 0.8, 7, 1, floats((1.0, 1.0, 1.0))),
         grid.terms,
         grid.contracted,
         False,

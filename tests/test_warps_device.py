@@ -175,7 +175,7 @@ def test_lattices_are_kept_with_their_edit(monkeypatch: pytest.MonkeyPatch) -> N
     edit = STACKS["affine"][0].replace(lattice=8)
     DeviceStack.from_stack(EditStack([edit]))
     sampled: list[object] = []
-    monkeypatch.setattr(edit_lattice, "_sample_lattice", lambda *arguments: sampled.append(arguments))
+    monkeypatch.setattr(edit_lattice, "sample_lattice", lambda *arguments: sampled.append(arguments))
     DeviceStack.from_stack(EditStack([edit, STACKS["move"][0]]))
     assert not sampled
     DeviceStack.from_stack(EditStack([edit.translate((0.01, 0, 0))]))

@@ -8,6 +8,7 @@ lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,11 @@ import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
-from cagefield.devices import floats
+from cagefield.devices import floats, ints
 from cagefield.fields.voxel import VoxelField
+from cagefield.rendering.kernels.grid import GridArgs
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs
+from cagefield.rendering.occupancy import Occupancy
 from cagefield.trilinear_hex import Array
 
 BRICK = 4
@@ -56,6 +60,13 @@ class DeviceGrid:
     density: qd.ndarray
     sh: qd.ndarray
 
+    @cached_property
+    def args(self) -> GridArgs:
+        """The grid as kernels take it."""
+        field = self.field
+        transform = transform_of(field.bounds, field.resolution, field.contracted)
+        return GridArgs(self.index, self.density, self.sh, ints(field.resolution), *transform)
+
     @classmethod
     def from_field(cls, field: VoxelField) -> DeviceGrid:
         """The arrays of a field, its slots ordered by brick so that neighbours lie close in memory."""
@@ -76,11 +87,17 @@ def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -
     return np.asarray(np.lexsort((vertices, brick)))
 
 
-def transform_of(field: VoxelField) -> tuple[Array, Array, Array]:
-    """Origin, scale and half as in `cagefield.rendering.kernels.march`."""
-    n = np.array(field.resolution)
-    if field.contracted:
-        origin, scale = field.center, 1.0 / field.half_size
-    else:
-        origin, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-    return floats(origin), floats(scale), floats((n - 1) / 4)
+def transform_of(
+    bounds: NDArray[np.float64], resolution: tuple[int, int, int], contracted: bool
+) -> tuple[Array, Array, Array]:
+    """Lower, scale and half of `GridArgs`; bounds [2,3] are those of the inner box where it is contracted."""
+    n = np.array(resolution) - 1
+    if contracted:
+        return floats(bounds.mean(axis=0)), floats(2.0 / (bounds[1] - bounds[0])), floats(n / 4)
+    return floats(bounds[0]), floats(n / (bounds[1] - bounds[0])), floats(n / 4)
+
+
+def occupancy_args(occupancy: Occupancy, codes: Any = None) -> OccupancyArgs:
+    """An occupancy as kernels take it; `codes` where they are on the device already."""
+    flat = occupancy.codes.reshape(-1) if codes is None else codes
+    return OccupancyArgs(flat, ints(occupancy.origin), ints(occupancy.codes.shape))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cagefield.devices import ints
 from cagefield.loops import deal_of
-from cagefield.rendering.grid import DeviceGrid, transform_of
+from cagefield.rendering.grid import DeviceGrid
 from cagefield.rendering.kernels.mapped_points import map_points
 from cagefield.warps.device_stack import DeviceStack
 
@@ -34,10 +34,8 @@ def images_of(
         ints(lower),
         ints(wanted.shape),
         spacing,
-        *transform_of(grid.field),
-        stack.params,
-        stack.lattice,
-        stack.n_edits,
+        grid.args,
+        stack.args,
         grid.field.contracted,
         stack.has_flows,
     )

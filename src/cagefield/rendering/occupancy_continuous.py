@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cagefield.devices import ints
 from cagefield.loops import deal_of
-from cagefield.rendering.grid import DeviceGrid
+from cagefield.rendering.grid import DeviceGrid, occupancy_args
 from cagefield.rendering.kernels.occupancy_continuous import dense_blocks, occupied_points
 from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS
 from cagefield.rendering.mapped_points import images_of
@@ -106,9 +106,7 @@ def _occupied(
         out,
         deal_of(len(out)),
         images,
-        canonical.codes.reshape(-1),
-        ints(canonical.codes.shape),
-        ints(canonical.origin),
+        occupancy_args(canonical),
         ints(count),
         most,
     )
@@ -126,8 +124,6 @@ def _refined(
         candidates.reshape(-1),
         images,
         ints(count),
-        grid.index,
-        grid.density,
-        ints(grid.field.resolution),
+        grid.args,
     )
     return out.view(bool)

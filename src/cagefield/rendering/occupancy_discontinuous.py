@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.devices import ints
-from cagefield.fields.voxel import VoxelField
 from cagefield.loops import deal_of
-from cagefield.rendering.grid import DeviceGrid, transform_of
+from cagefield.rendering.grid import DeviceGrid, occupancy_args
 from cagefield.rendering.kernels.occupancy_discontinuous import dense_blocks, occupied_corners
 from cagefield.rendering.occupancy import BRICK, Occupancy, cubes
 from cagefield.warps.device_stack import DeviceStack
@@ -35,7 +34,7 @@ def near_bricks(
     count: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """The bricks [count] with an occupied corner or one beside it, the first at grid coordinates `lower`."""
-    return _near(canonical, grid.field, stack, lower, count, BRICK)
+    return _near(canonical, grid, stack, lower, count, BRICK)
 
 
 def occupied_blocks(
@@ -50,7 +49,7 @@ def occupied_blocks(
 
     `proceed` is called between the passes, and may raise.
     """
-    near = _near(canonical, grid.field, stack, lower, np.array(new.shape), 2)
+    near = _near(canonical, grid, stack, lower, np.array(new.shape), 2)
     near &= new
     proceed()
     candidates = np.argwhere(near).astype(np.int32)
@@ -61,20 +60,20 @@ def occupied_blocks(
 
 def _near(
     canonical: Occupancy,
-    field: VoxelField,
+    grid: DeviceGrid,
     stack: DeviceStack,
     lower: NDArray[np.int64],
     count: NDArray[np.int64],
     spacing: int,
 ) -> NDArray[np.bool_]:
     """Cubes of `spacing` cells [count] with an occupied corner, or a corner beside one."""
-    near = _corners(canonical, field, stack, lower, count + 1, spacing)
+    near = _corners(canonical, grid, stack, lower, count + 1, spacing)
     return cubes(ndimage.maximum_filter(near, size=3, mode="nearest"))
 
 
 def _corners(
     canonical: Occupancy,
-    field: VoxelField,
+    grid: DeviceGrid,
     stack: DeviceStack,
     lower: NDArray[np.int64],
     count: NDArray[np.int64],
@@ -85,17 +84,13 @@ def _corners(
     occupied_corners(
         out,
         deal_of(len(out)),
-        canonical.codes.reshape(-1),
-        ints(canonical.codes.shape),
-        ints(canonical.origin),
+        occupancy_args(canonical),
         ints(lower),
         ints(count),
         spacing,
-        *transform_of(field),
-        stack.params,
-        stack.lattice,
-        stack.n_edits,
-        field.contracted,
+        grid.args,
+        stack.args,
+        grid.field.contracted,
         stack.has_flows,
     )
     return out.reshape(tuple(count)).astype(bool)
@@ -111,13 +106,8 @@ def _refined(
         deal_of(len(out)),
         np.ascontiguousarray(candidates).reshape(-1),
         ints(lower),
-        grid.index,
-        grid.density,
-        ints(grid.field.resolution),
-        *transform_of(grid.field),
-        stack.params,
-        stack.lattice,
-        stack.n_edits,
+        grid.args,
+        stack.args,
         grid.field.contracted,
         stack.has_flows,
     )

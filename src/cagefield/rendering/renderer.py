@@ -51,7 +51,7 @@ class Renderer:
         """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
         devices.start()
         from cagefield.rendering import occupancy
-        from cagefield.rendering.grid import DeviceGrid, to_device
+        from cagefield.rendering.grid import DeviceGrid, occupancy_args, to_device
 
         self.field = field
         self.edits = edits if edits is not None else EditStack([])
@@ -59,7 +59,7 @@ class Renderer:
         self.preserve_opacity = preserve_opacity
         self._grid = grid if grid is not None else DeviceGrid.from_field(field)
         self._canonical = occupancy.of_field(field)
-        self._canonical_codes = to_device(self._canonical.codes)
+        self._canonical_bricks = occupancy_args(self._canonical, to_device(self._canonical.codes))
         self._pixels: dict[tuple[int, int], Any] = {}
         self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
         self._coarse = False
@@ -93,7 +93,7 @@ class Renderer:
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> None:
-        from cagefield.rendering.grid import for_kernels
+        from cagefield.rendering.grid import for_kernels, occupancy_args
         from cagefield.rendering.incremental_occupancy import Chain, replaced
         from cagefield.rendering.occupancy_deformed import Known, deform
         from cagefield.warps.device_stack import DeviceStack
@@ -113,7 +113,7 @@ class Renderer:
                 link = self._chain.link(self.edits.active[place])
         self._coarse = coarse
         self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed, link)
-        self._codes = for_kernels(self._occupancy.codes)
+        self._bricks = occupancy_args(self._occupancy, for_kernels(self._occupancy.codes))
         self._stack = stack
         self._boxes = for_kernels(stack.boxes.astype(np.float32))
 
@@ -141,13 +141,14 @@ class Renderer:
         directions = self._device_directions(camera)
         out = self._buffer(width, height)
         down = -(-height // march.TILE)
-        n = np.array(field.resolution)
-        if field.contracted:
-            lower, scale = field.center, 1.0 / field.half_size
-            length = step or self.step
-        else:
-            lower, scale = field.bounds[0], (n - 1) / (field.bounds[1] - field.bounds[0])
-            length = (step or self.step) / float(scale.max())
+        grid = self._grid.args
+        length = step or self.step
+        if not field.contracted:
+            length /= float(np.max(grid.scale))
+        pose = march.CameraArgs(
+            directions, camera.width, floats(camera.c2w[:3, :3]), floats(camera.c2w[:3, 3])
+        )
+        how = march.MarchArgs(length, near, int(normals), int(self.preserve_opacity))
         rows = down if should_stop is None else BAND
         for row in range(0, down, rows):
             if should_stop is not None and should_stop():
@@ -156,34 +157,14 @@ class Renderer:
             march.march_tiles(
                 out,
                 deal_of(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
-                directions,
-                row,
-                few,
-                ints((x, y)),
-                ints((width, height)),
-                camera.width,
-                floats(camera.c2w[:3, :3]),
-                floats(camera.c2w[:3, 3]),
-                self._codes,
-                ints(self._occupancy.origin),
-                ints(self._occupancy.codes.shape),
-                self._grid.index,
-                self._grid.density,
-                self._grid.sh,
-                ints(field.resolution),
-                floats(lower),
-                floats(scale),
-                length,
-                near,
-                int(normals),
+                pose,
+                march.TileArgs(ints((x, y)), ints((width, height)), row, few),
+                how,
+                grid,
+                self._bricks,
+                self._canonical_bricks,
+                self._stack.args,
                 self._boxes,
-                len(self._stack.boxes),
-                self._canonical_codes,
-                ints(self._canonical.codes.shape),
-                self._stack.params,
-                self._stack.lattice,
-                self._stack.n_edits,
-                int(self.preserve_opacity),
                 field.sh.shape[1],
                 field.contracted,
                 self._stack.n_edits > 0,

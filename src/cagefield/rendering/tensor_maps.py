@@ -12,6 +12,7 @@ from cagefield import devices
 from cagefield.loops import deal_of
 from cagefield.rendering.kernels.tensor_maps import map_tensors
 from cagefield.warps.device_stack import DeviceStack, PackedStack
+from cagefield.warps.kernels.edit_maps import EditArgs
 
 
 class TensorMap:
@@ -34,8 +35,7 @@ class TensorMap:
         self.preserve_opacity = preserve_opacity
         self._as_arrays = device.type == "cpu" and not as_tensors
         self.count, self.flows = packed.n_edits, packed.has_flows
-        self._params = self._argument(packed.params)
-        self._lattice = self._argument(packed.lattice)
+        self._edits = EditArgs(self._argument(packed.params), self._argument(packed.lattice), packed.n_edits)
 
     def _argument(self, values: NDArray[np.float32]) -> Any:
         return values if self._as_arrays else torch.from_numpy(values.copy()).to(self.device)
@@ -61,6 +61,5 @@ class TensorMap:
         out = torch.empty((len(samples), 7), dtype=torch.float32, device=self.device)
         if len(samples):
             table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
-            stack = self._params, self._lattice, self.count, self.flows
-            map_tensors(table, deal_of(len(samples)), result, *stack, preserve_opacity)
+            map_tensors(table, deal_of(len(samples)), result, self._edits, self.flows, preserve_opacity)
         return out[:, :3], out[:, 3:6], out[:, 6]

@@ -13,7 +13,15 @@ from cagefield.devices import floats, ints
 from cagefield.loops import deal_of
 from cagefield.training.exposure import Exposure
 from cagefield.training.grid_state import GridState
-from cagefield.training.kernels.march import MOST_SAMPLES, SAMPLE, march_batch
+from cagefield.training.kernels.march import (
+    MOST_SAMPLES,
+    SAMPLE,
+    BatchArgs,
+    LossArgs,
+    WorkerArgs,
+    march_batch,
+)
+from cagefield.training.kernels.photos import PatchArgs
 from cagefield.training.kernels.update import gauss_newton, laplacian
 from cagefield.training.photos import Photos
 from cagefield.training.voxel_config import VoxelConfig
@@ -44,46 +52,34 @@ class Batches:
             exposure.add(patches[:, 0], sums.to_numpy().reshape(len(patches), -1, 6).sum(axis=1))
         return float(losses.to_numpy().mean()) / 3.0
 
-    def _march(self, grid: GridState, chosen: NDArray[np.int32], gains: Any, step: int) -> tuple[Any, Any]:
+    def _march(
+        self, grid: GridState, chosen: NDArray[np.int32], gains: Any, step_number: int
+    ) -> tuple[Any, Any]:
         """Device arrays: losses [rays] and exposure sums [rays * 6]; the grid's accumulator is filled."""
         config, photos, space = self._config, self._photos, self._space
         count, gpu = len(chosen), devices.is_gpu()
         workers = count if gpu else grid.workers
         patches, losses, penalties, sums = self._buffer(count)
         patches.from_numpy(np.ascontiguousarray(chosen).reshape(-1))
-        lower, scale = space.to_grid(grid)
+        cells = grid.args
+        step = config.step if space.contracted else config.step / float(np.max(cells.scale))
         march_batch(
-            patches,
-            count,
-            config.patch,
-            workers,
             deal_of(workers, 1),
-            step + 1000003 * config.seed,
-            photos.views,
-            photos.poses,
-            gains,
-            photos.directions,
-            photos.pixels,
-            grid.codes,
-            grid.index,
-            grid.density,
-            grid.sh,
-            grid.accumulator,
-            grid.record,
-            self._scratch(workers),
-            losses,
-            penalties,
-            sums,
-            ints(grid.brick_dims),
-            ints(grid.resolution),
-            floats(lower),
-            floats(scale),
-            config.step if space.contracted else config.step / max(scale),
-            space.near,
-            config.distortion,
-            space.reach,
-            1,
-            floats((1.0, 1.0, 1.0)),
+            PatchArgs(patches, count, config.patch),
+            photos.args(gains),
+            cells,
+            grid.bricks,
+            WorkerArgs(grid.accumulator, grid.record, self._scratch(workers), workers),
+            LossArgs(losses, penalties, sums),
+            BatchArgs(
+                step,
+                space.near,
+                config.distortion,
+                space.reach,
+                step_number + 1000003 * config.seed,
+                1,
+                floats((1.0, 1.0, 1.0)),
+            ),
             grid.terms,
             space.contracted,
             gpu,

@@ -13,9 +13,12 @@ import quadrants as qd
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering import occupancy
-from cagefield.rendering.grid import brick_order, to_device
+from cagefield.rendering.grid import brick_order, to_device, transform_of
+from cagefield.rendering.kernels.grid import GridArgs
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 from cagefield.training.kernels.accumulators import HEAD
 
 CHUNK = 2**18
@@ -132,6 +135,17 @@ class GridState:
             contracted=contracted,
             threads=threads,
         )
+
+    @property
+    def args(self) -> GridArgs:
+        """The grid as kernels take it."""
+        transform = transform_of(self.bounds, self.resolution, self.contracted)
+        return GridArgs(self.index, self.density, self.sh, ints(self.resolution), *transform)
+
+    @property
+    def bricks(self) -> OccupancyArgs:
+        """Its occupancy as kernels take it."""
+        return OccupancyArgs(self.codes, ints((0, 0, 0)), ints(self.brick_dims))
 
     @property
     def terms(self) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.devices import floats, ints
 from cagefield.rendering.grid import to_device
 from cagefield.training.grid_state import GridState
 from cagefield.training.kernels.patches import touched_patches
+from cagefield.training.kernels.photos import PatchArgs
 from cagefield.training.photos import Photos
 from cagefield.training.voxel_space import VoxelSpace
 
@@ -69,22 +69,8 @@ class Patches:
 
     def _touched(self, space: VoxelSpace, grid: GridState) -> NDArray[np.bool_]:
         """Which of all patches [P] have a ray that meets an occupied block of a bounded grid."""
-        lower, scale = space.to_grid(grid)
-        count = len(self._all)
-        touched = to_device(np.zeros(count, np.int32))
-        touched_patches(
-            touched,
-            to_device(self._all),
-            count,
-            self._size,
-            self._photos.views,
-            self._photos.poses,
-            self._photos.directions,
-            grid.codes,
-            ints(grid.brick_dims),
-            floats(lower),
-            floats(scale),
-            ints(grid.resolution),
-            space.near,
-        )
+        touched = to_device(np.zeros(len(self._all), np.int32))
+        patches = PatchArgs(to_device(self._all), len(self._all), self._size)
+        gains = to_device(np.zeros(1, np.float32))
+        touched_patches(touched, patches, self._photos.args(gains), grid.args, grid.bricks, space.near)
         return touched.to_numpy() > 0

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.datasets.views import View
 from cagefield.errors import DatasetError
+
+if TYPE_CHECKING:
+    from cagefield.training.kernels.photos import PhotoArgs
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +83,12 @@ class Photos:
             pixels=to_device(flat),
             has_alpha=bool((flat[:, 3] < 255).any()),
         )
+
+    def args(self, gains: Any) -> PhotoArgs:
+        """The photos as kernels take them, with a gain [V,3] (on the device) for each."""
+        from cagefield.training.kernels.photos import PhotoArgs
+
+        return PhotoArgs(self.views, self.poses, gains, self.directions, self.pixels)
 
     def patches(self, size: int) -> NDArray[np.int32]:
         """All patches [P, 3] (view, first column, first row) of size x size pixels; they tile each photo."""

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
-from cagefield.devices import floats, ints
+from cagefield.devices import floats
 from cagefield.fields.voxel import VoxelField
 from cagefield.loops import deal_of
 from cagefield.rendering import occupancy
-from cagefield.rendering.grid import DeviceGrid, to_device
+from cagefield.rendering.grid import DeviceGrid, occupancy_args, to_device
 from cagefield.training.kernels.visibility import mark_seen
 
 LEAST_TRANSMITTANCE = 0.1
@@ -38,9 +38,8 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
     what is changed at unseen ones, a photo shows only through what hides them.
     """
     grid = DeviceGrid.from_field(field)
-    bricks = occupancy.of_field(field)
-    codes = to_device(bricks.codes)
-    scale = (np.array(field.resolution) - 1) / (field.bounds[1] - field.bounds[0])
+    found = occupancy.of_field(field)
+    bricks = occupancy_args(found, to_device(found.codes))
     seen = to_device(np.zeros(int(np.prod(field.resolution)), np.uint8))
     pixels = sum(camera.width * camera.height for camera in cameras)
     stride = max(1, math.ceil(math.sqrt(pixels / MOST_RAYS)))
@@ -53,14 +52,9 @@ def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
             local.shape[0] * local.shape[1],
             floats(camera.c2w[:3, :3]),
             floats(camera.origin),
-            codes,
-            ints(bricks.codes.shape),
-            grid.index,
-            grid.density,
-            ints(field.resolution),
-            floats(field.bounds[0]),
-            floats(scale),
-            float(STEP / scale.max()),
+            grid.args,
+            bricks,
+            STEP / float(np.max(grid.args.scale)),
             LEAST_TRANSMITTANCE,
         )
     cells = seen.to_numpy().reshape(field.resolution) > 0

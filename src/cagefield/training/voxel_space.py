@@ -75,17 +75,6 @@ class VoxelSpace:
             return grid.refined(self.bounds, (resolution,) * 3, degree)
         return grid.refined(*_cubic_voxels(grid.support(), resolution), degree)
 
-    def to_grid(self, grid: GridState) -> tuple[list[float], list[float]]:
-        """(lower, scale), each 3 numbers: a world position p has the grid coordinates (p - lower) * scale.
-
-        Where contracted, those are normalised coordinates, which the march contracts.
-        """
-        if self.contracted:
-            half = (self.bounds[1] - self.bounds[0]) / 2
-            return self.bounds.mean(axis=0).tolist(), (1.0 / half).tolist()
-        n = np.array(grid.resolution) - 1
-        return grid.bounds[0].tolist(), (n / (grid.bounds[1] - grid.bounds[0])).tolist()
-
 
 def _cubic_voxels(
     box: NDArray[np.float64], resolution: int

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.edit_lattice import nodes_of
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.kernels.device_stack import map_samples
+from cagefield.warps.kernels.edit_maps import EditArgs
 from cagefield.warps.packing import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
 from cagefield.warps.weak_memo import kept
 
@@ -73,7 +75,12 @@ class DeviceStack:
             array.setflags(write=False)
         return packed
 
-    @property
+    @cached_property
+    def args(self) -> EditArgs:
+        """The stack as kernels take it."""
+        return EditArgs(self.params, self.lattice, self.n_edits)
+
+    @cached_property
     def has_flows(self) -> bool:
         """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
         return bool((self.params[:, RESOLUTION] == FLOW).any())
@@ -87,9 +94,7 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            map_samples(
-                samples, deal_of(len(samples)), out, self.params, self.lattice, self.n_edits, self.has_flows
-            )
+            map_samples(samples, deal_of(len(samples)), out, self.args, self.has_flows)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
 
 

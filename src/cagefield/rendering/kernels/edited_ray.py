@@ -12,7 +12,7 @@ import quadrants as qd
 
 from cagefield.rendering.kernels.grid import vec3
 from cagefield.rendering.kernels.ray_grid import safe_inverse, slab, vec2
-from cagefield.warps.kernels.edit_maps import map_sample
+from cagefield.warps.kernels.edit_maps import EditArgs, map_sample
 from cagefield.warps.kernels.lattice import displacement, first_node, to_nodes
 from cagefield.warps.kernels.trilinear_hex import image, read3, times
 from cagefield.warps.packing import (
@@ -48,37 +48,37 @@ canonical space; node + t node_velocity: the ray in node units of the lattice.
 
 
 @qd.func
-def edited_ray(origin: vec3, d: vec3, params: qd.template(), n_edits: qd.i32):
+def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
     """The `EditedRay` of a ray with unit direction d."""
     ray = EditedRay(edit=-1)
     inverse = safe_inverse(d)
     met = 0
     e = -1
-    for n in range(n_edits):
-        through = slab(origin, inverse, read3(params, n, BOX), read3(params, n, BOX + 3))
+    for n in range(edits.count):
+        through = slab(origin, inverse, read3(edits.params, n, BOX), read3(edits.params, n, BOX + 3))
         if through.x <= through.y:
             met += 1
             e = n
     if met == 1:
-        if params[e, SIMPLE] > 0.5 and params[e, ALONE] > 0.5:
+        if edits.params[e, SIMPLE] > 0.5 and edits.params[e, ALONE] > 0.5:
             ray.edit = e
-            ray.resolution = qd.cast(params[e, RESOLUTION], qd.i32)
-            ray.first = first_node(params, e)
+            ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
+            ray.first = first_node(edits.params, e)
             at = RECORDS
-            xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
-            xi_velocity = times(params, e, at + MATRIX, d)
+            xi = times(edits.params, e, at + MATRIX, origin - read3(edits.params, e, at + CENTRE))
+            xi_velocity = times(edits.params, e, at + MATRIX, d)
             one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
             ray.inner = slab(xi, safe_inverse(xi_velocity), -one, one)
-            q, v = image(xi, d, params, e, at)
+            q, v = image(xi, d, edits.params, e, at)
             ray.canonical = q
             ray.velocity = v
-            ray.node = to_nodes(origin, params, e)
-            ray.node_velocity = times(params, e, TO_NODES + 3, d)
+            ray.node = to_nodes(origin, edits.params, e)
+            ray.node_velocity = times(edits.params, e, TO_NODES + 3, d)
             ray.outer = slab(
                 ray.node,
                 safe_inverse(ray.node_velocity),
-                read3(params, e, NODE_BOX),
-                read3(params, e, NODE_BOX + 3),
+                read3(edits.params, e, NODE_BOX),
+                read3(edits.params, e, NODE_BOX + 3),
             )
     return ray
 
@@ -89,9 +89,7 @@ def map_along(
     t: qd.f32,
     p: vec3,
     d: vec3,
-    params: qd.template(),
-    lattice: qd.template(),
-    n_edits: qd.i32,
+    edits: EditArgs,
     flows: qd.template(),
 ):
     """As `map_sample` for p = o + t d on the ray, and 1 where p was moved, else 0."""
@@ -106,13 +104,13 @@ def map_along(
             moved = 1
         elif t >= ray.outer.x and t <= ray.outer.y:
             u, along = displacement(
-                ray.node + t * ray.node_velocity, ray.node_velocity, lattice, ray.first, ray.resolution
+                ray.node + t * ray.node_velocity, ray.node_velocity, edits.lattice, ray.first, ray.resolution
             )
             q = p + u
             v = d + along
             moved = 1
     else:
-        q, v, emptied = map_sample(p, d, params, lattice, n_edits, flows)
+        q, v, emptied = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
             moved = 1
     return q, v, emptied, moved

@@ -2,6 +2,8 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+from dataclasses import dataclass
+
 import quadrants as qd
 
 from cagefield import sh as harmonics
@@ -13,6 +15,25 @@ vec3 = qd.types.vector(3, qd.f32)
 ivec3 = qd.types.vector(3, qd.i32)
 vec8 = qd.types.vector(8, qd.f32)
 ivec8 = qd.types.vector(8, qd.i32)
+
+
+@dataclass(frozen=True, eq=False)
+class GridArgs:
+    """A grid as kernels take it: index, density and sh of `DeviceGrid`, its resolution and its transform.
+
+    A world position p has the grid coordinates (p - lower) * scale or, where it is contracted,
+    (contract((p - lower) * scale) + 2) * half; half = (resolution - 1) / 4.
+    """
+
+    index: I32
+    density: F32
+    sh: F32
+    resolution: ivec3
+    lower: vec3
+    scale: vec3
+    half: vec3
+
+
 SH_C0, SH_C1, SH_C2, SH_C3 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics.C3
 
 
@@ -86,20 +107,20 @@ def gather_rgb(sh: qd.template(), slots: ivec8, w: vec8, basis: qd.template(), K
 
 
 @qd.func
-def to_grid(p: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
-    """Grid coordinates of a position; the transform is that of `transform_of`."""
-    g = (p - lower) * scale
+def to_grid(p: vec3, grid: GridArgs, contracted: qd.template()):
+    """Grid coordinates of a world position."""
+    g = (p - grid.lower) * grid.scale
     if qd.static(contracted):
-        g = (contract_point(g) + 2.0) * half
+        g = (contract_point(g) + 2.0) * grid.half
     return g
 
 
 @qd.func
-def to_world(g: vec3, lower: vec3, scale: vec3, half: vec3, contracted: qd.template()):
+def to_world(g: vec3, grid: GridArgs, contracted: qd.template()):
     """The position at grid coordinates: the inverse of `to_grid`, up to that of `contract_point`."""
-    p = g / scale + lower
+    p = g / grid.scale + grid.lower
     if qd.static(contracted):
-        p = uncontract_point(g / half - 2.0) / scale + lower
+        p = uncontract_point(g / grid.half - 2.0) / grid.scale + grid.lower
     return p
 
 

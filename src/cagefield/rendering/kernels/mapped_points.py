@@ -5,8 +5,8 @@
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.kernels.grid import U8, ivec3, to_grid, to_world, vec3
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.rendering.kernels.grid import U8, GridArgs, ivec3, to_grid, to_world, vec3
+from cagefield.warps.kernels.edit_maps import EditArgs, Nodes, map_sample
 
 UNKNOWN = 1e30
 """Image of a point that was not mapped."""
@@ -22,12 +22,8 @@ def map_points(
     lower: ivec3,
     count: ivec3,
     spacing: qd.i32,
-    origin: vec3,
-    scale: vec3,
-    half: vec3,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
+    grid: GridArgs,
+    edits: EditArgs,
     contracted: qd.template(),
     flows: qd.template(),
 ):
@@ -39,11 +35,11 @@ def map_points(
             g = qd.cast(at, qd.f32)
             if started == 1:
                 g = starts[n]
-            p = to_world(g, origin, scale, half, contracted)
-            q, _v, _empty = map_sample(p, vec3(1.0, 0.0, 0.0), params, lattice, n_edits, flows)
+            p = to_world(g, grid, contracted)
+            q, _v, _empty = map_sample(p, vec3(1.0, 0.0, 0.0), edits, flows)
             image = g
             if qd.abs(q - p).max() > 0.0:
-                image = to_grid(q, origin, scale, half, contracted)
+                image = to_grid(q, grid, contracted)
         if n < images.shape[0]:
             images[n] = image
 

@@ -7,110 +7,124 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+from dataclasses import dataclass
+
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.kernels.edited_ray import EditedRay, edited_ray, map_along
 from cagefield.rendering.kernels.grid import (
     F32,
-    I32,
+    GridArgs,
     contract_velocity,
     corner_slots,
     corner_weights,
     gather_density,
     gather_rgb,
-    ivec3,
     sh_basis,
     to_grid,
     vec3,
 )
-from cagefield.rendering.kernels.ray_grid import is_occupied, look_ahead, safe_inverse, slab
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs, is_occupied, look_ahead, safe_inverse, slab
+from cagefield.warps.kernels.edit_maps import EditArgs, map_sample
 
 mat3 = qd.types.matrix(3, 3, qd.f32)
 ivec2 = qd.types.vector(2, qd.i32)
 TILE = 8
 
 
+@dataclass(frozen=True, eq=False)
+class CameraArgs:
+    """A camera as kernels take it: directions [N,3] of its pixels in camera space, and its pose."""
+
+    directions: F32
+    width: qd.i32
+    rotation: mat3
+    origin: vec3
+
+
+@dataclass(frozen=True, eq=False)
+class TileArgs:
+    """The tiles, 8 x 8 pixels each, that are marched: `rows` of them from `first_row` on, of a rectangle.
+
+    The rectangle has its top left pixel at `corner` (column, row) and `size` (columns, rows).
+    """
+
+    corner: ivec2
+    size: ivec2
+    first_row: qd.i32
+    rows: qd.i32
+
+
+@dataclass(frozen=True, eq=False)
+class MarchArgs:
+    """How rays are marched: step and nearest distance, in units of t, and what is worked out of a sample."""
+
+    step: qd.f32
+    near: qd.f32
+    with_normals: qd.i32
+    preserve_opacity: qd.i32
+
+
 @qd.kernel(fastcache=True)
 def march_tiles(
     out: F32,
     deal: Deal,
-    directions: F32,
-    first_row: qd.i32,
-    rows: qd.i32,
-    corner: ivec2,
-    size: ivec2,
-    width: qd.i32,
-    rotation: mat3,
-    origin: vec3,
-    codes: I32,
-    brick_origin: ivec3,
-    brick_dims: ivec3,
-    index: I32,
-    density: F32,
-    sh: F32,
-    resolution: ivec3,
-    lower: vec3,
-    scale: vec3,
-    step: qd.f32,
-    near: qd.f32,
-    with_normals: qd.i32,
+    camera: CameraArgs,
+    tiles: TileArgs,
+    march: MarchArgs,
+    grid: GridArgs,
+    bricks: OccupancyArgs,
+    canonical_bricks: OccupancyArgs,
+    edits: EditArgs,
     boxes: F32,
-    n_boxes: qd.i32,
-    canonical_codes: I32,
-    canonical_dims: ivec3,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
-    preserve_opacity: qd.i32,
     K: qd.template(),
     contracted: qd.template(),
     edited: qd.template(),
     flows: qd.template(),
 ):
-    """Marches rows of tiles, 8 x 8 pixels each, of a rectangle of a picture that is `width` pixels wide.
+    """Marches rows of tiles of a rectangle of a camera's picture.
 
-    The rectangle has its top left pixel at `corner` (column, row) and `size` (columns, rows).
     out: [size.y * size.x, 8]: premultiplied rgb, opacity, sum of w t, and the premultiplied normal.
-    directions: camera-space, one for each pixel of the picture. Grid coordinates are (p - lower) * scale, or,
-    when contracted, `lower` is the centre, `scale` 1 / half size, and the result is contracted.
 
-    boxes: [n_boxes, 2, 3], the deformed-space boxes outside which no edit changes anything. The part of a ray
-    that may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `codes`
-    are those of the deformed field.
+    boxes: [B,2,3], the deformed-space boxes outside which no edit changes anything. The part of a ray that
+    may lie in them is found first; only its samples in occupied blocks evaluate the edits' maps. `bricks` are
+    those of the deformed field, `canonical_bricks`, which begin at 0, those of the field as it was trained.
     """
-    across = (size.x + TILE - 1) // TILE
+    across = (tiles.size.x + TILE - 1) // TILE
     qd.loop_config(block_dim=64)
     for turn in range(turns(deal)):
         n = dealt(turn, deal)
         tile = n // (TILE * TILE)
         x = (tile % across) * TILE + n % TILE
-        y = (first_row + tile // across) * TILE + (n // TILE) % TILE
-        if tile < across * rows and x < size.x and y < size.y:
-            pixel = (corner.y + y) * width + corner.x + x
-            d = rotation @ vec3(directions[3 * pixel], directions[3 * pixel + 1], directions[3 * pixel + 2])
+        y = (tiles.first_row + tile // across) * TILE + (n // TILE) % TILE
+        if tile < across * tiles.rows and x < tiles.size.x and y < tiles.size.y:
+            pixel = (tiles.corner.y + y) * camera.width + tiles.corner.x + x
+            d = camera.rotation @ vec3(
+                camera.directions[3 * pixel],
+                camera.directions[3 * pixel + 1],
+                camera.directions[3 * pixel + 2],
+            )
             basis = sh_basis(d, K)
-            go = (origin - lower) * scale
-            gd = d * scale
+            go = (camera.origin - grid.lower) * grid.scale
+            gd = d * grid.scale
             inverse = safe_inverse(gd)
-            half = 0.25 * qd.cast(resolution - 1, qd.f32)
-            t = near
+            t = march.near
             t_end = 1e30
             if qd.static(not contracted):
-                lo = qd.cast(brick_origin, qd.f32)
-                hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(brick_dims, qd.f32))
-                t = qd.max(hit.x, near) + 0.5 * step
+                lo = qd.cast(bricks.origin, qd.f32)
+                hit = slab(go, inverse, lo, lo + 4.0 * qd.cast(bricks.dims, qd.f32))
+                t = qd.max(hit.x, march.near) + 0.5 * march.step
                 t_end = hit.y
             edit_in = 1e30
             edit_out = -1e30
             ray = EditedRay(edit=-1)
             if qd.static(edited):
                 world = safe_inverse(d)
-                for k in range(n_boxes):
+                for k in range(boxes.shape[0] // 6):
                     at = 6 * k
                     through = slab(
-                        origin,
+                        camera.origin,
                         world,
                         vec3(boxes[at], boxes[at + 1], boxes[at + 2]),
                         vec3(boxes[at + 3], boxes[at + 4], boxes[at + 5]),
@@ -119,14 +133,14 @@ def march_tiles(
                         edit_in = qd.min(edit_in, through.x)
                         edit_out = qd.max(edit_out, through.y)
                 if edit_in <= edit_out:
-                    ray = edited_ray(origin, d, params, n_edits)
+                    ray = edited_ray(camera.origin, d, edits)
             T = 1.0
             rgb = vec3(0.0, 0.0, 0.0)
             normal = vec3(0.0, 0.0, 0.0)
             depth = 0.0
             while t < t_end and T > 1e-3:
                 g, h, empty, leap, last = look_ahead(
-                    codes, go + t * gd, gd, inverse, half, step, brick_origin, brick_dims, contracted
+                    bricks, go + t * gd, gd, inverse, grid.half, march.step, contracted
                 )
                 if qd.static(contracted):
                     if last == 1:
@@ -139,26 +153,26 @@ def march_tiles(
                     view = d
                     if qd.static(edited):
                         if t >= edit_in and t <= edit_out:
-                            p = origin + t * d
-                            canonical, view, emptied, moved = map_along(
-                                ray, t, p, d, params, lattice, n_edits, flows
-                            )
+                            p = camera.origin + t * d
+                            canonical, view, emptied, moved = map_along(ray, t, p, d, edits, flows)
                             if emptied == 1:
                                 alive = 0
                             if moved == 1:
-                                g = to_grid(canonical, lower, scale, half, contracted)
-                                outside = g.min() < 0.0 or (g - qd.cast(resolution - 1, qd.f32)).max() > 0.0
-                                if outside or not is_occupied(canonical_codes, g, canonical_dims):
+                                g = to_grid(canonical, grid, contracted)
+                                outside = (
+                                    g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0
+                                )
+                                if outside or not is_occupied(canonical_bricks, g):
                                     alive = 0
                     if alive == 1:
-                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
-                        slots = corner_slots(index, cell, resolution.y, resolution.z)
+                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
+                        slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                         f = g - qd.cast(cell, qd.f32)
                         b = corner_weights(f)
-                        raw = gather_density(density, slots, b)
+                        raw = gather_density(grid.density, slots, b)
                         if raw > 0.0:
                             if qd.static(edited):
-                                if preserve_opacity == 1 and moved == 1:
+                                if march.preserve_opacity == 1 and moved == 1:
                                     raw *= view.norm()
                             keep = qd.exp(-raw * h)
                             w = T * (1.0 - keep)
@@ -168,24 +182,22 @@ def march_tiles(
                                 if qd.static(edited):
                                     if moved == 1:
                                         seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
-                                c = gather_rgb(sh, slots, b, seen, K)
+                                c = gather_rgb(grid.sh, slots, b, seen, K)
                                 rgb += w * qd.max(qd.min(c, 1.0), 0.0)
                                 depth += w * t
-                                if with_normals == 1:
-                                    slope = density_slope(density, slots, f)
+                                if march.with_normals == 1:
+                                    slope = density_slope(grid.density, slots, f)
                                     if qd.static(contracted):
-                                        at_world = (origin + t * d - lower) * scale
-                                        slope = pull_back(slope * half, at_world) * scale
+                                        at_world = (camera.origin + t * d - grid.lower) * grid.scale
+                                        slope = pull_back(slope * grid.half, at_world) * grid.scale
                                     else:
-                                        slope = slope * scale
+                                        slope = slope * grid.scale
                                     if qd.static(edited):
                                         if moved == 1:
-                                            slope = through_edits(
-                                                slope, origin + t * d, params, lattice, n_edits, flows
-                                            )
+                                            slope = through_edits(slope, camera.origin + t * d, edits, flows)
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h
-            at = 8 * (y * size.x + x)
+            at = 8 * (y * tiles.size.x + x)
             for a in qd.static(range(3)):
                 out[at + a] = rgb[a]
                 out[at + 5 + a] = normal[a]
@@ -204,14 +216,7 @@ def pull_back(slope: vec3, q: vec3):
 
 
 @qd.func
-def through_edits(
-    slope: vec3,
-    p: vec3,
-    params: qd.template(),
-    lattice: qd.template(),
-    n_edits: qd.i32,
-    flows: qd.template(),
-):
+def through_edits(slope: vec3, p: vec3, edits: EditArgs, flows: qd.template()):
     """J^T slope: the gradient in deformed space at p of a gradient in canonical space."""
     out = vec3(0.0, 0.0, 0.0)
     for a in range(3):
@@ -222,7 +227,7 @@ def through_edits(
             axis.y = 1.0
         else:
             axis.z = 1.0
-        _q, v, _emptied = map_sample(p, axis, params, lattice, n_edits, flows)
+        _q, v, _emptied = map_sample(p, axis, edits, flows)
         along = slope.dot(v)
         if a == 0:
             out.x = along

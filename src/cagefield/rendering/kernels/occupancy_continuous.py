@@ -5,9 +5,10 @@
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.kernels.grid import F32, I32, U8, ivec3, vec3
+from cagefield.rendering.kernels.grid import I32, U8, GridArgs, ivec3, vec3
 from cagefield.rendering.kernels.mapped_points import UNKNOWN, differences
 from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 from cagefield.warps.kernels.edit_maps import Nodes
 
 
@@ -16,9 +17,7 @@ def occupied_points(
     out: U8,
     deal: Deal,
     images: Nodes,
-    codes: I32,
-    bricks: ivec3,
-    origin: ivec3,
+    bricks: OccupancyArgs,
     count: ivec3,
     most: qd.f32,
 ):
@@ -36,14 +35,14 @@ def occupied_points(
                 z_reach, _z = differences(images, n, k, count.z, 1)
                 r = qd.min(0.5 * (x_reach + y_reach + z_reach) + 0.5, most)
                 empty = 0
-                b = (qd.cast(qd.floor(image), qd.i32) - origin) >> 2
-                if b.min() >= 0 and (bricks - b).min() > 0:
+                b = (qd.cast(qd.floor(image), qd.i32) - bricks.origin) >> 2
+                if b.min() >= 0 and (bricks.dims - b).min() > 0:
                     # Every brick nearer than this code says is empty.
-                    code = codes[(b.x * bricks.y + b.y) * bricks.z + b.z]
+                    code = bricks.codes[(b.x * bricks.dims.y + b.y) * bricks.dims.z + b.z]
                     if r.max() < qd.cast(4 * ((code >> 8) - 1), qd.f32):
                         empty = 1
                 if empty == 0:
-                    found = is_blocked(image, r, codes, bricks, origin)
+                    found = is_blocked(image, r, bricks)
             out[n] = qd.cast(found, qd.u8)
 
 
@@ -54,9 +53,7 @@ def dense_blocks(
     candidates: I32,
     images: Nodes,
     count: ivec3,
-    index: I32,
-    density: F32,
-    resolution: ivec3,
+    grid: GridArgs,
 ):
     for turn in range(turns(deal)):
         c = dealt(turn, deal)
@@ -100,6 +97,6 @@ def dense_blocks(
                     w = qd.abs(1.0 - up - part)
                     for a in qd.static(range(3)):
                         image[a] += w.x * w.y * w.z * corners[corner, a]
-                found = is_dense(image, r, index, density, resolution)
+                found = is_dense(image, r, grid)
                 at += 1
             out[c] = qd.cast(found, qd.u8)

@@ -6,9 +6,9 @@ import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.kernels.grid import (
-    F32,
     I32,
     U8,
+    GridArgs,
     contract_velocity,
     ivec3,
     to_grid,
@@ -17,25 +17,20 @@ from cagefield.rendering.kernels.grid import (
     vec3,
 )
 from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs
+from cagefield.warps.kernels.edit_maps import EditArgs, map_sample
 
 
 @qd.kernel(fastcache=True)
 def occupied_corners(
     out: U8,
     deal: Deal,
-    codes: I32,
-    bricks: ivec3,
-    bricks_origin: ivec3,
+    bricks: OccupancyArgs,
     lower: ivec3,
     count: ivec3,
     spacing: qd.i32,
-    origin: vec3,
-    scale: vec3,
-    half: vec3,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
+    grid: GridArgs,
+    edits: EditArgs,
     contracted: qd.template(),
     flows: qd.template(),
 ):
@@ -46,11 +41,11 @@ def occupied_corners(
             j = (n // count.z) % count.y
             k = n % count.z
             g = qd.cast(lower + spacing * ivec3(i, j, k), qd.f32)
-            image, reach, empty = probe(g, origin, scale, half, params, lattice, n_edits, contracted, flows)
+            image, reach, empty = probe(g, grid, edits, contracted, flows)
             found = 0
             if empty == 0:
                 r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
-                found = is_blocked(image, r, codes, bricks, bricks_origin)
+                found = is_blocked(image, r, bricks)
             out[n] = qd.cast(found, qd.u8)
 
 
@@ -60,15 +55,8 @@ def dense_blocks(
     deal: Deal,
     candidates: I32,
     lower: ivec3,
-    index: I32,
-    density: F32,
-    resolution: ivec3,
-    origin: vec3,
-    scale: vec3,
-    half: vec3,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
+    grid: GridArgs,
+    edits: EditArgs,
     contracted: qd.template(),
     flows: qd.template(),
 ):
@@ -80,31 +68,19 @@ def dense_blocks(
             k = 0
             while k < 27 and found == 0:
                 g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
-                image, reach, empty = probe(
-                    g, origin, scale, half, params, lattice, n_edits, contracted, flows
-                )
+                image, reach, empty = probe(g, grid, edits, contracted, flows)
                 if empty == 0:
                     r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
-                    found = is_dense(image, r, index, density, resolution)
+                    found = is_dense(image, r, grid)
                 k += 1
             out[n] = qd.cast(found, qd.u8)
 
 
 @qd.func
-def probe(
-    g: vec3,
-    origin: vec3,
-    scale: vec3,
-    half: vec3,
-    params: qd.template(),
-    lattice: qd.template(),
-    n_edits: qd.i32,
-    contracted: qd.template(),
-    flows: qd.template(),
-):
+def probe(g: vec3, grid: GridArgs, edits: EditArgs, contracted: qd.template(), flows: qd.template()):
     """(image, reach, empty) of grid coordinates g: image in grid coordinates, reach = row sums of |J|."""
-    p = to_world(g, origin, scale, half, contracted)
-    c = g / half - 2.0
+    p = to_world(g, grid, contracted)
+    c = g / grid.half - 2.0
     reach = vec3(0.0, 0.0, 0.0)
     image = g
     empty = 0
@@ -117,15 +93,19 @@ def probe(
             e.y = 1.0
         else:
             e.z = 1.0
-        d = e / scale
+        d = e / grid.scale
         if qd.static(contracted):
-            d = (uncontract_point(c + 0.01 * e / half) - uncontract_point(c - 0.01 * e / half)) * 50.0 / scale
+            d = (
+                (uncontract_point(c + 0.01 * e / grid.half) - uncontract_point(c - 0.01 * e / grid.half))
+                * 50.0
+                / grid.scale
+            )
         length = qd.max(d.norm(), 1e-20)
-        q, v, emptied = map_sample(p, d / length, params, lattice, n_edits, flows)
+        q, v, emptied = map_sample(p, d / length, edits, flows)
         empty = emptied
-        along = v * length * scale
+        along = v * length * grid.scale
         if qd.static(contracted):
-            along = contract_velocity((q - origin) * scale, along) * half
-        image = to_grid(q, origin, scale, half, contracted)
+            along = contract_velocity((q - grid.lower) * grid.scale, along) * grid.half
+        image = to_grid(q, grid, contracted)
         reach += qd.abs(along)
     return image, reach, empty

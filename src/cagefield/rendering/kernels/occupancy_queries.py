@@ -7,17 +7,18 @@ Points and reaches r are in grid coordinates; all of the box [point - r, point +
 
 import quadrants as qd
 
-from cagefield.rendering.kernels.grid import ivec3, vec3
+from cagefield.rendering.kernels.grid import GridArgs, vec3
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 
 MOST_CELLS = 12.0
 """Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""
 
 
 @qd.func
-def is_blocked(image: vec3, r: vec3, codes: qd.template(), bricks: ivec3, origin: ivec3):
+def is_blocked(image: vec3, r: vec3, bricks: OccupancyArgs):
     """1 where an occupied block lies within r of an image, grid coordinates, else 0."""
-    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - (origin >> 1), 0)
-    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - (origin >> 1), 2 * bricks - 1)
+    first = qd.max(qd.cast(qd.floor((image - r) * 0.5), qd.i32) - (bricks.origin >> 1), 0)
+    last = qd.min(qd.cast(qd.floor((image + r) * 0.5), qd.i32) - (bricks.origin >> 1), 2 * bricks.dims - 1)
     found = 0
     x = first.x >> 1
     while x <= last.x >> 1 and found == 0:
@@ -25,7 +26,7 @@ def is_blocked(image: vec3, r: vec3, codes: qd.template(), bricks: ivec3, origin
         for y in range(first.y >> 1, (last.y >> 1) + 1):
             in_xy = in_x & between(y, first.y, last.y, 0xCC)
             for z in range(first.z >> 1, (last.z >> 1) + 1):
-                code = codes[(x * bricks.y + y) * bricks.z + z]
+                code = bricks.codes[(x * bricks.dims.y + y) * bricks.dims.z + z]
                 found |= code & in_xy & between(z, first.z, last.z, 0xAA)
         x += 1
     return qd.min(found, 1)
@@ -46,16 +47,16 @@ def between(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
 
 
 @qd.func
-def is_dense(image: vec3, r: vec3, index: qd.template(), density: qd.template(), resolution: ivec3):
+def is_dense(image: vec3, r: vec3, grid: GridArgs):
     """1 where a cell within r of an image, grid coordinates, holds density, else 0."""
     first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
-    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, resolution - 1)
+    last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, grid.resolution - 1)
     found = 0
     x = first.x
     while x <= last.x and found == 0:
         for y in range(first.y, last.y + 1):
             for z in range(first.z, last.z + 1):
-                if density[index[(x * resolution.y + y) * resolution.z + z]] > 0.0:
+                if grid.density[grid.index[(x * grid.resolution.y + y) * grid.resolution.z + z]] > 0.0:
                     found = 1
         x += 1
     return found

@@ -1,10 +1,21 @@
 """Kernel functions that walk a ray through the brick grid of `cagefield.rendering.occupancy`."""
 
+from dataclasses import dataclass
+
 import quadrants as qd
 
-from cagefield.rendering.kernels.grid import contract_point, contract_velocity, ivec3, vec3
+from cagefield.rendering.kernels.grid import I32, contract_point, contract_velocity, ivec3, vec3
 
 vec2 = qd.types.vector(2, qd.f32)
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyArgs:
+    """A grid of bricks as kernels take it: codes and origin of `Occupancy`, and its shape."""
+
+    codes: I32
+    origin: ivec3
+    dims: ivec3
 
 
 @qd.func
@@ -28,11 +39,11 @@ def safe_inverse(d: vec3):
 
 
 @qd.func
-def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims: ivec3):
+def empty_run(bricks: OccupancyArgs, g: vec3, inverse: vec3):
     """The ray parameter to the exit of the empty block around grid coordinates g; -1 where it is occupied."""
-    cell = qd.cast(qd.floor(g), qd.i32) - origin
-    b = qd.max(qd.min(cell >> 2, dims - 1), 0)
-    code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
+    cell = qd.cast(qd.floor(g), qd.i32) - bricks.origin
+    b = qd.max(qd.min(cell >> 2, bricks.dims - 1), 0)
+    code = bricks.codes[(b.x * bricks.dims.y + b.y) * bricks.dims.z + b.z]
     run = -1.0
     lower = ivec3(0, 0, 0)
     size = 0
@@ -46,7 +57,7 @@ def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims:
             lower = (cell >> 1) << 1
             size = 2
     if size > 0:
-        lo = qd.cast(lower + origin, qd.f32)
+        lo = qd.cast(lower + bricks.origin, qd.f32)
         a = (lo - g) * inverse
         c = (lo + qd.cast(size, qd.f32) - g) * inverse
         run = qd.max(qd.max(a, c).min(), 0.0)
@@ -54,25 +65,23 @@ def empty_run(codes: qd.template(), g: vec3, inverse: vec3, origin: ivec3, dims:
 
 
 @qd.func
-def is_occupied(codes: qd.template(), g: vec3, dims: ivec3):
+def is_occupied(bricks: OccupancyArgs, g: vec3):
     """True where the sub-block around grid coordinates g is occupied; the brick grid begins at 0."""
     cell = qd.cast(g, qd.i32)
-    b = qd.min(cell >> 2, dims - 1)
-    code = codes[(b.x * dims.y + b.y) * dims.z + b.z]
+    b = qd.min(cell >> 2, bricks.dims - 1)
+    code = bricks.codes[(b.x * bricks.dims.y + b.y) * bricks.dims.z + b.z]
     s = (cell >> 1) & 1
     return code < 256 and (code >> (s.x * 4 + s.y * 2 + s.z)) & 1 == 1
 
 
 @qd.func
 def look_ahead(
-    codes: qd.template(),
+    bricks: OccupancyArgs,
     q: vec3,
     gd: vec3,
     inverse: vec3,
     half: vec3,
     step: qd.f32,
-    origin: ivec3,
-    dims: ivec3,
     contracted: qd.template(),
 ):
     """(g, h, empty, leap, last) at a point q of a ray with velocity gd and its inverse.
@@ -102,12 +111,12 @@ def look_ahead(
             limit = 0.25 * m / qd.abs(gd).max()
         if m > 2.0 * half.x:
             last = 1
-        run = empty_run(codes, g, safe_inverse(v), origin, dims)
+        run = empty_run(bricks, g, safe_inverse(v))
         if run >= 0.0:
             empty = 1
             leap = qd.max(qd.min(run * share, limit), h)
     else:
-        run = empty_run(codes, g, inverse, origin, dims)
+        run = empty_run(bricks, g, inverse)
         if run >= 0.0:
             empty = 1
             leap = (qd.floor(run / step) + 1.0) * step

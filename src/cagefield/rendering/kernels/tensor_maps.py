@@ -5,7 +5,7 @@
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.edit_maps import EditArgs, Params, map_sample
 from cagefield.warps.kernels.trilinear_hex import read3
 
 
@@ -14,9 +14,7 @@ def map_tensors(
     samples: Params,
     deal: Deal,
     out: Params,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
+    edits: EditArgs,
     flows: qd.template(),
     preserve_opacity: qd.template(),
 ):
@@ -24,7 +22,7 @@ def map_tensors(
         i = dealt(turn, deal)
         if i < samples.shape[0]:
             d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, edits, flows)
             length = qd.max(v.norm(), 1e-20)
             unchanged = (v - d).norm() == 0.0
             for a in qd.static(range(3)):

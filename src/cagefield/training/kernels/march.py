@@ -20,25 +20,26 @@ back over them has the gradients from S_i. (Marching twice instead, with nothing
 on a CPU.) b_v are trilinear weights.
 """
 
+from dataclasses import dataclass
+
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.kernels.grid import (
     F32,
-    I32,
-    U8,
+    GridArgs,
     contract_point,
     contract_velocity,
     corner_slots,
     corner_weights,
     gather_density,
     gather_rgb,
-    ivec3,
     sh_basis,
     vec3,
 )
-from cagefield.rendering.kernels.ray_grid import look_ahead, safe_inverse, slab
+from cagefield.rendering.kernels.ray_grid import OccupancyArgs, look_ahead, safe_inverse, slab
 from cagefield.training.kernels.accumulators import HEAD, add
+from cagefield.training.kernels.photos import PatchArgs, PhotoArgs
 
 SAMPLE = 8
 """Floats of a noted sample: t, h, w, T after it, and its colour before the clamp."""
@@ -69,112 +70,119 @@ def spread_slope(
     return 2.0 * (s * before_w - before_ws + after_ws - s * after_w) + (2.0 / 3.0) * w * ds
 
 
+@dataclass(frozen=True, eq=False)
+class WorkerArgs:
+    """What workers add up: an accumulator of `record` floats for each of them, and room for their samples."""
+
+    accumulator: F32
+    record: qd.i32
+    scratch: F32
+    workers: qd.i32
+
+
+@dataclass(frozen=True, eq=False)
+class LossArgs:
+    """What is found of each ray: losses (squared error), penalties (distortion term), gain_sums [rays,6].
+
+    The gain sums are C photo and C C of each channel, for the exposure's fit.
+    """
+
+    losses: F32
+    penalties: F32
+    gain_sums: F32
+
+
+@dataclass(frozen=True, eq=False)
+class BatchArgs:
+    """How a batch is marched: step and nearest distance, in units of t, and what is random about it."""
+
+    step: qd.f32
+    near: qd.f32
+    distortion: qd.f32
+    reach: qd.f32
+    seed: qd.u32
+    random_background: qd.i32
+    background: vec3
+
+
 @qd.kernel(fastcache=True)
 def march_batch(
-    patches: I32,
-    n_patches: qd.i32,
-    patch_size: qd.i32,
-    workers: qd.i32,
     deal: Deal,
-    seed: qd.u32,
-    views: I32,
-    poses: F32,
-    gains: F32,
-    directions: F32,
-    pixels: U8,
-    codes: I32,
-    index: I32,
-    density: F32,
-    sh: F32,
-    accumulator: F32,
-    record: qd.i32,
-    scratch: F32,
-    losses: F32,
-    penalties: F32,
-    gain_sums: F32,
-    brick_dims: ivec3,
-    resolution: ivec3,
-    lower: vec3,
-    scale: vec3,
-    step: qd.f32,
-    near: qd.f32,
-    distortion: qd.f32,
-    reach: qd.f32,
-    random_background: qd.i32,
-    background: vec3,
+    patches: PatchArgs,
+    photos: PhotoArgs,
+    grid: GridArgs,
+    bricks: OccupancyArgs,
+    work: WorkerArgs,
+    loss: LossArgs,
+    batch: BatchArgs,
     K: qd.template(),
     contracted: qd.template(),
     gpu: qd.template(),
 ):
-    """Adds the gradients and curvatures of a batch of pixel patches to the accumulators.
-
-    patches: [P, 3] (view, column, row of the first pixel). views: [V, 4] (first pixel, width, first
-    direction, height). poses: [V, 12] rows of c2w. gains: [V, 3]. Writes losses [rays] (squared error),
-    penalties [rays] (distortion term) and gain_sums [rays * 6] (C photo, C C per channel) for the exposure
-    fit. World position p maps to grid
-    coordinates (p - lower) * scale; when contracted, `lower` is the centre, `scale` 1 / half size, and the
-    result is contracted.
-    """
-    rays = patch_size * patch_size
-    per = (n_patches + workers - 1) // workers
+    """Adds the gradients and curvatures of a batch of patches to the accumulators; writes `loss`."""
+    rays = patches.size * patches.size
+    per = (patches.count + work.workers - 1) // work.workers
     for turn in range(turns(deal)):
         worker = dealt(turn, deal)
         base = 0
         if qd.static(not gpu):
-            base = worker * record
-        for patch in range(qd.min(worker * per, n_patches), qd.min((worker + 1) * per, n_patches)):
+            base = worker * work.record
+        for patch in range(qd.min(worker * per, patches.count), qd.min((worker + 1) * per, patches.count)):
             for r in range(rays):
                 ray = patch * rays + r
-                view = patches[3 * patch]
-                column = patches[3 * patch + 1] + r % patch_size
-                row = patches[3 * patch + 2] + r // patch_size
-                first = views[4 * view]
-                width = views[4 * view + 1]
+                view = patches.patches[3 * patch]
+                column = patches.patches[3 * patch + 1] + r % patches.size
+                row = patches.patches[3 * patch + 2] + r // patches.size
+                first = photos.views[4 * view]
+                width = photos.views[4 * view + 1]
                 pixel = row * width + column
-                losses[ray] = 0.0
-                penalties[ray] = 0.0
+                loss.losses[ray] = 0.0
+                loss.penalties[ray] = 0.0
                 for a in qd.static(range(6)):
-                    gain_sums[6 * ray + a] = 0.0
-                if row < views[4 * view + 3] and column < width:
+                    loss.gain_sums[6 * ray + a] = 0.0
+                if row < photos.views[4 * view + 3] and column < width:
                     m = 12 * view
-                    at = 3 * (views[4 * view + 2] + pixel)
-                    l = vec3(directions[at], directions[at + 1], directions[at + 2])
+                    at = 3 * (photos.views[4 * view + 2] + pixel)
+                    l = vec3(photos.directions[at], photos.directions[at + 1], photos.directions[at + 2])
                     d = vec3(
-                        poses[m] * l.x + poses[m + 1] * l.y + poses[m + 2] * l.z,
-                        poses[m + 4] * l.x + poses[m + 5] * l.y + poses[m + 6] * l.z,
-                        poses[m + 8] * l.x + poses[m + 9] * l.y + poses[m + 10] * l.z,
+                        photos.poses[m] * l.x + photos.poses[m + 1] * l.y + photos.poses[m + 2] * l.z,
+                        photos.poses[m + 4] * l.x + photos.poses[m + 5] * l.y + photos.poses[m + 6] * l.z,
+                        photos.poses[m + 8] * l.x + photos.poses[m + 9] * l.y + photos.poses[m + 10] * l.z,
                     )
-                    o = vec3(poses[m + 3], poses[m + 7], poses[m + 11])
-                    gain = vec3(gains[3 * view], gains[3 * view + 1], gains[3 * view + 2])
+                    o = vec3(photos.poses[m + 3], photos.poses[m + 7], photos.poses[m + 11])
+                    gain = vec3(
+                        photos.gains[3 * view], photos.gains[3 * view + 1], photos.gains[3 * view + 2]
+                    )
                     key = qd.cast(ray, qd.u32)
-                    bg = background
-                    if random_background == 1:
+                    bg = batch.background
+                    if batch.random_background == 1:
                         for a in qd.static(range(3)):
-                            bg[a] = hash01(key, seed * qd.u32(4) + qd.u32(a + 1))
+                            bg[a] = hash01(key, batch.seed * qd.u32(4) + qd.u32(a + 1))
                     px = 4 * (first + pixel)
-                    opacity = qd.cast(pixels[px + 3], qd.f32) / 255.0
+                    opacity = qd.cast(photos.pixels[px + 3], qd.f32) / 255.0
                     photo = vec3(0.0, 0.0, 0.0)
                     for a in qd.static(range(3)):
-                        photo[a] = qd.cast(pixels[px + a], qd.f32) / 255.0 * opacity + (1.0 - opacity) * bg[a]
+                        photo[a] = (
+                            qd.cast(photos.pixels[px + a], qd.f32) / 255.0 * opacity + (1.0 - opacity) * bg[a]
+                        )
                     basis = sh_basis(d, K)
 
                     # Ray in grid coordinates (bounded) or normalised coordinates (contracted).
-                    go = (o - lower) * scale
-                    gd = d * scale
+                    go = (o - grid.lower) * grid.scale
+                    gd = d * grid.scale
                     inverse = safe_inverse(gd)
-                    half = 0.25 * qd.cast(resolution - 1, qd.f32)
                     t_end = 1e30
-                    t_start = near
+                    t_start = batch.near
                     if qd.static(not contracted):
-                        hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(resolution - 1, qd.f32))
-                        t_start = qd.max(hit.x, near)
+                        hit = slab(go, inverse, vec3(0.0, 0.0, 0.0), qd.cast(grid.resolution - 1, qd.f32))
+                        t_start = qd.max(hit.x, batch.near)
                         t_end = hit.y
-                    jitter = hash01(key, seed * qd.u32(4))
+                    jitter = hash01(key, batch.seed * qd.u32(4))
                     if qd.static(not contracted):
-                        t_start += jitter * step
+                        t_start += jitter * batch.step
                     else:
                         v0 = contract_velocity(go + t_start * gd, gd)
-                        t_start += jitter * step / qd.abs(v0 * half).max()
+                        t_start += jitter * batch.step / qd.abs(v0 * grid.half).max()
 
                     C = vec3(0.0, 0.0, 0.0)
                     T = 1.0
@@ -184,15 +192,7 @@ def march_batch(
                     total_ws = 0.0
                     while t < t_end and T > 1e-3:
                         g, h, empty, leap, last = look_ahead(
-                            codes,
-                            go + t * gd,
-                            gd,
-                            inverse,
-                            half,
-                            step,
-                            ivec3(0, 0, 0),
-                            brick_dims,
-                            contracted,
+                            bricks, go + t * gd, gd, inverse, grid.half, batch.step, contracted
                         )
                         if qd.static(contracted):
                             if last == 1:
@@ -200,52 +200,56 @@ def march_batch(
                         if empty == 1:
                             t += leap
                         else:
-                            cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
-                            slots = corner_slots(index, cell, resolution.y, resolution.z)
+                            cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
+                            slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                             b = corner_weights(g - qd.cast(cell, qd.f32))
-                            raw = gather_density(density, slots, b)
+                            raw = gather_density(grid.density, slots, b)
                             if raw > 0.0:
                                 keep = qd.exp(-raw * h)
                                 w = T * (1.0 - keep)
                                 T *= keep
                                 if w > LEAST_WEIGHT:
-                                    colour = gather_rgb(sh, slots, b, basis, K)
+                                    colour = gather_rgb(grid.sh, slots, b, basis, K)
                                     C += w * qd.max(qd.min(colour, 1.0), 0.0)
                                     if samples < MOST_SAMPLES:
-                                        s = t / (t + reach)
+                                        s = t / (t + batch.reach)
                                         total_w += w
                                         total_ws += w * s
                                         at = SAMPLE * (worker * MOST_SAMPLES + samples)
-                                        scratch[at] = t
-                                        scratch[at + 1] = h
-                                        scratch[at + 2] = w
-                                        scratch[at + 3] = T
+                                        work.scratch[at] = t
+                                        work.scratch[at + 1] = h
+                                        work.scratch[at + 2] = w
+                                        work.scratch[at + 3] = T
                                         for a in qd.static(range(3)):
-                                            scratch[at + 4 + a] = colour[a]
+                                            work.scratch[at + 4 + a] = colour[a]
                                         samples += 1
                             t += h
                     C += T * bg
                     residual = gain * C - photo
-                    losses[ray] = residual.dot(residual)
+                    loss.losses[ray] = residual.dot(residual)
                     for a in qd.static(range(3)):
-                        gain_sums[6 * ray + a] = C[a] * photo[a]
-                        gain_sums[6 * ray + 3 + a] = C[a] * C[a]
+                        loss.gain_sums[6 * ray + a] = C[a] * photo[a]
+                        loss.gain_sums[6 * ray + 3 + a] = C[a] * C[a]
 
                     total_wu = 0.0
-                    if distortion > 0.0:
+                    if batch.distortion > 0.0:
                         before_w = 0.0
                         before_ws = 0.0
                         for sample in range(samples):
                             at = SAMPLE * (worker * MOST_SAMPLES + sample)
-                            s = scratch[at] / (scratch[at] + reach)
-                            ds = scratch[at + 1] * reach / ((scratch[at] + reach) * (scratch[at] + reach))
-                            w = scratch[at + 2]
+                            s = work.scratch[at] / (work.scratch[at] + batch.reach)
+                            ds = (
+                                work.scratch[at + 1]
+                                * batch.reach
+                                / ((work.scratch[at] + batch.reach) * (work.scratch[at] + batch.reach))
+                            )
+                            w = work.scratch[at + 2]
                             u = spread_slope(s, ds, w, before_w, before_ws, total_w, total_ws)
                             before_w += w
                             before_ws += w * s
                             total_wu += w * u
-                            scratch[at + 7] = u
-                        penalties[ray] = 0.5 * distortion * total_wu
+                            work.scratch[at + 7] = u
+                        loss.penalties[ray] = 0.5 * batch.distortion * total_wu
 
                     slopes = vec3(0.0, 0.0, 0.0)  # sum of |dC/ds_i|
                     remaining = C
@@ -253,36 +257,46 @@ def march_batch(
                         for sample in range(samples):
                             at = SAMPLE * (worker * MOST_SAMPLES + sample)
                             for a in qd.static(range(3)):
-                                c = qd.max(qd.min(scratch[at + 4 + a], 1.0), 0.0)
-                                remaining[a] -= scratch[at + 2] * c
-                                slopes[a] += scratch[at + 1] * qd.abs(scratch[at + 3] * c - remaining[a])
+                                c = qd.max(qd.min(work.scratch[at + 4 + a], 1.0), 0.0)
+                                remaining[a] -= work.scratch[at + 2] * c
+                                slopes[a] += work.scratch[at + 1] * qd.abs(
+                                    work.scratch[at + 3] * c - remaining[a]
+                                )
                         slopes *= gain
 
                     remaining = C
                     for sample in range(samples):
                         at = SAMPLE * (worker * MOST_SAMPLES + sample)
-                        q = go + scratch[at] * gd
-                        h = scratch[at + 1]
-                        w = scratch[at + 2]
-                        colour = vec3(scratch[at + 4], scratch[at + 5], scratch[at + 6])
+                        q = go + work.scratch[at] * gd
+                        h = work.scratch[at + 1]
+                        w = work.scratch[at + 2]
+                        colour = vec3(
+                            work.scratch[at + 4],
+                            work.scratch[at + 5],
+                            work.scratch[at + 6],
+                        )
                         g = q
                         if qd.static(contracted):
-                            g = (contract_point(q) + 2.0) * half
-                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), resolution - 2), 0)
-                        slots = corner_slots(index, cell, resolution.y, resolution.z)
+                            g = (contract_point(q) + 2.0) * grid.half
+                        cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
+                        slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                         b = corner_weights(g - qd.cast(cell, qd.f32))
                         c = qd.max(qd.min(colour, 1.0), 0.0)
                         remaining -= w * c
-                        slope = h * gain * (scratch[at + 3] * c - remaining)
+                        slope = h * gain * (work.scratch[at + 3] * c - remaining)
                         curvature = slope.dot(slope)
                         colour_curvature = w * w
                         if qd.static(not contracted):
                             curvature = qd.abs(slope).dot(slopes)
                             colour_curvature = w * total_w
                         gradient = slope.dot(residual)
-                        if distortion > 0.0:
-                            total_wu -= w * scratch[at + 7]
-                            gradient += distortion * h * (scratch[at + 3] * scratch[at + 7] - total_wu)
+                        if batch.distortion > 0.0:
+                            total_wu -= w * work.scratch[at + 7]
+                            gradient += (
+                                batch.distortion
+                                * h
+                                * (work.scratch[at + 3] * work.scratch[at + 7] - total_wu)
+                            )
                         pull = residual * gain * w
                         for a in qd.static(range(3)):
                             if colour[a] < 0.0 and pull[a] > 0.0:
@@ -292,14 +306,14 @@ def march_batch(
                         for k in qd.static(range(8)):
                             if slots[k] > 0:
                                 to = base + slots[k] * (HEAD + 3 * K)
-                                add(accumulator, to, b[k] * gradient, gpu)
-                                add(accumulator, to + 1, b[k] * curvature, gpu)
-                                add(accumulator, to + 2, b[k] * colour_curvature, gpu)
+                                add(work.accumulator, to, b[k] * gradient, gpu)
+                                add(work.accumulator, to + 1, b[k] * curvature, gpu)
+                                add(work.accumulator, to + 2, b[k] * colour_curvature, gpu)
                                 if qd.static(gpu):
-                                    qd.atomic_max(accumulator[to + 3], b[k] * w)
+                                    qd.atomic_max(work.accumulator[to + 3], b[k] * w)
                                 else:
-                                    accumulator[to + 3] = qd.max(accumulator[to + 3], b[k] * w)
+                                    work.accumulator[to + 3] = qd.max(work.accumulator[to + 3], b[k] * w)
                                 for j in qd.static(range(K)):
                                     y = b[k] * basis[j]
                                     for a in qd.static(range(3)):
-                                        add(accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
+                                        add(work.accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)

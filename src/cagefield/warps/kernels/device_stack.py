@@ -5,7 +5,7 @@
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.warps.kernels.edit_maps import Nodes, Params, map_sample
+from cagefield.warps.kernels.edit_maps import EditArgs, Params, map_sample
 from cagefield.warps.kernels.trilinear_hex import read3
 
 
@@ -14,16 +14,14 @@ def map_samples(
     samples: Params,
     deal: Deal,
     out: Params,
-    params: Params,
-    lattice: Nodes,
-    n_edits: qd.i32,
+    edits: EditArgs,
     flows: qd.template(),
 ):
     for turn in range(turns(deal)):
         i = dealt(turn, deal)
         if i < samples.shape[0]:
             d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, params, lattice, n_edits, flows)
+            q, v, emptied = map_sample(read3(samples, i, 0), d, edits, flows)
             stretch = 1.0
             if (v - d).norm() > 0.0:
                 stretch = v.norm()

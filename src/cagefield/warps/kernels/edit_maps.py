@@ -7,6 +7,8 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
+from dataclasses import dataclass
+
 import quadrants as qd
 
 from cagefield.warps.kernels.flow_shell import flow_sample
@@ -32,15 +34,17 @@ Params = qd.types.ndarray(dtype=qd.f32, ndim=2)
 Nodes = qd.types.ndarray(dtype=vec3, ndim=1)
 
 
+@dataclass(frozen=True, eq=False)
+class EditArgs:
+    """An edit stack as kernels take it: the params [E,WIDTH] and lattice [M,3] of `DeviceStack`, and E."""
+
+    params: Params
+    lattice: Nodes
+    count: qd.i32
+
+
 @qd.func
-def map_sample(
-    p: vec3,
-    d: vec3,
-    params: qd.template(),
-    lattice: qd.template(),
-    n_edits: qd.i32,
-    flows: qd.template(),
-):
+def map_sample(p: vec3, d: vec3, edits: EditArgs, flows: qd.template()):
     """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
 
     An emptied sample is returned where it was when it was found empty.
@@ -48,10 +52,10 @@ def map_sample(
     q = p
     v = d
     emptied = 0
-    for n in range(n_edits):
-        e = n_edits - 1 - n
-        if emptied == 0 and in_box(q, params, e, BOX):
-            q, v, emptied = map_edit(q, v, params, lattice, e, flows)
+    for n in range(edits.count):
+        e = edits.count - 1 - n
+        if emptied == 0 and in_box(q, edits.params, e, BOX):
+            q, v, emptied = map_edit(q, v, edits.params, edits.lattice, e, flows)
     return q, v, emptied
 
 
