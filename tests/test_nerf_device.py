@@ -54,8 +54,8 @@ def test_edited_rays_are_traced_without_the_host(kind: dict[str, Any], calls: li
         ("meta", (30, 3)), ("meta", (30,)), ("meta", (30,)),
     ]  # fmt: skip
     assert [len(samples) for samples, *_ in calls] == [30 * 12, 30 * 28]
-    for samples, _deal, out, params, lattice, *_ in calls:
-        assert {values.device.type for values in (samples, out, params, lattice)} == {"meta"}
+    for samples, _deal, out, edits, *_ in calls:
+        assert {values.device.type for values in (samples, out, edits.params, edits.lattice)} == {"meta"}
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=str)
