@@ -14,12 +14,9 @@ import sys
 
 import numpy as np
 import torch
+from PIL import Image
 
-from cagefield import Cage, Edit, EditStack, turntable
-from cagefield.fields.baking import bake
-from cagefield.rendering import render_sampled
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.renderer import Renderer
+from cagefield import Cage, Edit, EditStack, Renderer, bake, render_sampled, turntable
 
 
 class Torus(torch.nn.Module):
@@ -51,7 +48,7 @@ def main(path):
     camera = turntable((0, 0, 0), 3.0, 1, elevation=0.7, width=64, height=64, fov_x=0.7)[0]
     exact = render_sampled(field, camera, samples=64, edits=edits)
     fast = Renderer(bake(field, 64), edits).render(camera, background="white")
-    write_png(path, side_by_side(exact.rgb, np.clip(fast.rgb, 0, 1)))
+    Image.fromarray(np.hstack([exact.rgb8(), fast.rgb8()])).save(path)
 
 
 if __name__ == "__main__":

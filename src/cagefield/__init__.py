@@ -25,11 +25,38 @@ if TYPE_CHECKING:
     from cagefield.edits.files import load_edits as load_edits
     from cagefield.edits.files import save_edits as save_edits
     from cagefield.errors import CagefieldError as CagefieldError
+    from cagefield.fields.baking import bake as bake
     from cagefield.fields.nerf import NerfField as NerfField
+    from cagefield.fields.protocol import Field as Field
     from cagefield.fields.splat import SplatField as SplatField
     from cagefield.fields.voxel import VoxelField as VoxelField
     from cagefield.rendering.frame import Frame as Frame
+    from cagefield.rendering.reference_renderer import render_sampled as render_sampled
+    from cagefield.rendering.renderer import Renderer as Renderer
     from cagefield.scene import Scene as Scene
+
+__all__ = [
+    "Cage",
+    "CagefieldError",
+    "Camera",
+    "Dataset",
+    "Edit",
+    "EditStack",
+    "Field",
+    "Frame",
+    "NerfField",
+    "Renderer",
+    "Scene",
+    "SplatField",
+    "VoxelField",
+    "__version__",
+    "bake",
+    "load_dataset",
+    "load_edits",
+    "render_sampled",
+    "save_edits",
+    "turntable",
+]
 
 _HOME = {
     "Cage": "cagefield.cages",
@@ -38,13 +65,17 @@ _HOME = {
     "Dataset": "cagefield.datasets.dataset",
     "Edit": "cagefield.edits",
     "EditStack": "cagefield.edits",
+    "Field": "cagefield.fields.protocol",
     "Frame": "cagefield.rendering.frame",
     "NerfField": "cagefield.fields.nerf",
+    "Renderer": "cagefield.rendering.renderer",
     "Scene": "cagefield.scene",
     "SplatField": "cagefield.fields.splat",
     "VoxelField": "cagefield.fields.voxel",
+    "bake": "cagefield.fields.baking",
     "load_dataset": "cagefield.datasets.dataset",
     "load_edits": "cagefield.edits.files",
+    "render_sampled": "cagefield.rendering.reference_renderer",
     "save_edits": "cagefield.edits.files",
     "turntable": "cagefield.cameras",
 }
