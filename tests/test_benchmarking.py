@@ -268,7 +268,10 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
 
 def test_turned_parts_are_compared_with_the_light_they_carry(bench: Workbench) -> None:
     (score,) = measure([case("plant", "move_pinecone")], bench)
-    assert np.isfinite(score.there_carried)
+    # Near the truth, which a field without the edit is not; and no farther than from the truth's own light,
+    # of which the turned part brought none along.
+    assert score.there_carried > score.figures.there_if_left + 3.0
+    assert score.there_carried > score.figures.there_edited - 0.1
 
 
 def test_pictures(bench: Workbench, tmp_path: Path) -> None:

@@ -43,6 +43,14 @@ from cagefield.server.render_worker.tasks import (
 from scenes import ball_scene
 from sent_pictures import pixels_of
 
+# Kernels: imported once a device runs.
+devices.start("cpu")
+
+from cagefield.rendering.kernels.mapped_points import map_points  # noqa: E402
+from cagefield.rendering.kernels.march import march_tiles  # noqa: E402
+from cagefield.rendering.kernels.occupancy_continuous import occupied_points  # noqa: E402
+from cagefield.rendering.kernels.occupancy_discontinuous import occupied_corners  # noqa: E402
+
 SIDE = 48
 INNER = Cage.box((0, 0, 0), 1.2)
 MOVED = Edit(INNER, INNER.grown(0.4), name="ball", lattice=24).translate((0.25, 0, 0))
@@ -177,6 +185,22 @@ def test_warming_up_is_possible_for_every_stage(renderers: RendererCache) -> Non
     handlers = TaskHandlers(renderers)
     for stage in WarmStage:
         assert isinstance(handlers.do(WarmTask(1, stage), lambda _: False), Answered)
+
+
+def test_what_is_warm_is_not_compiled_again_by_drags(renderers: RendererCache) -> None:
+    used = [kernel._primal for kernel in (march_tiles, map_points, occupied_points, occupied_corners)]
+    for kernel in used:
+        kernel.reset()
+    assert not any(kernel.materialized_kernels for kernel in used)
+    handlers = TaskHandlers(renderers)
+    for stage in WarmStage:
+        handlers.do(WarmTask(1, stage), lambda _: False)
+    warm = [set(kernel.materialized_kernels) for kernel in used]
+    assert all(warm)
+    for edit in (MOVED, Edit.delete(Cage.box((0.3, 0.1, 0.0), 0.2))):
+        for moving, exact in ((True, False), (False, True)):
+            renderers.picture(replace(task(edit), moving=moving, exact=exact), lambda: False)
+    assert [set(kernel.materialized_kernels) for kernel in used] == warm
 
 
 def test_a_cage_is_fitted_to_what_the_edits_below_left_in_it(renderers: RendererCache) -> None:
