@@ -17,7 +17,7 @@ from cagefield.benchmarking.compare import continuous
 from cagefield.benchmarking.distortion import between
 from cagefield.cages import Cage
 from cagefield.edits import Edit
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_shell
 from cagefield.warps.extended_coordinates import Extended
 

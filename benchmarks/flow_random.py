@@ -40,7 +40,7 @@ from cagefield.edits.operations import (
     Translate,
 )
 from cagefield.errors import CagefieldError
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell, flow_table
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.kernels import flow_shell

@@ -18,7 +18,7 @@ import numpy as np
 
 from cagefield import devices
 from cagefield.benchmarking.cases import CASES, chosen
-from cagefield.benchmarking.figures import Pictures, changed_pixels, mean_psnr, pooled_psnr
+from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
 from cagefield.benchmarking.workbench import Settings, Workbench
@@ -28,6 +28,7 @@ from cagefield.datasets.procedural import procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
 from cagefield.training.voxel_config import VoxelConfig
+from cagefield.typing import AnyArray
 
 Factors = tuple[float, float, float]
 
@@ -153,8 +154,8 @@ def _row(
     factors: str,
     edits: EditStack,
     cameras: tuple[Camera, ...],
-    before: Pictures,
-    truth: Pictures,
+    before: AnyArray,
+    truth: AnyArray,
 ) -> tuple[str, ...]:
     there = changed_pixels(before, truth)
     figures = []

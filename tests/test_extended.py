@@ -7,7 +7,7 @@ import pytest
 
 from cagefield.cages import Cage
 from cagefield.errors import CageError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.trilinear_bend import _middles, bends_one_to_one, forms
 from random_cages import dragged, trilinear, unit_vectors

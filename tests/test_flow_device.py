@@ -13,7 +13,7 @@ from hypothesis import given
 from cagefield import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import DeviceError, EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from random_cages import examples, unit_vectors
 from test_flow_shell import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points

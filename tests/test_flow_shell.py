@@ -16,7 +16,7 @@ from cagefield.edits.edit import largest_safe
 from cagefield.edits.limits import along, flow_reach
 from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
 from cagefield.errors import CageError, EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps import Falloff, FlowShell
 from cagefield.warps.cage_motion import TIMES
 from cagefield.warps.extended_coordinates import Extended, straightened_slope

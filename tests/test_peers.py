@@ -19,7 +19,7 @@ from cagefield.benchmarking.peers.mean_value import ClosedMesh, cube_surface
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.inner_map import HexahedronMap
 

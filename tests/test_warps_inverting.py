@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.newton_inverse import inverted
 
 

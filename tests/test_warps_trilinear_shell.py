@@ -10,7 +10,7 @@ from cagefield import trilinear_hex
 from cagefield.cages import FACES, Cage
 from cagefield.edits.edit import Edit
 from cagefield.edits.operations import euler_degrees
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.trilinear_shell import SIDES, TrilinearShell
 from random_cages import edits, examples, seeds, trilinear

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield import trilinear_hex
 from cagefield.errors import CageError
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
 

@@ -18,10 +18,9 @@ from collections.abc import Sequence
 from typing import Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
+from cagefield.typing import Array, Mask
+
 Lens = Literal["pinhole", "opencv", "opencv_fisheye"]
 
 COEFFICIENTS: Final[dict[str, tuple[int, ...]]] = {

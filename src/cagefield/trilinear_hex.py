@@ -13,13 +13,11 @@ hexahedra are as well conditioned as cubes.
 from __future__ import annotations
 
 from itertools import product
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
-Mask: TypeAlias = NDArray[np.bool_]
+from cagefield.typing import Array, Mask
 
 BITS: Array = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=np.float64)
 """[8,3] u of the eight corners."""

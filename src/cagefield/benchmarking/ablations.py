@@ -16,7 +16,7 @@ from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.compare import compared_cameras, continuous, seen
 from cagefield.benchmarking.distortion import distortion
 from cagefield.benchmarking.edits import eye, frame_ratio
-from cagefield.benchmarking.figures import Figures, Pictures, compare
+from cagefield.benchmarking.figures import Figures, compare
 from cagefield.benchmarking.strips import Panel, difference, strip
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
@@ -25,6 +25,7 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.metrics import psnr
 from cagefield.scene import Scene
+from cagefield.typing import AnyArray
 
 RESOLUTIONS = (64, 128, 256)
 GAPS = (0.1, 0.25, 0.5, 1.0)
@@ -60,7 +61,7 @@ class Subject:
         """The cameras of the figures."""
         return compared_cameras(self.scene, self.bench)
 
-    def picture(self, edits: EditStack) -> Pictures:
+    def picture(self, edits: EditStack) -> AnyArray:
         """The picture [H,W,3] of the scene under edits, from where the case's pictures are taken."""
         return seen(self.scene.with_edits(edits), [eye(self.case.scene, self.size)])[0]
 

@@ -26,9 +26,7 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.rendering.metrics import psnr, ssim
-
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from cagefield.typing import Array, Float32
 
 NEARER, FOGGY = 0.8, 0.1
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.distortion import Distortion, distortion, shell_points
-from cagefield.benchmarking.figures import Figures, Pictures, compare, stacked
+from cagefield.benchmarking.figures import Figures, compare, stacked
 from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
@@ -24,6 +24,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.frame import Frame
 from cagefield.scene import Scene
+from cagefield.typing import AnyArray
 from cagefield.warps.device_stack import DeviceStack
 
 _TIMED_POINTS = 1 << 17
@@ -102,7 +103,7 @@ def compared_cameras(scene: Scene, bench: Workbench) -> tuple[Camera, ...]:
     )
 
 
-def seen(scene: Scene, cameras: Sequence[Camera]) -> Pictures:
+def seen(scene: Scene, cameras: Sequence[Camera]) -> AnyArray:
     """Pictures [V,H,W,3] of a scene, as `shown`."""
     return stacked([np.clip(shown(scene, camera).rgb, 0.0, 1.0) for camera in cameras])
 

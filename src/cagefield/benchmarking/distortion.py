@@ -10,7 +10,7 @@ from cagefield.benchmarking.methods import BackwardMap
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell
 

@@ -12,7 +12,7 @@ import numpy as np
 from cagefield.benchmarking.cases import Case, relit
 from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen, shown
 from cagefield.benchmarking.distortion import Distortion, distortion
-from cagefield.benchmarking.figures import Figures, Pictures, compare, floats, mean_psnr, pooled_psnr
+from cagefield.benchmarking.figures import Figures, compare, floats, mean_psnr, pooled_psnr
 from cagefield.benchmarking.figures import changed_pixels as changed
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import Table, number
@@ -26,6 +26,7 @@ from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.voxel_config import VoxelConfig
+from cagefield.typing import AnyArray
 
 _TIMED_VIEWS, _ROUNDS = 2, 3
 
@@ -81,7 +82,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
     """The scores of the cases, in order; cases of one scene that follow each other share its pictures."""
     scene, name = None, ""
     perceived, _ = lpips()
-    unedited: dict[str, Pictures] = {}
+    unedited: dict[str, AnyArray] = {}
     for case in cases:
         if scene is None or case.scene != name:
             scene, name, unedited = bench.scene(case.scene), case.scene, {}
@@ -266,7 +267,7 @@ def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, erro
     """Writes before, edited and truth (and their difference, dark, three times as strong) side by side."""
     camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
-    before = cast(Pictures, shown(scene, camera).rgb8())
+    before = cast(AnyArray, shown(scene, camera).rgb8())
     after = shown(scene.with_edits(case.edits), camera).rgb8()
     truth = (
         bench.mapped(case.scene, case.edits, [camera]) if case.moved is None else bench.moved(case, [camera])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
 from cagefield.rendering.reference_renderer import PointMap
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.device_stack import DeviceStack
 
 _WITH_KERNEL = ("flow", "trilinear")

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.rendering.metrics import mse, psnr, ssim
-
-Pictures = NDArray[Any]
-"""[V,H,W,3], uint8 or floats in [0,1]: one picture a view, over white."""
+from cagefield.typing import AnyArray
 
 CHANGED = 4 / 255
 """A pixel is changed where a channel of the truth differs by more than this: above rounding and noise."""
@@ -50,7 +48,7 @@ class Figures:
 
 
 def compare(
-    unedited: Pictures, edited: Pictures, unedited_truth: Pictures, edited_truth: Pictures
+    unedited: AnyArray, edited: AnyArray, unedited_truth: AnyArray, edited_truth: AnyArray
 ) -> Figures:
     """The figures of one edit, from pictures of the same views."""
     there = changed_pixels(unedited_truth, edited_truth)
@@ -66,7 +64,7 @@ def compare(
     )
 
 
-def changed_pixels(before: Pictures, after: Pictures) -> NDArray[np.bool_]:
+def changed_pixels(before: AnyArray, after: AnyArray) -> NDArray[np.bool_]:
     """Mask [V,H,W] of the pixels that differ by more than CHANGED, and those within a 100th of the width."""
     difference = np.abs(floats(after) - floats(before)).max(axis=-1) > CHANGED
     reach = max(1, round(difference.shape[2] / 100))
@@ -74,14 +72,14 @@ def changed_pixels(before: Pictures, after: Pictures) -> NDArray[np.bool_]:
     return spread
 
 
-def pooled_psnr(first: Pictures, second: Pictures, mask: NDArray[np.bool_]) -> float:
+def pooled_psnr(first: AnyArray, second: AnyArray, mask: NDArray[np.bool_]) -> float:
     """PSNR over the masked pixels of all views together; NaN for an empty mask."""
     if not mask.any():
         return float("nan")
     return psnr(floats(first)[mask], floats(second)[mask])
 
 
-def mean_psnr(pictures: Pictures, truth: Pictures, where: NDArray[np.bool_] | None = None) -> float:
+def mean_psnr(pictures: AnyArray, truth: AnyArray, where: NDArray[np.bool_] | None = None) -> float:
     """Mean over views of the PSNR, of the pixels in the mask `where` [V,H,W] if one is given.
 
     inf only where all views are equal to the truth. A view without a pixel in the mask is passed over.
@@ -96,17 +94,17 @@ def mean_psnr(pictures: Pictures, truth: Pictures, where: NDArray[np.bool_] | No
     return float(np.mean(-10.0 * np.log10(np.maximum(errors, (0.5 / 255) ** 2 / 3))))
 
 
-def floats(pictures: Pictures) -> NDArray[np.float32]:
+def floats(pictures: AnyArray) -> NDArray[np.float32]:
     """The pictures as floats in [0,1]."""
     if pictures.dtype == np.uint8:
         return pictures.astype(np.float32) / np.float32(255.0)
     return np.clip(pictures, 0.0, 1.0).astype(np.float32)
 
 
-def stacked(pictures: Sequence[NDArray[Any]]) -> Pictures:
+def stacked(pictures: Sequence[NDArray[Any]]) -> AnyArray:
     """Pictures [H,W,3], one for each view, as one array."""
     return np.stack(pictures)
 
 
-def _mean_ssim(pictures: Pictures, truth: Pictures) -> float:
+def _mean_ssim(pictures: AnyArray, truth: AnyArray) -> float:
     return float(np.mean([ssim(floats(a), floats(b)) for a, b in zip(pictures, truth, strict=True)]))

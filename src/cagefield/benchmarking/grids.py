@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 
@@ -19,11 +18,10 @@ from cagefield.benchmarking.methods import BackwardMap, exact_map
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array, UInt8
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
-UInt8 = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 INNER, OUTER, VIEW = 0.3, 0.8, 0.86

@@ -15,8 +15,8 @@ from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.frame import Background, Frame
 from cagefield.training.splat_config import SplatConfig
+from cagefield.typing import Float32
 
-Float32 = NDArray[np.float32]
 Show = Callable[[Camera], Frame]
 CaptureField = Literal["splat", "voxel"]
 

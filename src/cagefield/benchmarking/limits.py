@@ -14,7 +14,7 @@ from cagefield.benchmarking.ablations import Ablation, title
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.compare import seen
 from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.figures import Pictures, changed_pixels, mean_psnr, pooled_psnr, stacked
+from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr, stacked
 from cagefield.benchmarking.strips import strip
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench, beside
@@ -23,6 +23,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural import ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.typing import AnyArray
 
 REACH = 60.0
 """Degrees to either side of a scene's picture within which the photos of its single-sided capture lie."""
@@ -42,10 +43,10 @@ def limits(case: Case, bench: Workbench, size: int) -> Ablation:
     shadow = changed_pixels(every.old_shadows, every.new_shadows)
     before = [n for n, camera in enumerate(tests) if beside(camera, front, REACH)]
 
-    def there(truth: Pictures) -> str:
+    def there(truth: AnyArray) -> str:
         return number(pooled_psnr(every.edited, truth, shadow))
 
-    def from_there(pictures: Pictures, truth: Pictures) -> str:
+    def from_there(pictures: AnyArray, truth: AnyArray) -> str:
         return number(mean_psnr(pictures[before], truth[before]) if before else float("nan"))
 
     rows = (
@@ -101,14 +102,14 @@ def limits(case: Case, bench: Workbench, size: int) -> Ablation:
 class _Shots:
     """Pictures [V,H,W,3] of the trained scene, edited or turned, and of the model, the same views each."""
 
-    edited: Pictures
-    old_shadows: Pictures
-    new_shadows: Pictures
-    one_side: Pictures
-    one_side_turned: Pictures
-    all_round_turned: Pictures
-    model: Pictures
-    turned: Pictures
+    edited: AnyArray
+    old_shadows: AnyArray
+    new_shadows: AnyArray
+    one_side: AnyArray
+    one_side_turned: AnyArray
+    all_round_turned: AnyArray
+    model: AnyArray
+    turned: AnyArray
 
 
 def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera]) -> _Shots:
@@ -130,7 +131,7 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
     )
 
 
-def photos(model: ProceduralScene, cameras: Sequence[Camera]) -> Pictures:
+def photos(model: ProceduralScene, cameras: Sequence[Camera]) -> AnyArray:
     """Photos [V,H,W,3] of a scene over white."""
     return stacked([model.photograph(camera, background="white").rgb8() for camera in cameras])
 

@@ -14,7 +14,7 @@ from cagefield.benchmarking.peers import PEERS, PeerShell
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps import SHELLS, Falloff, Shell
 from cagefield.warps.interfaces import Mapped
 

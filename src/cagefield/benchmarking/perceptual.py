@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.benchmarking.figures import Pictures, floats
+from cagefield.benchmarking.figures import floats
+from cagefield.typing import AnyArray
 
 WEIGHTS = "alexnet-owt-7be5be79.pth"
 """File of torchvision's AlexNet, on whose activations LPIPS is defined; in no package."""
 
-Distance = Callable[[Pictures, Pictures], float]
+Distance = Callable[[AnyArray, AnyArray], float]
 
 
 def lpips() -> tuple[Distance | None, str]:
@@ -37,7 +38,7 @@ def lpips() -> tuple[Distance | None, str]:
         # A torchvision that was built for another torch says so: "operator torchvision::nms does not exist".
         return None, f"LPIPS is left out; it cannot be imported: {error}"
 
-    def distance(pictures: Pictures, truth: Pictures) -> float:
+    def distance(pictures: AnyArray, truth: AnyArray) -> float:
         pairs: Sequence[tuple[Any, Any]] = list(zip(pictures, truth, strict=True))
         with torch.no_grad():
             return float(np.mean([network(_tensor(torch, a), _tensor(torch, b)).item() for a, b in pairs]))
@@ -45,6 +46,6 @@ def lpips() -> tuple[Distance | None, str]:
     return distance, ""
 
 
-def _tensor(torch: Any, picture: Pictures) -> Any:
+def _tensor(torch: Any, picture: AnyArray) -> Any:
     """[1,3,H,W] in [-1,1]."""
     return torch.from_numpy(2.0 * floats(picture).transpose(2, 0, 1)[None] - 1.0)

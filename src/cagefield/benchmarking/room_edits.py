@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.captures import Float32, gains_to
+from cagefield.benchmarking.captures import gains_to
 from cagefield.benchmarking.cases import ROOM_CASES, Case
 from cagefield.benchmarking.figures import Figures, compare
 from cagefield.benchmarking.learning import Learnt
@@ -27,6 +27,7 @@ from cagefield.datasets.procedural import capture
 from cagefield.datasets.procedural.hand_held import picture
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import side_by_side, write_png
+from cagefield.typing import Float32
 
 _ROUNDS = 5
 _EYES = {"room-digger": ((1.7, -2.9, 1.75), (-0.05, -0.1, 0.5))}

@@ -11,8 +11,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from cagefield.benchmarking.figures import floats
 from cagefield.errors import CagefieldError
+from cagefield.typing import UInt8
 
-UInt8 = NDArray[np.uint8]
 Panel = tuple[str, NDArray[Any]]
 """A caption and a picture [H,W,3], uint8 or floats in [0,1]."""
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.parts import Part, apply
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.tracing import trace
-
-Mask = NDArray[np.bool_]
+from cagefield.typing import Mask
 
 REACH = 0.008
 """A photo's ray may end within this distance of a surface, in world units: a voxel. It is followed to a point

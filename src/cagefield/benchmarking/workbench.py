@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import cagefield
 from cagefield.benchmarking.cases import Case
@@ -39,9 +38,8 @@ from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
+from cagefield.typing import Mask, UInt8
 
-UInt8 = NDArray[np.uint8]
-Mask = NDArray[np.bool_]
 Move = Callable[[float, float, str], None]
 Bar = Callable[[str], AbstractContextManager[Move]]
 

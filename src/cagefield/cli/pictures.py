@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import replaced_whole, side_by_side, write_png
+from cagefield.typing import AnyArray
 
-Array = npt.NDArray[Any]
-Pictures = dict[str, Array]
+Pictures = dict[str, AnyArray]
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class DepthScale:
     far: float
 
     @classmethod
-    def fitted(cls, depths: Sequence[Array]) -> DepthScale:
+    def fitted(cls, depths: Sequence[AnyArray]) -> DepthScale:
         """The scale that spreads the finite distances, their nearest and farthest hundredth left out."""
         finite = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
         if finite.size == 0:
@@ -34,7 +32,7 @@ class DepthScale:
         near = max(float(near), 1e-6)
         return cls(near, max(float(far), 1.01 * near))
 
-    def picture(self, depth: Array) -> Array:
+    def picture(self, depth: AnyArray) -> AnyArray:
         """Grey picture [H,W,3] in [0,1]; black where nothing is seen."""
         inverse = 1.0 / np.maximum(depth, 1e-6)
         grey = (inverse - 1.0 / self.far) / (1.0 / self.near - 1.0 / self.far)
@@ -59,7 +57,7 @@ def pictures_of(frames: Sequence[Frame], depth_scale: DepthScale | None = None) 
     return pictures
 
 
-def in_one_row(pictures: Pictures) -> Array:
+def in_one_row(pictures: Pictures) -> AnyArray:
     """The pictures beside one another, for a video."""
     return side_by_side(*(picture for end, picture in pictures.items() if end.endswith(".png")))
 

@@ -13,7 +13,7 @@ from cagefield import trilinear_hex
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.splat import SplatField
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 
 if TYPE_CHECKING:

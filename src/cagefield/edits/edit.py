@@ -16,7 +16,7 @@ from cagefield.edits import operations as ops
 from cagefield.edits.limits import flow_reach
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps import FALLOFFS, SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp

@@ -45,7 +45,7 @@ from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 VERSION = 1
 _SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")

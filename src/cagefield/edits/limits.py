@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cages import Cage, factors
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Operation, Rotate, Scale, Translate
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell
 
 PARTS = 16

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cagefield.edits.edit import Edit, bounds_of
 from cagefield.errors import EditError
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 
 @dataclass(frozen=True)

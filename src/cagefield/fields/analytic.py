@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import erf
 
 from cagefield.errors import FieldError
-
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from cagefield.typing import Array, Float32
 
 GAUSSIAN_REACH = 5.0
 """Standard deviations after which a blob is no longer sampled: exp(-12.5) = 3.7e-6 of the peak."""

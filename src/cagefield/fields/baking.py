@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,9 +31,7 @@ from cagefield.fields.contraction import contract, uncontract
 from cagefield.fields.protocol import Field
 from cagefield.fields.splat import SplatField, rotation_matrices
 from cagefield.fields.voxel import VoxelField
-
-Float32 = NDArray[np.float32]
-Array = NDArray[Any]
+from cagefield.typing import AnyArray, Float32
 
 BACK = 0.02
 """Weight of a direction from which a vertex is seen through its own surface."""
@@ -141,27 +138,27 @@ class _Grid:
     """
 
     def __init__(
-        self, lower: Array, edge: float, shape: tuple[int, ...], interest: Array | None = None
+        self, lower: AnyArray, edge: float, shape: tuple[int, ...], interest: AnyArray | None = None
     ) -> None:
         self.lower, self.edge, self.shape, self.interest = lower, edge, shape, interest
 
     @classmethod
-    def within(cls, box: Array, resolution: int) -> _Grid:
+    def within(cls, box: AnyArray, resolution: int) -> _Grid:
         size = box[1] - box[0]
         edge = float(size.max()) / (resolution - 1)
         return cls(box[0], edge, tuple(max(2, int(np.ceil(s / edge - 1e-6)) + 1) for s in size))
 
     @classmethod
-    def contracting(cls, interest: Array, resolution: int) -> _Grid:
+    def contracting(cls, interest: AnyArray, resolution: int) -> _Grid:
         """The grid of all of space, contracted around the box of interest."""
         edge = 2.0 * float((interest[1] - interest[0]).max()) / (resolution - 1)
         return cls(np.full(3, -2.0), edge, (resolution,) * 3, interest)
 
     @property
-    def bounds(self) -> Array:
+    def bounds(self) -> AnyArray:
         return np.stack([self.lower, self.lower + (np.array(self.shape) - 1) * self.edge])
 
-    def steps_at(self, positions: Array) -> Array:
+    def steps_at(self, positions: AnyArray) -> AnyArray:
         """World displacements [N,3,3] (columns) of one step along each axis of the grid, at positions [N,3].
 
         With c contracted, M = max|c| > 1 on axis k, uncontract(c) = c / (M (2 - M)) has the derivative
@@ -180,7 +177,7 @@ class _Grid:
         J[np.arange(len(c)), :, axis] += c * slope[:, None]
         return half[:, None] * J * (4.0 / (np.array(self.shape) - 1))
 
-    def positions(self, vertices: Array) -> Float32:
+    def positions(self, vertices: AnyArray) -> Float32:
         if self.interest is None:
             return (self.lower + vertices * self.edge).astype(np.float32)
         cube = -2.0 + 4.0 * vertices / (np.array(self.shape) - 1)
@@ -201,13 +198,13 @@ def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask
 
 
-def _empty(box: Array) -> FieldError:
+def _empty(box: AnyArray) -> FieldError:
     return FieldError(
         f"the field is empty in {box.tolist()}: nothing to bake; train it further or give other bounds"
     )
 
 
-def _content(density: _Density, box: Array, opacity: float, report: Callable[[float], None]) -> Array:
+def _content(density: _Density, box: AnyArray, opacity: float, report: Callable[[float], None]) -> AnyArray:
     """The part of `box` that holds density, by 96 vertices along its longest axis, widened by one."""
     grid = _Grid.within(box, 96)
     density = density.on(grid)
@@ -248,7 +245,7 @@ def _candidates(
 class _Density:
     """Density [N] of positions [N,3], seen from where the cameras stand on average, else along -z."""
 
-    def __init__(self, field: Field, eye: Array | None) -> None:
+    def __init__(self, field: Field, eye: AnyArray | None) -> None:
         self.field, self.eye = field, eye
         self.signed = getattr(field, "signed_density", None)
 
@@ -272,7 +269,7 @@ class _Density:
         return sigma
 
 
-def surrounding(field: SplatField, eyes: Array) -> NDArray[np.bool_]:
+def surrounding(field: SplatField, eyes: AnyArray) -> NDArray[np.bool_]:
     """True [N] for splats that have one of the eyes [E,3] within 2 standard deviations."""
     axes = (
         rotation_matrices(field.quaternions.astype(np.float64))
@@ -284,7 +281,7 @@ def surrounding(field: SplatField, eyes: Array) -> NDArray[np.bool_]:
     return found
 
 
-def widened(field: SplatField, widths: Array) -> SplatField:
+def widened(field: SplatField, widths: AnyArray) -> SplatField:
     """The splats convolved with Gaussians of covariances W W^T, `widths` W [N,3,3] in world units.
 
     The opacity of each falls as the area grows that it covers across its thinnest axis.
@@ -309,7 +306,7 @@ def widened(field: SplatField, widths: Array) -> SplatField:
     )
 
 
-def _gradient(sigma: Float32, vertices: Array) -> Float32:
+def _gradient(sigma: Float32, vertices: AnyArray) -> Float32:
     """Central differences [M,3] of a grid at vertices [M,3]; one-sided at its faces."""
     last = np.array(sigma.shape) - 1
     slopes = np.empty((len(vertices), 3), np.float32)
@@ -330,7 +327,7 @@ def _colours(field: Field, positions: Float32, along: Float32) -> Float32:
     return field(np.repeat(positions, views, axis=0), along.reshape(-1, 3))[1].reshape(n, views, 3)
 
 
-def _directions(points: Float32, eyes: Array | None, views: int, chance: np.random.Generator) -> Float32:
+def _directions(points: Float32, eyes: AnyArray | None, views: int, chance: np.random.Generator) -> Float32:
     """Unit directions [N,K,3] into the scene, from the eyes or from all around."""
     away = np.asarray(chance.normal(size=(len(points), views, 3)))
     if eyes is not None:
@@ -356,7 +353,7 @@ def _blocks(count: int, size: int) -> Iterator[slice]:
         yield slice(start, min(start + size, count))
 
 
-def _plane(shape: tuple[int, ...], index: int) -> Array:
+def _plane(shape: tuple[int, ...], index: int) -> AnyArray:
     """Vertices [M,3] of plane `index` along the first axis."""
     j, k = np.meshgrid(np.arange(shape[1]), np.arange(shape[2]), indexing="ij")
     return np.stack([np.full(j.size, index), j.ravel(), k.ravel()], axis=1)

@@ -29,11 +29,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
+from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.fields.nerf_torch import TorchNerf
 
-Float32 = NDArray[np.float32]
 
 MAX_FREQUENCIES = 32
 """More octaves than float32 can tell apart are a misread shape."""

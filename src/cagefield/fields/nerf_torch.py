@@ -16,7 +16,8 @@ from torch.nn.functional import linear
 from cagefield import devices
 
 if TYPE_CHECKING:
-    from cagefield.fields.nerf import Float32, Linear, Mlp, NerfField
+    from cagefield.fields.nerf import Linear, Mlp, NerfField
+    from cagefield.typing import Float32
 
 BLOCK = {"cpu": 1 << 12, "cuda": 1 << 19}
 """Positions that go through a network at a time where no gradients are kept: on a CPU, what caches hold."""

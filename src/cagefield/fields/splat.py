@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
+from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.fields.splat_mixture import SplatMixture
 
-Float32 = NDArray[np.float32]
 
 FORMAT_VERSION = "1"
 

@@ -44,11 +44,11 @@ from numpy.typing import NDArray
 
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
+from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.fields.splat import SplatField
 
-Float32 = NDArray[np.float32]
 
 MAX_OPACITY = 0.99
 """Highest opacity of a splat, in pictures as here, where an opaque one would have no finite density."""

@@ -22,7 +22,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +31,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.ply import Columns, read_ply
 from cagefield.rendering.images import replaced_whole
-
-Array = NDArray[Any]
+from cagefield.typing import AnyArray
 
 CHUNK = 256
 """Splats that share a chunk of a compressed file."""
@@ -91,7 +89,7 @@ def write_splat_ply(path: str | Path, field: SplatField) -> None:
     """Writes the splats in 3DGS' layout, complete or not at all."""
     rest = np.zeros((len(field), 0)) if field.sh_degree == 0 else field.sh[:, 1:].transpose(0, 2, 1)
     opacity = np.clip(field.opacities.astype(np.float64), 1e-7, 1.0 - 1e-7)
-    groups: Sequence[tuple[Sequence[str], Array]] = (
+    groups: Sequence[tuple[Sequence[str], AnyArray]] = (
         (("x", "y", "z"), field.means),
         (("nx", "ny", "nz"), np.zeros((len(field), 3))),
         (_names("f_dc_", 3), field.sh[:, 0]),
@@ -113,7 +111,7 @@ def _names(stem: str, count: int) -> tuple[str, ...]:
     return tuple(f"{stem}{index}" for index in range(count))
 
 
-def _plain(path: Path, vertex: Columns) -> tuple[Array, Array, Array, Array, Array]:
+def _plain(path: Path, vertex: Columns) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray, AnyArray]:
     """(means, log scales, quaternions, opacities, harmonics) of 3DGS' layout."""
     dc = _names("f_dc_", 3) if "f_dc_0" in vertex else ("red", "green", "blue")
     missing = [name for name in (*_SHAPE, *dc) if name not in vertex]
@@ -138,7 +136,7 @@ def _plain(path: Path, vertex: Columns) -> tuple[Array, Array, Array, Array, Arr
     )
 
 
-def _harmonics(path: Path, dc: Array, columns: Columns) -> Array:
+def _harmonics(path: Path, dc: AnyArray, columns: Columns) -> AnyArray:
     """Coefficients [N,(degree+1)^2,3] of those of degree 0 [N,3] and the columns f_rest_*."""
     count = sum(name.startswith("f_rest_") for name in columns)
     if count not in _REST or any(name not in columns for name in _names("f_rest_", count)):
@@ -151,7 +149,7 @@ def _harmonics(path: Path, dc: Array, columns: Columns) -> Array:
 
 def _unpacked(
     path: Path, vertex: Columns, chunk: Columns, harmonics: Columns
-) -> tuple[Array, Array, Array, Array, Array]:
+) -> tuple[AnyArray, AnyArray, AnyArray, AnyArray, AnyArray]:
     """(means, log scales, quaternions, opacities, harmonics) of a compressed file."""
     packed = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
     limits = [f"{end}_{part}" for part in ("x", "scale_x") for end in ("min", "max")]
@@ -182,14 +180,14 @@ def _unpacked(
     )
 
 
-def _bits(values: NDArray[np.uint32], *fields: tuple[int, int]) -> Array:
+def _bits(values: NDArray[np.uint32], *fields: tuple[int, int]) -> AnyArray:
     """Bit fields (shift, width) of numbers [N] as [N,fields] from 0 to 1."""
     return np.stack(
         [(values >> shift & (1 << width) - 1) / ((1 << width) - 1) for shift, width in fields], axis=1
     )
 
 
-def _between(chunk: Columns, stem: str, parts: Iterable[str], row: Array, share: Array) -> Array:
+def _between(chunk: Columns, stem: str, parts: Iterable[str], row: AnyArray, share: AnyArray) -> AnyArray:
     """Values [N,3] at the given shares [N,3] of the way from their chunk's minimum to its maximum.
 
     A scale of 0 has the logarithm -inf, which is cut first: no value can lie between it and another.
@@ -200,7 +198,7 @@ def _between(chunk: Columns, stem: str, parts: Iterable[str], row: Array, share:
     return low[row] * (1.0 - share) + high[row] * share
 
 
-def _smallest_three(packed: NDArray[np.uint32]) -> Array:
+def _smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
     """Quaternions [N,4] (w x y z) of three components, sqrt(2) (0..1 - .5), and the index of the largest."""
     others = (_bits(packed, (20, 10), (10, 10), (0, 10)) - 0.5) * np.sqrt(2.0)
     largest = (packed >> 30).astype(np.int64)
@@ -212,7 +210,7 @@ def _smallest_three(packed: NDArray[np.uint32]) -> Array:
     return quaternions
 
 
-def _stack(columns: Columns, names: Iterable[str]) -> Array:
+def _stack(columns: Columns, names: Iterable[str]) -> AnyArray:
     return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
 
 

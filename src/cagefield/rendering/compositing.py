@@ -8,41 +8,40 @@ Source: Max, "Optical models for direct volume rendering" (1995); Mildenhall et 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from cagefield.typing import AnyArray
 
 
 class Composite(NamedTuple):
     """Sums along rays: premultiplied [...,3], opacity and depth [...] (inf at opacity 0), weights [...,S]."""
 
-    premultiplied: Array
-    opacity: Array
-    depth: Array
-    weights: Array
+    premultiplied: AnyArray
+    opacity: AnyArray
+    depth: AnyArray
+    weights: AnyArray
 
 
-def alpha(sigma: Array, delta: Array) -> Array:
+def alpha(sigma: AnyArray, delta: AnyArray) -> AnyArray:
     """Share of light absorbed by each segment: 1 - exp(-sigma delta), exact for small arguments."""
     return -np.expm1(-sigma * delta)
 
 
-def transmittance(sigma: Array, delta: Array) -> Array:
+def transmittance(sigma: AnyArray, delta: AnyArray) -> AnyArray:
     """Share of light that reaches the start of each segment: exp(-sum_{j<i} sigma_j delta_j)."""
     tau = np.cumsum(sigma * delta, axis=-1)
     before = np.concatenate([np.zeros_like(tau[..., :1]), tau[..., :-1]], axis=-1)
     return np.exp(-before)
 
 
-def weights(sigma: Array, delta: Array) -> Array:
+def weights(sigma: AnyArray, delta: AnyArray) -> AnyArray:
     """Contribution of each sample: T_i alpha_i; they add up to the opacity."""
     return transmittance(sigma, delta) * alpha(sigma, delta)
 
 
-def composite(sigma: Array, rgb: Array, t: Array, delta: Array) -> Composite:
+def composite(sigma: AnyArray, rgb: AnyArray, t: AnyArray, delta: AnyArray) -> Composite:
     """Premultiplied colour, opacity, expected depth and weights of rays.
 
     sigma, t, delta [...,S]; rgb [...,S,3]. Depth is sum(w t) / sum(w). Exact when sigma and rgb are constant

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
-
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
 
 
 @dataclass(frozen=True, eq=False)

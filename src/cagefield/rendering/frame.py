@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import CagefieldError
+from cagefield.typing import Float32
 
-Float32 = NDArray[np.float32]
 Background = str | Sequence[float] | NDArray[Any] | None
 
 _NAMED = {"white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0)}

@@ -21,7 +21,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.kernels.grid import GridArgs
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 from cagefield.rendering.occupancy import Occupancy
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 BRICK = 4
 

@@ -15,8 +15,7 @@ from PIL import Image, UnidentifiedImageError
 
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.rendering.frame import to_uint8
-
-UInt8 = NDArray[np.uint8]
+from cagefield.typing import UInt8
 
 
 @contextmanager

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
 from cagefield.errors import CagefieldError
-
-Image = NDArray[Any]
+from cagefield.typing import AnyArray
 
 WINDOW, WINDOW_SIGMA = 11, 1.5
 K1, K2 = 0.01, 0.03
 
 
-def _pair(first: Image, second: Image) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     first, second = np.asarray(first), np.asarray(second)
     if first.shape != second.shape or first.size == 0:
         raise CagefieldError(
@@ -26,19 +23,19 @@ def _pair(first: Image, second: Image) -> tuple[NDArray[np.float64], NDArray[np.
     return floats[0], floats[1]
 
 
-def mse(first: Image, second: Image) -> float:
+def mse(first: AnyArray, second: AnyArray) -> float:
     """Mean squared difference over all pixels and channels."""
     a, b = _pair(first, second)
     return float(np.mean((a - b) ** 2))
 
 
-def psnr(first: Image, second: Image) -> float:
+def psnr(first: AnyArray, second: AnyArray) -> float:
     """Peak signal-to-noise ratio in dB: -10 log10(mse); inf for equal images."""
     error = mse(first, second)
     return float("inf") if error == 0 else float(-10.0 * np.log10(error))
 
 
-def ssim(first: Image, second: Image) -> float:
+def ssim(first: AnyArray, second: AnyArray) -> float:
     """Mean structural similarity of [H,W] or [H,W,C] images: 1 for equal images.
 
     11x11 Gaussian window with standard deviation 1.5, only where it fits the image; K1 = .01, K2 = .03,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
 

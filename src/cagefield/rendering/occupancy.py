@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.fields.voxel import VoxelField
+from cagefield.typing import UInt8
 
 BRICK = 4
 MAX_LEAP = 16
@@ -27,8 +28,6 @@ FEW = 4
 
 FULL = 255
 """Mask of a brick whose sub-blocks are all occupied."""
-
-Masks = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +44,12 @@ class Occupancy:
     codes: NDArray[np.int32]
 
     @classmethod
-    def from_masks(cls, origin: NDArray[np.int64], masks: Masks, leap: int = MAX_LEAP) -> Occupancy:
+    def from_masks(cls, origin: NDArray[np.int64], masks: UInt8, leap: int = MAX_LEAP) -> Occupancy:
         """The occupancy of bricks with these masks; rays leap over at most `leap` bricks at a time."""
         return cls(origin, encode(masks, leap))
 
     @property
-    def masks(self) -> Masks:
+    def masks(self) -> UInt8:
         """[bx, by, bz], the bits of the occupied sub-blocks of each brick."""
         return self.codes.astype(np.uint8)
 
@@ -62,7 +61,7 @@ class Occupancy:
         return bits.reshape(x, y, z, 2, 2, 2).transpose(0, 3, 1, 4, 2, 5).reshape(2 * x, 2 * y, 2 * z)
 
 
-def masks_of(blocks: NDArray[np.bool_]) -> Masks:
+def masks_of(blocks: NDArray[np.bool_]) -> UInt8:
     """Masks [bx,by,bz] of occupied sub-blocks [2bx,2by,2bz]."""
     # Pairs along z, y, x become 2, 4, 8 bits of a byte.
     pairs = np.ascontiguousarray(blocks).view("<u2")
@@ -71,7 +70,7 @@ def masks_of(blocks: NDArray[np.bool_]) -> Masks:
     return np.asarray(faces[0::2] + np.uint8(16) * faces[1::2])
 
 
-def encode(masks: Masks, leap: int = MAX_LEAP) -> NDArray[np.int32]:
+def encode(masks: UInt8, leap: int = MAX_LEAP) -> NDArray[np.int32]:
     """Codes [bx,by,bz] of bricks with these masks, D at most `leap`."""
     empty = masks == 0
     if empty.all():

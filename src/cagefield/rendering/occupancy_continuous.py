@@ -26,9 +26,8 @@ from cagefield.rendering.kernels.occupancy_continuous import dense_blocks, occup
 from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS
 from cagefield.rendering.mapped_points import images_of
 from cagefield.rendering.occupancy import BRICK, Occupancy, cubes
+from cagefield.typing import Mask
 from cagefield.warps.device_stack import DeviceStack
-
-Mask = NDArray[np.bool_]
 
 
 def near_bricks(

@@ -14,8 +14,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
 from cagefield.rendering.compositing import composite
 from cagefield.rendering.frame import Background, Frame
-
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
 
 NORMAL_WEIGHT = 1e-4
 """Samples that contribute less than this to a pixel do not get a normal."""

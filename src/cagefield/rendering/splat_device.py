@@ -20,14 +20,8 @@ from cagefield.rendering.grid import to_device
 from cagefield.rendering.kernels import splat_device as kernels
 from cagefield.rendering.kernels.splat_blending import SUMS
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
-from cagefield.rendering.splat_rasterizer import (
-    DEPTH,
-    Float32,
-    Region,
-    intrinsics,
-    untiled,
-    world_to_camera,
-)
+from cagefield.rendering.splat_rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
+from cagefield.typing import Float32
 
 _FARTHEST = 1e9
 """Largest |(x/z, y/z)| that float32 squares."""

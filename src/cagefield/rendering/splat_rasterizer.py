@@ -19,8 +19,8 @@ from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.kernels import splat_blending, splat_projection
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
+from cagefield.typing import Float32
 
-Float32 = NDArray[np.float32]
 Region = tuple[int, int, int, int]
 
 _LOCK = threading.RLock()

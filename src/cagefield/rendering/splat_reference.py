@@ -9,7 +9,6 @@ Source: Zwicker et al., "EWA splatting" (2002), equations 24 to 34; Kerbl et al.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,7 @@ from cagefield import lenses, sh
 from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.frame import Background, Frame
-
-Array = NDArray[Any]
+from cagefield.typing import AnyArray
 
 BLUR, SLOPE_BLUR, ALPHA_MIN, ALPHA_MAX = 0.3, 0.02, 1.0 / 255.0, 0.99
 LEAST_COMPENSATION = 0.005
@@ -34,16 +32,16 @@ class ProjectedSplats:
     """
 
     rows: NDArray[np.int64]
-    means: Array
-    conics: Array
-    opacities: Array
-    colours: Array
-    distances: Array
-    slopes: Array
+    means: AnyArray
+    conics: AnyArray
+    opacities: AnyArray
+    colours: AnyArray
+    distances: AnyArray
+    slopes: AnyArray
 
 
 def project(
-    splats: DeformedSplats, camera: Camera, near: float, limits: Array | None = None
+    splats: DeformedSplats, camera: Camera, near: float, limits: AnyArray | None = None
 ) -> ProjectedSplats:
     """The splats as the camera sees them; `limits` [4] bound n where shapes are taken (None: no bounds)."""
     W = np.diag([1.0, -1.0, -1.0]) @ camera.c2w[:3, :3].T
@@ -74,7 +72,7 @@ def project(
     return ProjectedSplats(rows, means, conics, opacities, np.maximum(colours, 0.0), distance, slopes)
 
 
-def blend(seen: ProjectedSplats, width: int, height: int) -> tuple[Array, Array, Array]:
+def blend(seen: ProjectedSplats, width: int, height: int) -> tuple[AnyArray, AnyArray, AnyArray]:
     """(colour [H,W,3] without background, T [H,W], depth times weight [H,W])."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     colour, through, depth = np.zeros((height, width, 3)), np.ones((height, width)), np.zeros((height, width))
@@ -95,7 +93,7 @@ def render(
     *,
     near: float,
     background: Background = "white",
-    limits: Array | None = None,
+    limits: AnyArray | None = None,
 ) -> Frame:
     """The frame that the camera sees."""
     colour, through, depth = blend(project(splats, camera, near, limits), camera.width, camera.height)
@@ -105,7 +103,7 @@ def render(
     return Frame.from_premultiplied(colour, opacity, distance, background=background)
 
 
-def _jacobians(p: Array, camera: Camera, limits: Array | None) -> Array:
+def _jacobians(p: AnyArray, camera: Camera, limits: AnyArray | None) -> AnyArray:
     """d(pixel)/d(p) [N,2,3] at camera points [N,3], n within the limits; central differences of the lens."""
     n = p[:, :2] / p[:, 2:]
     if limits is not None:
@@ -124,6 +122,6 @@ def _jacobians(p: Array, camera: Camera, limits: Array | None) -> Array:
     return np.array([camera.fx, camera.fy])[:, None] * (D @ flat) / p[:, 2, None, None]
 
 
-def _full(six: Array) -> Array:
+def _full(six: AnyArray) -> AnyArray:
     """Symmetric matrices [N,3,3] of their values xx, xy, xz, yy, yz, zz [N,6]."""
     return six[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)

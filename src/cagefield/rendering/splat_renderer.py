@@ -19,12 +19,12 @@ from cagefield.rendering.splat_rasterizer import (
     DEPTH,
     NORMALS,
     Buffers,
-    Float32,
     Projection,
     Region,
     near_depth,
     project,
 )
+from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_device import DeviceProjection, SplatArrays

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.rendering.splat_rasterizer import intrinsics, kernels, world_to_camera
-
-Array = NDArray[np.float64]
+from cagefield.typing import Array
 
 NEIGHBOURS = 4
 """Photos that each photo is compared with."""

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from cagefield.cameras import Camera
 from cagefield.fields.splat import rotation_matrices
 from cagefield.training.splat_state import SplatState
-
-Array = NDArray[np.float64]
+from cagefield.typing import Array
 
 FROM = 0.1
 """Progress from which poses are refined: before, the splats are too coarse to tell."""

@@ -21,8 +21,7 @@ from cagefield.training.plane_sweep import CLEAR, find_surfaces
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import TrainingView
-
-Array = NDArray[np.float64]
+from cagefield.typing import Array
 
 FAR = 10.0
 """Radius of the background's sphere, in median distances of the cameras from the centre of interest."""

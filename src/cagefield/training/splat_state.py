@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from cagefield.fields.splat import SplatField
 from cagefield.training.kernels.splat_chain import CURVATURES, GRADIENTS
 from cagefield.training.kernels.splat_step import MOMENTS, RUNNING
-
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
 
 
 @dataclass(eq=False)

@@ -8,9 +8,8 @@ from typing import Any
 from weakref import ref
 
 import numpy as np
-from numpy.typing import NDArray
 
-Rows = NDArray[np.float32]
+from cagefield.typing import Float32
 
 
 class Joined:
@@ -25,7 +24,7 @@ class Joined:
         self._made: list[_Made] = []
         self._lock = Lock()
 
-    def join(self, parts: Sequence[Rows]) -> Rows:
+    def join(self, parts: Sequence[Float32]) -> Float32:
         """The parts [N,3] one after the other, read-only. Views of it do not outlive it."""
         with self._lock:
             lengths = [len(part) for part in parts]
@@ -44,14 +43,14 @@ class _Made:
     def __init__(self, lengths: list[int]) -> None:
         self.lengths = lengths
         self._rows = np.empty((sum(lengths), 3), dtype=np.float32)
-        self._parts: list[Rows | None] = [None] * len(lengths)
+        self._parts: list[Float32 | None] = [None] * len(lengths)
         self._held: ref[Any] | None = None
 
     @property
     def is_free(self) -> bool:
         return self._held is None or self._held() is None
 
-    def filled(self, parts: Sequence[Rows]) -> Rows:
+    def filled(self, parts: Sequence[Float32]) -> Float32:
         at = 0
         for n, part in enumerate(parts):
             if self._parts[n] is not part:

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 from cagefield.warps.extended_coordinates import Extended, slope_columns, straightened_slope
 from cagefield.warps.trilinear_bend import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
 

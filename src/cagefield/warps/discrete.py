@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.interfaces import Mapped
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.trilinear_bend import AXES, SIGNS, bends, bends_one_to_one, forms
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 FALLOFFS: tuple[str, ...] = ("smooth", "linear")
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from cagefield.cages import Cage, are_valid
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 from cagefield.warps.cage_motion import TIMES, Motion, gaps, may_bend
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.falloff import Falloff

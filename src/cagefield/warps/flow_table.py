@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.trilinear_bend import forms
 

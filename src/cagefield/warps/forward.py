@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table_along

@@ -9,7 +9,7 @@ import numpy as np
 
 from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import BITS, Array
+from cagefield.trilinear_hex import BITS
+from cagefield.typing import Array
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cagefield import trilinear_hex
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 STEPS = 40
 """Most steps of Newton's method; all but points in nearly flat cages need three."""

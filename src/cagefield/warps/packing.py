@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cagefield import trilinear_hex
 from cagefield.errors import EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.flow_shell import FlowShell

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield import trilinear_hex
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 BENDS = [3, 5, 6, 7]
 AXES = [1, 2, 4]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cagefield import trilinear_hex
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 from cagefield.warps.inner_map import between
 
 LEAST_RATIO = 1e-3

@@ -7,19 +7,17 @@ from functools import wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-import numpy as np
-from numpy.typing import NDArray
+from cagefield.typing import Float32
 
 Source = TypeVar("Source")
-Numbers = NDArray[np.float32]
 
 
-def kept(make: Callable[[Source], Numbers]) -> Callable[[Source], Numbers]:
+def kept(make: Callable[[Source], Float32]) -> Callable[[Source], Float32]:
     """`make`, called once for each source while it lives; what it returns becomes read-only."""
-    known: WeakKeyDictionary[Source, Numbers] = WeakKeyDictionary()
+    known: WeakKeyDictionary[Source, Float32] = WeakKeyDictionary()
 
     @wraps(make)
-    def once(source: Source) -> Numbers:
+    def once(source: Source) -> Float32:
         found = known.get(source)
         if found is None:
             found = make(source)

@@ -17,7 +17,7 @@ from cagefield.benchmarking.peers.harmonic import HarmonicShell
 from cagefield.benchmarking.peers.mean_value import MeanValueShell
 from cagefield.cages import Cage
 from cagefield.errors import EditError
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 
 class BackwardShell(Protocol):

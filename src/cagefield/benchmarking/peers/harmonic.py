@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from cagefield.cages import Cage
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Int, Mask
 from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
@@ -23,8 +22,6 @@ _MOST_STEPS = 2000
 _BISECTIONS = 24
 _LEAST_SHARE = 1e-3
 """A surface is taken to be at least this share of the spacing away from a node of the shell."""
-
-Int = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cagefield import trilinear_hex
 from cagefield.cages import FACES, Cage
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array, Int
 from cagefield.warps.inner_map import HexahedronMap
-
-Int = NDArray[np.intp]
 
 _NEAR = 1e-7
 """Points nearer to a triangle's plane than this share of the mesh are taken three times as far beside it."""

@@ -17,9 +17,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.parts import apply
 from cagefield.datasets.procedural.scene import ProceduralScene
-
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from cagefield.typing import Array, Float32
 
 EDGE = 0.03
 """A pixel is looked at more closely where it differs from a neighbour by more than this."""

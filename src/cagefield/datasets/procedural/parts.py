@@ -16,10 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.datasets.procedural.shapes import Shape
 from cagefield.datasets.procedural.textures import Texture
-
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.intp]
+from cagefield.typing import Array, Float32, Int
 
 
 def affine(

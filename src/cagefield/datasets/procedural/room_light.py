@@ -16,14 +16,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cagefield.datasets.procedural.occlusion import Occlusion
 from cagefield.datasets.procedural.parts import Part
 from cagefield.datasets.procedural.shading import dot
+from cagefield.typing import Float32
 
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 Vector = tuple[float, float, float]
 
 AMBIENT = np.array([0.58, 0.575, 0.56], np.float32)

@@ -22,8 +22,7 @@ from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
 from cagefield.datasets.procedural.tracing import Hits, trace
 from cagefield.errors import SceneError
 from cagefield.rendering.frame import Background, Frame
-
-Array = NDArray[np.float64]
+from cagefield.typing import Array
 
 
 @dataclass(frozen=True)

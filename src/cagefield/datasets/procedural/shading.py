@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
 
 
 def _unit(x: float, y: float, z: float) -> Float32:

@@ -14,9 +14,9 @@ from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
+
 Polygon = tuple[tuple[float, float], ...]
 
 

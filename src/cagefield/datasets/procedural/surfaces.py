@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from cagefield.datasets.procedural.parts import Placed, apply
 from cagefield.datasets.procedural.shading import Light, shade
+from cagefield.typing import Float32, Int
 
-Float32 = NDArray[np.float32]
-Int = NDArray[np.intp]
 Openness = Callable[[Float32, Float32], Float32]
 
 DEPTH = 2.0

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-Float32 = NDArray[np.float32]
+from cagefield.typing import Float32
+
 Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from cagefield.datasets.procedural.parts import Placed
 from cagefield.datasets.procedural.shapes import Shape
-
-Float32 = NDArray[np.float32]
-Int = NDArray[np.intp]
+from cagefield.typing import Float32, Int
 
 TOLERANCE = 2e-4
 """World distance at which a ray has arrived: a thirtieth of a pixel of a 400x400 view from distance 4."""

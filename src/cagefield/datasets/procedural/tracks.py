@@ -18,9 +18,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter, mini
 
 from cagefield import lenses
 from cagefield.cameras import Camera
-
-Array = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from cagefield.typing import Array, Float32
 
 NOISE = 0.7
 """Deviation of a sighting, in pixels along each axis."""

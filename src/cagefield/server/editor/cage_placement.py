@@ -9,7 +9,7 @@ from cagefield import trilinear_hex
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import EditError
-from cagefield.trilinear_hex import Array, Mask
+from cagefield.typing import Array, Mask
 
 SHARE_OF_VIEW = 0.22
 """Edge of a new inner cage, as a share of the picture's height at the surface's distance."""

@@ -14,7 +14,7 @@ from cagefield.cages import FACES, Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 
 def mirrored(edit: Edit, axis: int, at: float) -> Edit:

@@ -28,7 +28,7 @@ from cagefield.server.editor.mirror import mirrored
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.editor.path_preview import Preview
 from cagefield.server.editor.validity import problem
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 LATTICE = 64
 """Lattice nodes along an axis of a new continuous edit."""

@@ -19,7 +19,7 @@ from cagefield.server.editor.edit_kinds import kind_of
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, operation_messages, server_messages
 from cagefield.server.protocol.common import Corners, Vec3
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 STILLS_PER_SECOND, MOST_STILLS = 30.0, 6000
 """How densely pages are told of a camera path; a longer one has them further apart."""

@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 
 from cagefield.cameras import Camera
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 Rect: TypeAlias = tuple[float, float, float, float]
 """Left, top, right, bottom, as shares of the picture's width and height."""

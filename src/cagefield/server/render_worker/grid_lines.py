@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 from cagefield.edits import Edit, EditStack
-from cagefield.trilinear_hex import Array
+from cagefield.typing import Array
 
 LINES = 7
 """Lines along each axis, on each of the two axes across, the faces of the outer cage included."""

@@ -14,7 +14,7 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import Float32, Frame
+from cagefield.rendering.frame import Frame
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -29,6 +29,7 @@ from cagefield.server.render_worker.tasks import (
     Stopped,
     WarmStage,
 )
+from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer

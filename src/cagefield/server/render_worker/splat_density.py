@@ -7,7 +7,7 @@ import numpy as np
 from cagefield.cages import Cage
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.server.editor.cage_placement import PROBES
-from cagefield.trilinear_hex import Mask
+from cagefield.typing import Mask
 
 DENSE = 0.3
 """Opacity, of all splats that reach there together, from which on a probe's cell counts as dense."""
