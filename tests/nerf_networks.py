@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.mlp import Linear, Mlp
+from cagefield.fields.nerf import NerfField
 
 State = dict[str, np.ndarray]
 

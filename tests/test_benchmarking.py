@@ -24,7 +24,9 @@ from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Workbench, digest
 from cagefield.cages import Cage
 from cagefield.cli import main, parse
-from cagefield.cli.bench import BenchEdits, BenchSpeed, BenchTraining, command_line
+from cagefield.cli.bench_command import command_line
+from cagefield.cli.bench_edits import BenchEdits
+from cagefield.cli.bench_training import BenchSpeed, BenchTraining
 from cagefield.cli.options import PhotoOptions, TrainingOptions
 from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack

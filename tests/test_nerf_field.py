@@ -12,7 +12,8 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import FieldError
-from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.mlp import Linear, Mlp
+from cagefield.fields.nerf import NerfField
 from cagefield.fields.protocol import Field
 from nerf_networks import affine, gamma, hidden_of, relu, small_field, small_mlp
 

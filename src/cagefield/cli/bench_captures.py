@@ -74,7 +74,7 @@ class BenchCaptures:
         from cagefield.benchmarking.learning import Budget
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_text
-        from cagefield.cli.bench import command_line, work_folder
+        from cagefield.cli.bench_command import command_line, work_folder
 
         if not self.data:
             raise CagefieldError("no capture to measure; give folders, or names of built-in rooms")

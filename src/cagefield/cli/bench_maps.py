@@ -89,7 +89,7 @@ class BenchAblation:
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_text
         from cagefield.benchmarking.workbench import Settings, Workbench
-        from cagefield.cli.bench import command_line
+        from cagefield.cli.bench_command import command_line
         from cagefield.rendering.images import write_png
 
         usual = ("plant", "move_pinecone") if self.what == "limits" else ("microphone", "push_head")

@@ -9,7 +9,8 @@ from typing import Any
 
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
-from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.mlp import Linear, Mlp
+from cagefield.fields.nerf import NerfField
 
 KIND = "NerfField"
 FORMAT_VERSION = "1"

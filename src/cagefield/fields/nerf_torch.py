@@ -16,7 +16,7 @@ from torch.nn.functional import linear
 from cagefield import devices
 
 if TYPE_CHECKING:
-    from cagefield.fields.nerf import Linear, Mlp, NerfField
+    from cagefield.fields.mlp import Linear, Mlp, NerfParameters
     from cagefield.typing import Float32
 
 BLOCK = {"cpu": 1 << 12, "cuda": 1 << 19}
@@ -105,7 +105,9 @@ class TorchMlp:
 class TorchNerf:
     """A `NerfField` as tensors."""
 
-    def __init__(self, field: NerfField, device: torch.device | None = None, trainable: bool = False) -> None:
+    def __init__(
+        self, field: NerfParameters, device: torch.device | None = None, trainable: bool = False
+    ) -> None:
         self.field = field
         self.device = torch_device() if device is None else device
         self.coarse = TorchMlp(field.coarse, self.device, trainable)

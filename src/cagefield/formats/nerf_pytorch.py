@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
-from cagefield.fields.nerf import Linear, Mlp
+from cagefield.fields.mlp import Linear, Mlp
 
 YENCHENLIN = ("network_fn_state_dict", "network_fine_state_dict")
 _KRRISH94 = "krrish94/nerf-pytorch"

@@ -23,6 +23,7 @@ import torch
 from torch import Tensor
 
 from cagefield.cameras import Camera
+from cagefield.fields.mlp import NerfParameters
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf
 from cagefield.rendering.frame import Background, Frame
@@ -187,7 +188,7 @@ def sample_pdf(bins: Tensor, weights: Tensor, count: int, random: bool = False) 
     return start + (u - low) / width * (end - start)
 
 
-def _stratified(field: NerfField, rays: Rays, count: int, jitter: Jitter | None) -> Tensor:
+def _stratified(field: NerfParameters, rays: Rays, count: int, jitter: Jitter | None) -> Tensor:
     """Parameters s [N,count] of the coarse samples."""
     even = torch.linspace(0.0, 1.0, count, device=rays.origins.device)
     if field.ndc is not None:
@@ -205,7 +206,7 @@ def _stratified(field: NerfField, rays: Rays, count: int, jitter: Jitter | None)
     return s
 
 
-def _along(field: NerfField, rays: Rays, s: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def _along(field: NerfParameters, rays: Rays, s: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """(t [N,S], dt/ds [N,S], seen [N]) of parameters s; rays that see nothing of the field are not `seen`."""
     if field.ndc is None:
         scale = 1.0 / rays.cosines.clamp_min(LEAST_COSINE)[:, None]

@@ -16,7 +16,8 @@ from torch import Tensor
 from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError
-from cagefield.fields.nerf import Linear, Mlp, NerfField
+from cagefield.fields.mlp import Linear, Mlp
+from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.rendering.nerf import Jitter, Rays, march
 from cagefield.training.nerf_config import NerfConfig

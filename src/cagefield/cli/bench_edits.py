@@ -1,0 +1,197 @@
+"""`cagefield bench edits`: edits against ground truth."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from cagefield.cli.bench_command import command_line, work_folder
+from cagefield.cli.options import (
+    Device,
+    Flag,
+    Output,
+    Training,
+    TrainingOptions,
+    check_file,
+    progress_bar,
+)
+from cagefield.cli.train import Preset, nerf_config
+from cagefield.errors import CagefieldError
+
+if TYPE_CHECKING:
+    from cagefield.benchmarking.cases import Case
+    from cagefield.benchmarking.workbench import Workbench
+    from cagefield.training.nerf_config import NerfConfig
+    from cagefield.training.splat_config import SplatConfig
+    from cagefield.training.voxel_config import VoxelConfig
+
+
+@dataclass(frozen=True)
+class BenchEdits:
+    """Edits of the built-in scenes against scenes whose parts are really moved; writes Markdown tables."""
+
+    out: Output = Path("benchmarks/results/edits.md")
+    """Markdown file for the table; that of the methods goes beside it, its name ending _methods.md."""
+    scenes: tuple[str, ...] = ()
+    """Only these scenes: digger, chair, microphone, plant."""
+    edits: tuple[str, ...] = ()
+    """Only the edits of these names, such as move_cone."""
+    views: int = 100
+    """Number of training photos of each scene."""
+    size: int = 400
+    """Width and height of the photos in pixels."""
+    test_views: int = 20
+    """Number of test photos."""
+    field: Literal["voxel", "nerf", "splat"] = "voxel"
+    """nerf is the original NeRF, rendered exactly: needs PyTorch. nerf and splat need --no-methods."""
+    preset: Preset = "auto"
+    """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
+    training: Training = dataclasses.field(default_factory=TrainingOptions)
+    exact_size: int = 128
+    """Width and height of the pictures of continuous edits, whose truth is slow to render."""
+    exact_views: int = 6
+    """Number of pictures of continuous edits."""
+    exact_samples: int = 768
+    """Samples a ray in the truth of continuous edits."""
+    discrete_views: int | None = None
+    """Number of test photos that discrete edits are measured on; left out, all."""
+    methods: tuple[str, ...] = ()
+    """Compare only these ways to fill the shell: flow, "flow 64", trilinear, "trilinear 64", "trilinear 128",
+    "trilinear 256", "mean value", harmonic; left out, all."""
+    no_methods: Flag = False
+    """Compare no methods."""
+    compared_size: int = 64
+    """Width and height of the pictures of that comparison."""
+    compared_views: int = 3
+    """Number of its pictures for each edit and method."""
+    workdir: Path | None = None
+    """Folder that keeps photos, fields and truths, so that a second call only evaluates."""
+    retrain: Flag = False
+    """Train the fields anew where the work folder has them."""
+    pictures: Path | None = None
+    """Folder for pictures of each edit: before, edited, truth."""
+    picture_size: int = 320
+    """Width and height of each of them in pixels."""
+    error_panel: Flag = False
+    """A fourth picture: the difference from the truth."""
+    only_pictures: Flag = False
+    """Write the pictures and no table."""
+    device: Device = "auto"
+    overwrite: Flag = False
+    """Replace files that are there."""
+
+    def run(self) -> None:
+        """Trains what is missing, measures, shows the table, says where the files are."""
+        from cagefield import devices
+        from cagefield.benchmarking.cases import chosen
+        from cagefield.benchmarking.edits import picture_path
+        from cagefield.benchmarking.methods import check_known
+        from cagefield.benchmarking.workbench import Settings, Workbench
+
+        cases = chosen(self.scenes, self.edits)
+        check_known(self.methods)
+        if self.field != "nerf" and self.preset != "auto":
+            raise CagefieldError("--preset is for the original NeRF; give --field nerf too")
+        if self.field != "voxel" and not self.no_methods:
+            raise CagefieldError(
+                f"methods are compared on voxels only; give --no-methods with --field {self.field}"
+            )
+        if self.only_pictures and self.pictures is None:
+            raise CagefieldError("--only-pictures needs a folder for them; give --pictures FOLDER")
+        if self.picture_size < 1:
+            raise CagefieldError(f"--picture-size is {self.picture_size}; it must be at least 1")
+        if not self.only_pictures:
+            check_file(self.out, self.overwrite)
+            if not self.no_methods:
+                check_file(self._beside(), self.overwrite)
+        if self.pictures is not None:
+            for case in cases:
+                check_file(picture_path(self.pictures, case), self.overwrite)
+        devices.start(self.device)
+        settings = Settings(
+            self.views,
+            self.size,
+            self.test_views,
+            self._config(),
+            self.exact_size,
+            self.exact_views,
+            self.exact_samples,
+            self.compared_size,
+            self.compared_views,
+            self.discrete_views,
+        )
+        with work_folder(self.workdir) as folder:
+            bench = Workbench(settings, folder, progress_bar, self.retrain)
+            if not self.only_pictures:
+                self._measure(cases, bench)
+                if not self.no_methods:
+                    self._compare(cases, bench)
+            if self.pictures is not None:
+                self._draw(cases, bench, self.pictures)
+
+    def _config(self) -> VoxelConfig | NerfConfig | SplatConfig:
+        """The trainer's configuration."""
+        if self.field == "nerf":
+            return nerf_config(self.training, self.preset)
+        if self.field == "voxel":
+            return self.training.config()
+        from cagefield.benchmarking.learning import Budget, splat_config
+
+        chosen = self.training
+        return splat_config(
+            Budget(chosen.minutes, chosen.steps, sh_degree=chosen.sh_degree, seed=chosen.seed)
+        )
+
+    def _measure(self, cases: tuple[Case, ...], bench: Workbench) -> None:
+        from cagefield.benchmarking.edits import measure, table
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.tables import write_text
+
+        scores = []
+        for score in measure(cases, bench):
+            scores.append(score)
+            figures = score.figures
+            print(
+                f"{score.case.scene}, {score.case.name}: PSNR {figures.unedited:.2f} dB unedited, "
+                f"{figures.edited:.2f} dB edited, {figures.lost:.2f} dB lost",
+                flush=True,
+            )
+        machine, command = Machine.here(), command_line("bench edits", self)
+        result = table(scores, bench.settings, (f"Machine: {machine}", f"Command: `{command}`"))
+        result.show()
+        write_text(self.out, result.markdown())
+        print(f"table written to {self.out}")
+
+    def _beside(self) -> Path:
+        return self.out.with_name(f"{self.out.stem}_methods{self.out.suffix}")
+
+    def _compare(self, cases: tuple[Case, ...], bench: Workbench) -> None:
+        from cagefield.benchmarking.compare import measure, table
+        from cagefield.benchmarking.machine import Machine
+        from cagefield.benchmarking.methods import METHODS
+        from cagefield.benchmarking.tables import write_text
+
+        rows = []
+        for row in measure(cases, self.methods or tuple(METHODS), bench):
+            rows.append(row)
+            folds = "folds" if row.distortion.folds else f"min det J {row.distortion.least_det:.2f}"
+            print(
+                f"{row.case.scene}, {row.case.name}, {row.method}: {folds}, {row.figures.lost:.2f} dB lost",
+                flush=True,
+            )
+        if not rows:
+            return
+        notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench edits', self)}`")
+        result = table(rows, bench, notes)
+        result.show()
+        write_text(self._beside(), result.markdown())
+        print(f"table written to {self._beside()}")
+
+    def _draw(self, cases: tuple[Case, ...], bench: Workbench, folder: Path) -> None:
+        from cagefield.benchmarking.edits import write_picture
+
+        for case in cases:
+            path = write_picture(case, bench, folder, self.picture_size, error=self.error_panel)
+            print(f"picture written to {path}", flush=True)
