@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
-from cagefield.rendering.deformed_splats import DeformedSplats, rotation_matrices
+from cagefield.quaternions import rotation_matrices
+from cagefield.rendering.deformed_splats import DeformedSplats
 
 NEAR = 0.3
 LENSES = {

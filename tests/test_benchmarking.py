@@ -27,7 +27,8 @@ from cagefield.cli import main, parse
 from cagefield.cli.bench_command import command_line
 from cagefield.cli.bench_edits import BenchEdits
 from cagefield.cli.bench_training import BenchSpeed, BenchTraining
-from cagefield.cli.options import PhotoOptions, TrainingOptions
+from cagefield.cli.options import TrainingOptions
+from cagefield.cli.photo_options import PhotoOptions
 from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError

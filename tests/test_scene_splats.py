@@ -14,8 +14,9 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import FieldError
 from cagefield.fields.baking import _Grid, bake, surrounding, widened
-from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.metrics import psnr
 from cagefield.rendering.renderers import renderer_of
 from scenes import ball_field, ball_scene

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from cagefield import sh as harmonics
 from cagefield.cameras import Camera
+from cagefield.quaternions import rotation_matrices
 from cagefield.rendering import splat_reference as reference
-from cagefield.rendering.deformed_splats import rotation_matrices
 from cagefield.rendering.splat_rasterizer import (
     COLOUR,
     intrinsics,

@@ -10,8 +10,9 @@ import pytest
 from cagefield import sh
 from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
-from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat import SplatField
 from cagefield.fields.splat_mixture import LEAST, MAX_OPACITY
+from cagefield.quaternions import rotation_matrices
 from splat_scenes import random_splats
 
 

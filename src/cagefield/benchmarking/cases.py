@@ -42,7 +42,7 @@ class Case:
     @property
     def text(self) -> str:
         """Content of the edit file."""
-        return files("cagefield").joinpath("examples", self.file).read_text(encoding="utf-8")
+        return files("cagefield").joinpath("examples").joinpath(self.file).read_text(encoding="utf-8")
 
     @property
     def edits(self) -> EditStack:

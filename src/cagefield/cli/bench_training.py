@@ -15,13 +15,13 @@ from cagefield.cli.options import (
     Flag,
     OptionalOutput,
     Output,
-    Photos,
     Training,
     TrainingOptions,
     check_file,
     parse_size,
     progress_bar,
 )
+from cagefield.cli.photo_options import Photos
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:

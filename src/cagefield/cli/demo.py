@@ -115,7 +115,7 @@ class Demo:
 
         from cagefield.edits.files import load_edits
 
-        text = files("cagefield").joinpath("examples", "digger.yaml").read_text(encoding="utf-8")
+        text = files("cagefield").joinpath("examples").joinpath("digger.yaml").read_text(encoding="utf-8")
         (folder / "edits.yaml").write_text(text, encoding="utf-8")
         edited = scene.with_edits(load_edits(folder / "edits.yaml"))
         edited.save(folder / "edited")

@@ -14,7 +14,6 @@ import tyro
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
-    from cagefield.datasets import Dataset
     from cagefield.training.splat_config import SplatConfig
     from cagefield.training.voxel_config import VoxelConfig
 
@@ -25,33 +24,6 @@ Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]
 Flag = tyro.conf.FlagCreatePairsOff[bool]
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class PhotoOptions:
-    """Which photos are used."""
-
-    data: tyro.conf.Positional[Path]
-    """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model; for training also a
-    folder of photos alone or a video, whose poses are then found first."""
-    downscale: int | None = None
-    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
-    holdout: int = 8
-    """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
-
-    def load(self, posed_in: Path | None = None, keep_poses: bool = True) -> Dataset:
-        """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
-
-        So do those whose poses are folded, unless `keep_poses`.
-        """
-        from cagefield.cli.poses import posed, unfolded
-        from cagefield.datasets import load_dataset
-
-        data = self.data if posed_in is None else posed(self.data, posed_in)
-        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout)
-        if posed_in is None or keep_poses or data != self.data.expanduser():
-            return dataset
-        return unfolded(dataset, posed_in, self.downscale)
 
 
 @dataclass(frozen=True)
@@ -112,7 +84,6 @@ class BakingOptions:
             raise CagefieldError(f"--compare is {self.compare}; give the number of views, 0 or more")
 
 
-Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]
 Baking = tyro.conf.OmitArgPrefixes[BakingOptions]
 Training = tyro.conf.OmitArgPrefixes[TrainingOptions]
 

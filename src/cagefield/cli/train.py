@@ -11,16 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from cagefield.cli.options import (
-    BakingOptions,
-    Device,
-    Flag,
-    Output,
-    Photos,
-    Training,
-    TrainingOptions,
-    progress_bar,
-)
+from cagefield.cli.options import BakingOptions, Device, Flag, Output, Training, TrainingOptions, progress_bar
+from cagefield.cli.photo_options import Photos
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:

@@ -29,8 +29,9 @@ from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.contraction import contract, uncontract
 from cagefield.fields.protocol import Field
-from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.quaternions import rotation_matrices
 from cagefield.typing import AnyArray, Float32
 
 BACK = 0.02

@@ -152,7 +152,7 @@ class SplatField:
         """The splats, ready to be asked at points; made on first use."""
         from cagefield.fields.splat_mixture import SplatMixture
 
-        return SplatMixture.of(self)
+        return SplatMixture.of(self.means, self.log_scales, self.quaternions, self.opacities, self.sh)
 
     def take(self, rows: NDArray[Any]) -> SplatField:
         """The splats of these rows, or where a mask is True, in the same box."""
@@ -203,17 +203,6 @@ class SplatField:
 
 _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
 _SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
-
-
-def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Rotations [N,3,3] of unit quaternions [N,4] (w, x, y, z)."""
-    w, x, y, z = quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _box_of(means: Float32) -> NDArray[np.float64]:

@@ -37,18 +37,15 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
+from cagefield.quaternions import rotation_matrices
 from cagefield.typing import Float32
-
-if TYPE_CHECKING:
-    from cagefield.fields.splat import SplatField
-
 
 MAX_OPACITY = 0.99
 """Highest opacity of a splat, in pictures as here, where an opaque one would have no finite density."""
@@ -79,31 +76,32 @@ class SplatMixture:
     cells: tuple[NDArray[Any], ...]
 
     @classmethod
-    def of(cls, field: SplatField) -> SplatMixture:
-        """The mixture of a field's splats."""
+    def of(
+        cls, means: Float32, log_scales: Float32, quaternions: Float32, opacities: Float32, sh: Float32
+    ) -> SplatMixture:
+        """The mixture of splats; the arrays are those of a `SplatField`."""
         from cagefield.fields.kernels import splat_mixture as kernels
-        from cagefield.fields.splat import rotation_matrices
 
-        seen = np.flatnonzero(field.opacities > LEAST)
-        opacity = np.minimum(field.opacities[seen].astype(np.float64), MAX_OPACITY)
-        scales = np.exp(field.log_scales[seen].astype(np.float64))
-        rotations = rotation_matrices(field.quaternions[seen].astype(np.float64))
+        seen = np.flatnonzero(opacities > LEAST)
+        opacity = np.minimum(opacities[seen].astype(np.float64), MAX_OPACITY)
+        scales = np.exp(log_scales[seen].astype(np.float64))
+        rotations = rotation_matrices(quaternions[seen].astype(np.float64))
         end = 2.0 * np.log(opacity / LEAST)
         half = np.sqrt(end[:, None] * np.einsum("nij,nj->ni", rotations**2, scales**2))
         packed = np.empty((len(seen), kernels.PACKED), np.float32)
         packed[:, :9] = (rotations.transpose(0, 2, 1) / scales[:, :, None]).reshape(-1, 9)
-        packed[:, 9:12] = field.means[seen]
+        packed[:, 9:12] = means[seen]
         packed[:, 12] = -np.log(opacity)
         packed[:, 13] = end
         thinnest = np.argmin(scales, axis=1)
         layers = np.empty((len(seen), 4), np.float32)
         layers[:, :3] = packed[:, :9].reshape(-1, 3, 3)[np.arange(len(seen)), thinnest]
         layers[:, 3] = np.sqrt((scales**-2.0).mean(axis=1) / (2.0 * np.pi))
-        largest = np.maximum(half.max(axis=1), FINEST * _extent(field.means[seen]))
+        largest = np.maximum(half.max(axis=1), FINEST * _extent(means[seen]))
         exponents, levels = np.unique(np.ceil(np.log2(largest)), return_inverse=True)
         sizes = np.exp2(exponents)
         # Neighbours in memory are neighbours in space.
-        order = np.lexsort((*np.floor(field.means[seen] / sizes[levels][:, None]).T, levels))
+        order = np.lexsort((*np.floor(means[seen] / sizes[levels][:, None]).T, levels))
         packed, half, levels = packed[order], half[order], levels[order]
 
         nothing = np.empty(0, np.int64), np.empty(0, np.int32)
@@ -119,7 +117,7 @@ class SplatMixture:
         return cls(
             packed,
             layers[order],
-            np.ascontiguousarray(field.sh[seen[order]]),
+            np.ascontiguousarray(sh[seen[order]]),
             (sizes, table, starts, ends, ids[by_key]),
         )
 

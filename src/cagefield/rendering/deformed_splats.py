@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat import SplatField
+from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
 from cagefield.typing import Float32
 

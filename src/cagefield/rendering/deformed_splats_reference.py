@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField, rotation_matrices
+from cagefield.fields.splat import SplatField
+from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.deformed_splats import DeformedSplats
 
 

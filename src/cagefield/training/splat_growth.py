@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.fields.splat import rotation_matrices
+from cagefield.quaternions import rotation_matrices
 from cagefield.training.splat_state import SplatState
 
 SPLIT_OFFSET = 0.6

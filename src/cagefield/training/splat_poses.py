@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras import Camera
-from cagefield.fields.splat import rotation_matrices
+from cagefield.quaternions import rotation_matrices
 from cagefield.training.splat_state import SplatState
 from cagefield.typing import Array
 
