@@ -95,3 +95,10 @@ def test_checks_run_what_the_readme_says() -> None:
     tests = "python -m pytest -n 2 --dist loadfile"
     assert f"pip install '.[test]' && {tests}" in readme
     assert "pip install '.[test]'" in checks and checks[-1] == tests
+
+
+def test_no_two_modules_import_each_other() -> None:
+    grimp = pytest.importorskip("grimp", reason="import-linter is not installed (extra dev)")
+    graph = grimp.build_graph("cagefield")
+    pairs = {(m, other) for m in graph.modules for other in graph.find_modules_directly_imported_by(m)}
+    assert sorted(pair for pair in pairs if pair[::-1] in pairs and pair[0] < pair[1]) == []

@@ -4,7 +4,7 @@ export default defineConfig({
   base: "./",
   publicDir: false,
   build: {
-    outDir: "../src/cagefield/server/static",
+    outDir: "../src/cagefield/server/web/static",
     emptyOutDir: true,
     target: "es2022",
     chunkSizeWarningLimit: 1000,

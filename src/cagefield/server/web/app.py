@@ -22,7 +22,7 @@ from cagefield.server.render_worker.tasks import StillTask
 from cagefield.server.web.security import Guard
 from cagefield.server.web.websocket import attend
 
-STATIC = Path(__file__).parents[1] / "static"
+STATIC = Path(__file__).parent / "static"
 """The page as it was built."""
 
 _HEADERS = {
