@@ -42,7 +42,7 @@ class Distortion:
 def distortion(warp: BackwardMap, edit: Edit, *, samples: int = SAMPLES, seed: int = 0) -> Distortion:
     """The distortion of a map of a continuous edit, at `samples` random points of its deformed shell.
 
-    The trilinear shell is looked at in both directions, as the map back shows one sheet of a fold only, and
+    The trilinear shell is measured in both directions, as the map back shows one sheet of a fold only, and
     its least determinant is a bound over all of it.
     """
     outer = _outer(edit)

@@ -31,7 +31,7 @@ from cagefield.typing import Float32
 
 _ROUNDS = 5
 _EYES = {"room-digger": ((1.7, -2.9, 1.75), (-0.05, -0.1, 0.5))}
-"""(eye, point looked at) of a room's pictures."""
+"""(eye, target) of a room's pictures."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def unseen(
     `moved` was made from `photographed` by moving, copying or removing parts; the ray through each pixel's
     centre is followed to its surface, and that point of its part back to where the photos were taken. A photo
     shows it where its ray comes to REACH above it.
-    Only pixels of the mask `where` [H,W] are looked at; others, and those without a surface, are False.
+    Only pixels of the mask `where` [H,W] are tested; others, and those without a surface, are False.
     """
     shape = (camera.height, camera.width)
     pixels = np.flatnonzero(np.ones(shape, bool) if where is None else where)

@@ -107,7 +107,7 @@ class Train:
         checkpoint.unlink(missing_ok=True)
 
     def _check_options(self) -> None:
-        """Refuses, before photos are looked at, options that no trainer in question takes."""
+        """Refuses, before photos are read, options that no trainer in question takes."""
         if self.field in ("auto", "splat"):
             self.training.splat_config(self.splats, self.refine_poses)
         # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.

@@ -28,7 +28,7 @@ SIDE = 72
 """Pixels of the longer side of the small pictures, about."""
 
 PHOTOS = 120
-"""Photos that are looked at, at most, evenly among all."""
+"""Photos that are compared, at most, evenly among all."""
 
 NEIGHBOURS = 5
 """Cameras that each is compared with, at most: the nearest."""

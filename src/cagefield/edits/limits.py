@@ -1,4 +1,4 @@
-"""How far an operation may go: many shares of it looked at together."""
+"""How far an operation may go: many shares of it tested together."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ FILTER = 0.35
 BLOCK = 1 << 16
 """Vertices evaluated at a time."""
 
-_STEP = 2  # the first pass looks at every so-many-th vertex along each axis
+_STEP = 2  # the first pass samples every so-many-th vertex along each axis
 
 
 def bake(

@@ -19,7 +19,7 @@ def seen_by(
 ) -> NDArray[np.bool_]:
     """True [N] where a point [N,3] lies in the pictures of `least` cameras, at a depth of `near` or more.
 
-    What is in between is not looked at.
+    What is in between is not considered.
     """
     wanted = np.full(len(points), least)
     for camera in cameras:

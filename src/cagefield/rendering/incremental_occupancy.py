@@ -1,7 +1,7 @@
 """One edit of a stack that is replaced again and again, as by a drag, while the others stay.
 
-What the edits before it make of the field is looked at once, and so is where the edits after it take the
-points of a coarse look. Then a refresh maps each corner by the one edit alone, however many others there are.
+What the edits before it make of the field is worked out once, and so is where the edits after it take the
+points of a coarse pass. Then a refresh maps each corner by the one edit alone, however many others there are.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Chain:
     def starts(
         self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
     ) -> NDArray[np.float32] | None:
-        """Where the later edits take the points of a coarse look at bricks; None without later ones."""
+        """Where the later edits take the points of a coarse pass; None without later ones."""
         if not self.later:
             return None
         key = (*lower.tolist(), *count.tolist())

@@ -5,7 +5,7 @@ images q: along axis a as far as to the farther neighbour's, halved, and summed 
 
     r = sum_a max(|q_(+a) - q|, |q - q_(-a)|) / 2.
 
-Three passes, each looked at where the one before found something: points a brick apart, points a block
+Three passes, each where the one before found something: points a brick apart, points a block
 apart (both against occupied blocks, half a cell added), and the cells of a block against the densities
 themselves. The images of the cells' corners are interpolated between the block's corners, and r is then half
 a cell's reach plus a quarter of the images' second difference, twice the error of interpolation. A coarse
@@ -58,7 +58,7 @@ def near_bricks(
 def coarse_corners(
     grid: DeviceGrid, stack: DeviceStack, lower: NDArray[np.int64], count: NDArray[np.int64]
 ) -> NDArray[np.float32]:
-    """Images [N,3], grid coordinates, under a stack, of the corners that a coarse look at bricks maps."""
+    """Images [N,3], grid coordinates, under a stack, of the corners that a coarse pass maps."""
     return images_of(grid, stack, lower, np.ones(_coarse_points(count), bool), 2 * BRICK)
 
 

@@ -58,9 +58,9 @@ def deform(
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
-    Only what `known` does not know is looked at. `coarse` takes the first pass alone, by whole
+    Only what `known` does not know is worked out. `coarse` takes the first pass alone, by whole
     bricks: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack
-    has the edit of the link in place of another one, and nothing else is looked at. `proceed` is called
+    has the edit of the link in place of another one, and nothing else is worked out. `proceed` is called
     between the passes, and may raise.
     """
     field, proceed = grid.field, proceed or nothing
@@ -82,7 +82,7 @@ def deform(
         new &= changed
     where = _where(new)
     if where is not None:
-        # Whole bricks of what is looked at, and as many more on each side as their corners' reach depends on.
+        # Whole bricks of what is worked out, and as many more on each side as their corners' reach depends on.
         margin = 1 if coarse and not jumps else 2
         low = np.maximum(where[0] * side // BRICK - margin, 0)
         high = np.minimum(-(-where[1] * side // BRICK) + margin, (last - first) // BRICK)
@@ -106,7 +106,7 @@ def _near_bricks(
     jumps: bool,
     link: Shortcut | None,
 ) -> NDArray[np.uint8]:
-    """1 for the bricks [count] from the grid coordinates `lower` on where a coarse look finds something."""
+    """1 for the bricks [count] from the grid coordinates `lower` on where a coarse pass finds something."""
     if jumps:
         near = jumping.near_bricks(canonical, grid, stack, lower, count)
     elif link is not None:

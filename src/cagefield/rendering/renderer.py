@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from cagefield.rendering.occupancy import Occupancy
 
 BAND = 4
-"""Rows of tiles rendered between two looks at `should_stop`."""
+"""Rows of tiles rendered between two calls of `should_stop`."""
 
 KEPT = 8
 """Cameras' intrinsics whose directions stay on the device."""
@@ -76,7 +76,7 @@ class Renderer:
     ) -> Renderer:
         """A renderer of the same field under other edits; what they share with these is kept.
 
-        `coarse` looks at the edited space by many cells at a time: ready sooner, the same picture, slower.
+        `coarse` finds the occupancy of the edited space by many cells at a time: ready sooner, same picture.
         `proceed` is called now and then, and gives the renderer up by raising.
         """
         other = object.__new__(Renderer)

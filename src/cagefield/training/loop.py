@@ -81,7 +81,7 @@ def run_to_end(
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Turns Ctrl-C into a flag that is looked at between steps (in the main thread)."""
+    """Turns Ctrl-C into a flag that is checked between steps (in the main thread)."""
     pressed = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield pressed.is_set

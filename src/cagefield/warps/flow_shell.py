@@ -143,7 +143,7 @@ class FlowShell:
     def may_surround(inner: Cage, outer: Cage, corners: Array, *, fine: bool = True) -> Mask:
         """Mask [B] of the deformed inner cages [B,8,3] in which `problem` finds nothing but for their way.
 
-        Corners that no cage may have are False. Where not fine, only the corners are looked at, and edges or
+        Corners that no cage may have are False. Where not fine, only the corners are tested, and edges or
         faces that come too near to a bent outer cage are missed.
         """
         mask = np.asarray(gaps(corners, Extended.of(outer), 8) >= LEAST_GAP)

@@ -20,7 +20,7 @@ from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.typing import Array, Float32
 
 EDGE = 0.03
-"""A pixel is looked at more closely where it differs from a neighbour by more than this."""
+"""A pixel is sampled more finely where it differs from a neighbour by more than this."""
 
 SHOT_NOISE, READ_NOISE = 2.0e-4, 3.0e-3
 """Variance per unit of linear light, and deviation in the dark: about 42 dB on a wall."""
@@ -89,7 +89,7 @@ def around(
     """Cameras on an arc about a target [3], seen from above from `start_deg` (0 is +x) on.
 
     Distance (level) and height above the target go up and down within their limits along the arc, `turns`
-    times round; `sway` is the jitter of the eye and of the point looked at, relative to the distance.
+    times round; `sway` is the jitter of the eye and of the target, relative to the distance.
     """
     rng = np.random.RandomState(seed)
     share = (np.arange(count) + 0.5 + rng.uniform(-0.3, 0.3, count)) / count

@@ -58,7 +58,7 @@ def shade(
     occlusion: Float32,
     gloss: tuple[float, float],
 ) -> Float32:
-    """rgb [N,3] in [0,1] of surface points, wherever they are (`points` is not looked at).
+    """rgb [N,3] in [0,1] of surface points, wherever they are (`points` is not used).
 
     albedo [N,3]; normals [3,N] unit, outwards; viewdirs [3,N] unit, from the camera; occlusion [N] in [0,1]
     (1 is open); gloss: strength and exponent of the highlight.

@@ -1,6 +1,6 @@
 """What of a canonical field lies within reach of a point, inside Quadrants kernels.
 
-Points and reaches r are in grid coordinates; all of the box [point - r, point + r] is looked through.
+Points and reaches r are in grid coordinates; all of the box [point - r, point + r] is searched.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -11,7 +11,7 @@ from cagefield.rendering.kernels.grid import GridArgs, vec3
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 
 MOST_CELLS = 12.0
-"""Largest r, in cells; twice that in a coarse look. A map that squeezes more looks that far only."""
+"""Largest r, in cells; twice that in a coarse pass. Where a map squeezes more, no farther is searched."""
 
 
 @qd.func

@@ -18,7 +18,7 @@ MARGIN = 0.6
 """Margin of a new outer cage, in edges of the inner one."""
 
 PROBES = 40
-"""Points along each axis of a cage at which the field is looked at to fit it."""
+"""Points along each axis of a cage at which the field is sampled to fit it."""
 
 
 def pair_around(point: Array, view_height: float, bounds: Array, voxel: float) -> tuple[Cage, Cage]:

@@ -28,7 +28,7 @@ from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown
 
 @dataclass
 class Page:
-    """An open page: what it looks at and what waits to be sent to it."""
+    """An open page: its camera and view, and what waits to be sent to it."""
 
     number: int
     send_queue: SendQueue = field(default_factory=SendQueue)
@@ -73,7 +73,7 @@ class Coordinator:
     # ---- pages ----
 
     def join(self, hello: server_messages.Hello) -> Page:
-        """A new page, told what there is."""
+        """A new page; it is sent the scene, the edits and the jobs."""
         self._pages += 1
         page = Page(self._pages)
         self.pages[page.number] = page

@@ -20,7 +20,7 @@ POINTS = 33
 """Points of a line."""
 
 NODES = 25
-"""Lattice nodes along an axis at which the map is looked at; an edit's own finer lattice shows no more."""
+"""Lattice nodes along an axis at which the map is sampled; an edit's own finer lattice shows no more."""
 
 ROUNDS = 30
 """Iterations of the inverse, damped by one half."""

@@ -33,7 +33,7 @@ class JobFiles:
         self._videos[task.job][1](shown.rgb8())
 
     def end(self, job: int, keep: bool) -> None:
-        """A job ends: its video appears, or what there is of it goes."""
+        """A job ends: its video appears, or the unfinished file is removed."""
         if job not in self._videos:
             return
         context, _ = self._videos.pop(job)

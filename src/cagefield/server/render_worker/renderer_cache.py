@@ -149,7 +149,7 @@ class RendererCache:
         if not exact and self._is_sampled:
             ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
             edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
-        # What the last ones share with these need not be looked at again.
+        # Occupancy under edits that both share is kept.
         last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
         renderer = (last[0].renderer if last else self.plain).with_edits(
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact, proceed=proceed

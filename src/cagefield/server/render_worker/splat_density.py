@@ -13,7 +13,7 @@ DENSE = 0.3
 """Opacity, of all splats that reach there together, from which on a probe's cell counts as dense."""
 
 REACH = 1.5
-"""Standard deviations from its mean up to which a splat is looked at: a third of its opacity is there."""
+"""Standard deviations from its mean up to which a splat is sampled: a third of its opacity is there."""
 
 ACROSS = 7
 """Points across a splat, along each of its two larger axes."""
@@ -22,7 +22,7 @@ ACROSS = 7
 def dense(cage: Cage, splats: DeformedSplats) -> Mask:
     """Which of the cells around a cage's `probes` [PROBES^3] splats make dense.
 
-    Each splat is looked at on a grid of points in the plane of its two larger axes, up to `REACH` standard
+    Each splat is sampled on a grid of points in the plane of its two larger axes, up to `REACH` standard
     deviations. What a cell lets through is the product of what its splats do, each where it is densest in it.
     """
     low, high = cage.aabb

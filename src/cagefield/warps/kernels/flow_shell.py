@@ -31,7 +31,7 @@ def flow_point(p: vec3, lattice: qd.template(), base: qd.i32):
 
 @qd.func
 def flow(p: vec3, d: vec3, lattice: qd.template(), base: qd.i32, tangent: qd.template()):
-    """(canonical point, J d); d is not looked at, and returned, where there is no tangent."""
+    """(canonical point, J d); d is ignored, and returned, where there is no tangent."""
     Z = rows_times(lattice, base, p - lattice[base + 3])
     D = rows_times(lattice, base, d)
     steps = qd.cast(lattice[base + 8].x, qd.i32)
