@@ -82,7 +82,7 @@ def deform(
         new &= changed
     where = _where(new)
     if where is not None:
-        # Whole bricks of what is worked out, and as many more on each side as their corners' reach depends on.
+        # Whole bricks of those blocks, and as many more on each side as their corners' reach depends on.
         margin = 1 if coarse and not jumps else 2
         low = np.maximum(where[0] * side // BRICK - margin, 0)
         high = np.minimum(-(-where[1] * side // BRICK) + margin, (last - first) // BRICK)

@@ -35,7 +35,7 @@ _grid = np.linspace(0.0, 1.0, 41)
 TIMES: Array = np.unique(
     np.concatenate([_grid, [0.002, 0.006, 0.0125], 1.0 - np.array([0.002, 0.006, 0.0125])])
 )
-"""Times at which the motion is sampled: denser at its ends, where a cage with a small gap must shrink fast."""
+"""Times at which the motion is sampled: denser at its ends, where a small gap makes it fast."""
 
 
 @dataclass(frozen=True)
