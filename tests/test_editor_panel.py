@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import imageio_ffmpeg
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from PIL import Image
 
 from cagefield.edits import load_edits, parse_edits
 from editor_cone import EDITS, cone, difference, moved
+from editor_jobs import read_video, render
 from editor_page import PATIENCE, EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 
@@ -536,26 +536,6 @@ def test_playing_a_path_shows_the_edits_on_their_way_and_then_as_they_are(editor
     editor.until("cagefield.now.preview === null")
     editor.settle()
     assert editor.state["keys"][0]["parts"] == {}
-
-
-def render(editor: EditorPage, out: Path, width: int, height: int, fps: int) -> None:
-    """Answers the question that "Render video" asks."""
-    editor.page.click("text=Render video…")
-    fields = editor.page.locator("dialog[open] input")
-    for n, value in enumerate((out, width, height, fps)):
-        fields.nth(n).fill(str(value))
-    editor.page.click("dialog[open] .primary")
-
-
-def read_video(path: Path) -> list[NDArray[np.float64]]:
-    """The pictures [H,W,3] of a video, in [0,1]."""
-    end = time.monotonic() + PATIENCE
-    while not path.exists():
-        assert time.monotonic() < end, path
-        time.sleep(0.05)
-    frames = imageio_ffmpeg.read_frames(str(path))
-    width, height = next(frames)["size"]
-    return [np.frombuffer(frame, np.uint8).reshape(height, width, 3) / 255.0 for frame in frames]
 
 
 def test_save_as_goes_on_with_the_new_folder(editor: EditorPage, folder: Path) -> None:

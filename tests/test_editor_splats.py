@@ -17,11 +17,11 @@ from cagefield.edits import load_edits
 from cagefield.fields.splat import SplatField
 from cagefield.scene import Scene
 from editor_cone import cone, difference, moved
+from editor_jobs import read_video, render
 from editor_page import EditorPage, editor_page
 from editor_server import EditorServer, editor_server
 from scenes import SH_C0
 from splat_scenes import ball_of_splats
-from test_editor_panel import read_video, render
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 

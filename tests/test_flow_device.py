@@ -15,8 +15,8 @@ from cagefield.edits import Edit, EditStack
 from cagefield.errors import DeviceError, EditError
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
+from flow_edits import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points
 from random_cages import examples, unit_vectors
-from test_flow_shell import EDITS, INNER, OUTER, flow_edits, shell_of, shell_points
 
 EPS = float(np.finfo(np.float32).eps)
 

@@ -17,76 +17,15 @@ from cagefield.cameras import Camera
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering import splat_reference as reference
 from cagefield.rendering.splat_rasterizer import (
-    COLOUR,
     intrinsics,
     kernels,
-    project,
-    tiled,
-    world_to_camera,
 )
-from cagefield.training.kernels.splat_chain import CURVATURES, GRADIENTS, chain, shapes
-from splat_views import LENSES, NEAR, camera, covariances, parameters, single, splats_of, unit
-
-Values = dict[str, NDArray]
+from cagefield.training.kernels.splat_chain import shapes
+from splat_gradients import Values, analytic, pictures, rounded, settled
+from splat_views import LENSES, NEAR, camera, covariances, parameters, splats_of, unit
 
 PARTS = {"means": (0, 3), "log_scales": (3, 3), "quaternions": (6, 3), "logits": (9, 1), "colour": (10, 3)}
 """Where each parameter's gradient lies, and how many numbers it has."""
-
-
-def rounded(values: Values) -> Values:
-    """Parameters that float32 holds exactly, so that kernels and oracle see the same ones."""
-    return {name: part.astype(np.float32).astype(np.float64) for name, part in values.items()}
-
-
-def analytic(
-    values: Values, view: Camera, target: NDArray, background: NDArray, antialiased: bool
-) -> tuple[NDArray, NDArray, NDArray]:
-    """Gradients [N,GRADIENTS], curvatures [N,CURVATURES], and the splats drawn."""
-    splats = single(splats_of(values, antialiased))
-    seen = project(splats, view, near=NEAR)
-    tiles, stops = seen.blend(COLOUR)
-    colour = np.ascontiguousarray(tiles[:, 1:4] + tiles[:, :1] * background[:, None].astype(np.float32))
-    slopes = colour - tiled(target.astype(np.float32))
-    lens = intrinsics(view)
-    gradients = np.zeros((len(splats), GRADIENTS), np.float32)
-    curvatures = np.zeros((len(splats), CURVATURES), np.float32)
-    sums = seen.gradients(colour, slopes, stops)
-    with kernels():
-        chain(
-            seen.order,
-            seen.firsts,
-            seen.slots,
-            sums,
-            seen.packed,
-            splats.means,
-            values["log_scales"].astype(np.float32),
-            values["quaternions"].astype(np.float32),
-            splats.opacities,
-            splats.sh,
-            world_to_camera(view),
-            view.origin,
-            lens.focal,
-            lens.limits,
-            lens.model,
-            lens.coefficients,
-            antialiased,
-            True,
-            gradients,
-            curvatures,
-        )
-    return gradients, curvatures, seen.order
-
-
-def pictures(view: Camera, background: NDArray, antialiased: bool) -> Callable[[Values], NDArray]:
-    """The oracle's picture [H,W,3] of parameters."""
-    limits = intrinsics(view).limits
-
-    def picture(values: Values) -> NDArray:
-        seen = reference.project(splats_of(values, antialiased), view, NEAR, limits)
-        colour, through, _ = reference.blend(seen, view.width, view.height)
-        return colour + through[..., None] * background
-
-    return picture
 
 
 def moved(values: Values, name: str, splat: int, axis: int, step: float) -> Values:
@@ -114,31 +53,6 @@ def differences(
     ahead = picture(moved(values, name, splat, axis, step))
     behind = picture(moved(values, name, splat, axis, -step))
     return (ahead - behind) / (2.0 * step)
-
-
-def settled(values: Values, view: Camera, antialiased: bool) -> Values:
-    """Parameters at which no pixel lies where alpha's limits make the loss jump or bend.
-
-    Gradients are those between the jumps; each splat's opacity is changed a little until none is near one.
-    """
-    limits = intrinsics(view).limits
-    x, y = np.meshgrid(np.arange(view.width) + 0.5, np.arange(view.height) + 0.5)
-    chance = np.random.default_rng(9)
-    for _ in range(200):
-        seen = reference.project(splats_of(values, antialiased), view, NEAR, limits)
-        d = np.stack([x, y], axis=-1) - seen.means[:, None, None]
-        alpha = np.exp(-0.5 * np.einsum("nhwi,nij,nhwj->nhw", d, seen.conics, d))
-        alpha *= seen.opacities[:, None, None]
-        near = np.minimum(
-            np.abs(alpha / reference.ALPHA_MIN - 1.0), np.abs(alpha / reference.ALPHA_MAX - 1.0)
-        ).min(axis=(1, 2))
-        # Kernels know alpha to some 1e-5 of it; a difference moves it by 1e-4 at most.
-        bad = seen.rows[near < 1.5e-4]
-        if len(bad) == 0:
-            return values
-        values["logits"][bad] += chance.uniform(-0.05, 0.05, len(bad))
-        values = rounded(values)
-    raise AssertionError("no such parameters found")
 
 
 def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Values, NDArray, NDArray]:

@@ -15,8 +15,8 @@ from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_poses import PoseRefinement, moved, pose_sums
 from cagefield.training.splat_state import SplatState
 from splat_captures import around, as_dataset, painted_ball, photos_of, points_near, write_views
+from splat_gradients import analytic, pictures, rounded, settled
 from splat_views import camera, parameters
-from test_splat_gradients import analytic, pictures, rounded, settled
 
 
 @pytest.mark.parametrize("antialiased", [False, True])
