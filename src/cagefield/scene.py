@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
@@ -36,7 +37,6 @@ from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.seen import seen_by
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Background, Frame, background_rgb
 from cagefield.scene_files import (
     CAMERAS,

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import replaced_whole
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def number(value: float, digits: int = 2) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Writes a text file, whole or not at all."""
-    with replaced_whole(path) as temporary:
+    with replaced_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

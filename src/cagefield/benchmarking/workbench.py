@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 import cagefield
+from cagefield.atomic_files import replaced_file
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
 from cagefield.benchmarking.visibility import unseen
@@ -31,7 +32,6 @@ from cagefield.datasets.procedural import ProceduralScene, make_scene, procedura
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import replaced_whole
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
@@ -232,7 +232,7 @@ class Workbench:
             for picture in make():
                 made.append(picture)
                 move(len(made), count, f"{len(made)}/{count}")
-        with replaced_whole(path) as temporary:
+        with replaced_file(path) as temporary:
             np.savez_compressed(temporary, pictures=np.stack(made))
         return np.stack(made)
 

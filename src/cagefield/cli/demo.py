@@ -45,7 +45,7 @@ class Demo:
 
     def run(self) -> None:
         """Runs the chain and says where the results are."""
-        from cagefield.folders import replaced_folder
+        from cagefield.atomic_files import replaced_folder
 
         check_folder(self.out, self.overwrite, "before_after.png")
         began = time.perf_counter()

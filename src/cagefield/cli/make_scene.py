@@ -48,8 +48,8 @@ class MakeScene:
 
     def _scene(self) -> tuple[str, ...]:
         """Writes the photos of a scene alone; the names of its parts."""
+        from cagefield.atomic_files import replaced_folder
         from cagefield.datasets.procedural import make_scene, procedural_scene
-        from cagefield.folders import replaced_folder
 
         scene = procedural_scene(self.name)
         if self.no_points:
@@ -74,9 +74,9 @@ class MakeScene:
 
     def _capture(self) -> tuple[str, ...]:
         """Writes the capture of a room; the names of its parts."""
+        from cagefield.atomic_files import replaced_folder
         from cagefield.datasets.procedural import CAPTURES, make_capture
         from cagefield.datasets.procedural.capture_writer import OWN
-        from cagefield.folders import replaced_folder
 
         if self.test_views is not None:
             raise CagefieldError(

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cagefield.atomic_files import replaced_file
 from cagefield.rendering.frame import Frame
-from cagefield.rendering.images import replaced_whole, side_by_side, write_png
+from cagefield.rendering.images import side_by_side, write_png
 from cagefield.typing import AnyArray
 
 Pictures = dict[str, AnyArray]
@@ -67,7 +68,7 @@ def write_pictures(stem: Path, pictures: Pictures) -> None:
     for end, picture in pictures.items():
         path = stem.with_name(stem.name + end)
         if end.endswith(".npy"):
-            with replaced_whole(path) as temporary, temporary.open("wb") as file:
+            with replaced_file(path) as temporary, temporary.open("wb") as file:
                 np.save(file, picture)
         else:
             write_png(path, picture)

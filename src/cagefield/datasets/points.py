@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from cagefield.atomic_files import replaced_file
 from cagefield.datasets.features import OnProgress
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.triangulation import triangulate
@@ -206,10 +207,8 @@ def _write(file: Path, points: SparsePoints) -> None:
     names = sorted({name for seen in points.seen_by for name in seen})
     numbers = {name: number for number, name in enumerate(names)}
     flat = [sorted(numbers[name] for name in seen) for seen in points.seen_by]
-    draft = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with draft.open("wb") as stream:
+        with replaced_file(file) as draft, draft.open("wb") as stream:
             np.savez(
                 stream,
                 positions=points.positions,
@@ -219,9 +218,8 @@ def _write(file: Path, points: SparsePoints) -> None:
                 counts=np.array([len(seen) for seen in flat], dtype=np.int64),
                 seen=np.array([number for seen in flat for number in seen], dtype=np.int64),
             )
-        draft.replace(file)
     except OSError:
-        draft.unlink(missing_ok=True)
+        return
 
 
 def _read(file: Path) -> SparsePoints | None:

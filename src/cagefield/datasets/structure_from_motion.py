@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.datasets import features, repeated_views
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError
-from cagefield.folders import replaced_folder
 
 RECORD = "poses.json"
 
@@ -211,9 +211,8 @@ def _photos(
             unreadable[name] = str(error).removeprefix(f"{file}: ")
         on_progress(index / len(files), f"{index} of {len(files)} photos read")
     listing = [{**asdict(photo), "path": ""} for photo in photos]
-    draft = note.with_suffix(".new")
-    draft.write_text(json.dumps({"photos": listing, "unreadable": unreadable}), encoding="utf-8")
-    draft.replace(note)
+    with replaced_file(note) as draft:
+        draft.write_text(json.dumps({"photos": listing, "unreadable": unreadable}), encoding="utf-8")
     return photos, unreadable
 
 

@@ -31,13 +31,13 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cagefield.atomic_files import replaced_file
 from cagefield.cages import Cage
 from cagefield.edits import nodes, operations
 from cagefield.edits.edit import Edit
@@ -88,17 +88,13 @@ def save_edits(stack: EditStack, path: str | os.PathLike[str]) -> None:
     """Write the stack to a .yaml, .yml or .json file, atomically: a reader sees the old file or the new."""
     file = Path(path)
     text = dump_edits(stack, format=_format_of(file))
-    temporary = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
     try:
-        with temporary.open("x", encoding="utf-8") as stream:
+        with replaced_file(file, parents=False) as temporary, temporary.open("w", encoding="utf-8") as stream:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.replace(file)
     except OSError as error:
         raise EditFileError(f"{file}: cannot be written ({error.strerror or error})") from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def dump_edits(stack: EditStack, *, format: str = "yaml") -> str:

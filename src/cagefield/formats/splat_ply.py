@@ -27,10 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield import sh as spherical_harmonics
+from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.ply import Columns, read_ply
-from cagefield.rendering.images import replaced_whole
 from cagefield.typing import AnyArray
 
 CHUNK = 256
@@ -103,7 +103,7 @@ def write_splat_ply(path: str | Path, field: SplatField) -> None:
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
     header += ["comment SplatRenderMode: mip"] if field.antialiased else []
     header += [f"element vertex {len(field)}", *(f"property float {name}" for name in names), "end_header"]
-    with replaced_whole(Path(path)) as temporary:
+    with replaced_file(Path(path)) as temporary:
         temporary.write_bytes("\n".join([*header, ""]).encode() + table.astype("<f4").tobytes())
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,26 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.rendering.frame import to_uint8
 from cagefield.typing import UInt8
-
-
-@contextmanager
-def replaced_whole(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, same suffix: becomes `path` on success, is removed on failure."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def read_image(path: str | os.PathLike[str]) -> UInt8:
@@ -75,7 +58,7 @@ def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
     pixels = _pixels(image)
     if pixels.ndim == 3 and pixels.shape[-1] == 1:
         pixels = pixels[..., 0]
-    with replaced_whole(path) as temporary:
+    with replaced_file(path) as temporary:
         Image.fromarray(pixels).save(temporary, format="PNG")
 
 
@@ -101,7 +84,7 @@ def video_writer(
     height, width = shape
     pad = ((0, height % 2), (0, width % 2), (0, 0))
     count = 0
-    with replaced_whole(path) as temporary:
+    with replaced_file(path) as temporary:
         writer = imageio_ffmpeg.write_frames(
             str(temporary),
             (width + width % 2, height + height % 2),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
 
 
@@ -19,10 +19,8 @@ def write_checkpoint(
 ) -> None:
     """Writes them atomically; `signature` says which training they belong to."""
     contents: dict[str, Any] = {"scalars": json.dumps(scalars), "config": signature, **arrays}
-    draft = path.with_name(path.name + ".part")
-    with open(draft, "wb") as file:
+    with replaced_file(path) as draft, open(draft, "wb") as file:
         np.savez(file, **contents)
-    os.replace(draft, path)
 
 
 def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from cagefield.atomic_files import replaced_file
 from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError
@@ -163,9 +164,8 @@ class NerfRun:
             "parameters": [values.detach().cpu() for values in self.torch.parameters],
             "optimizer": self.optimizer.state_dict(),
         }
-        draft = path.with_name(path.name + ".new")
-        torch.save(state, draft)
-        draft.replace(path)
+        with replaced_file(path) as draft:
+            torch.save(state, draft)
 
     def restore(self, path: Path) -> None:
         """Goes on from the state in `path`."""

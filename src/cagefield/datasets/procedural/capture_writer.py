@@ -20,6 +20,7 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.captures import capture
 from cagefield.datasets.procedural.hand_held import developed, exposures, picture
@@ -27,7 +28,6 @@ from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.tracks import Tracks, tracks
 from cagefield.datasets.procedural.writer import DepthViews
 from cagefield.errors import DatasetError
-from cagefield.folders import replaced_folder
 
 HOLDOUT = 8
 QUALITY = 95

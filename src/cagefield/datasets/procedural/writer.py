@@ -16,11 +16,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
-from cagefield.folders import replaced_folder
 from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import write_png
 

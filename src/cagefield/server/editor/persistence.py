@@ -13,12 +13,12 @@ import hashlib
 import json
 from pathlib import Path
 
+from cagefield.atomic_files import replaced_file
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.edits.files import save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
-from cagefield.rendering.images import replaced_whole
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.session import Session
@@ -81,7 +81,7 @@ class SceneStore:
             if session.saved:
                 self.autosave_path.unlink(missing_ok=True)
             else:
-                with replaced_whole(self.autosave_path) as draft:
+                with replaced_file(self.autosave_path) as draft:
                     draft.write_text(json.dumps(_content(document)), encoding="utf-8")
             self.trouble = None
         except OSError as error:
@@ -105,7 +105,7 @@ class SceneStore:
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         save_edits(document.stack, self.path / _EDITS)
         if document.keys or (self.path / CAMERA_PATH).exists():
-            with replaced_whole(self.path / CAMERA_PATH) as draft:
+            with replaced_file(self.path / CAMERA_PATH) as draft:
                 draft.write_text(camera_path, encoding="utf-8")
         self._scene(document).save_manifest(self.path)
         self._done(session)
