@@ -30,7 +30,7 @@ def plain_sum(field: SplatField, points: np.ndarray, along: np.ndarray) -> tuple
         # 0.99^3000 is 1e-13
         li = np.where(z < LEAST, 0.0, (z[:, None] ** k / np.sqrt(k)).sum(axis=1))
         sigma = li * np.sqrt(np.einsum("pi,ij,pj->p", along, inverse, along) / (2.0 * np.pi))
-        shown = 0.5 + np.einsum("pt,tc->pc", sh.basis(along, field.sh_degree), field.sh[n].astype(float))
+        shown = 0.5 + np.einsum("pt,tc->pc", sh.sh_basis(along, field.sh_degree), field.sh[n].astype(float))
         total += sigma
         colour += sigma[:, None] * np.maximum(shown, 0.0)
     return total, np.clip(colour / np.maximum(total, 1e-30)[:, None], 0.0, 1.0)

@@ -42,8 +42,10 @@ C3: Final = (
 )
 
 
-def basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
+def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
     """Values [N,(degree+1)^2] of the harmonics at unit directions `viewdirs` [N,3].
+
+    The oracle of `rendering.kernels.grid.sh_basis`.
 
     float32 in, float32 out; anything else gives float64. Directions are not normalised here.
 

@@ -339,7 +339,7 @@ def _directions(points: Float32, eyes: AnyArray | None, views: int, chance: np.r
 def _fit(colours: Float32, along: Float32, gradient: Float32, degree: int) -> Float32:
     """Coefficients [N,(degree+1)^2,3] of colours [N,K,3] seen along directions [N,K,3]."""
     n, views, _ = along.shape
-    basis = spherical_harmonics.basis(along.reshape(-1, 3), degree).reshape(n, views, -1)
+    basis = spherical_harmonics.sh_basis(along.reshape(-1, 3), degree).reshape(n, views, -1)
     weight = np.where(np.einsum("nkc,nc->nk", along, gradient) >= 0.0, 1.0, BACK).astype(np.float32)
     weighted = basis * weight[..., None]
     ridge = np.full(basis.shape[2], RIDGE * views, np.float32)

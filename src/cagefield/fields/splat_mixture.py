@@ -150,7 +150,7 @@ class SplatMixture:
         degree = int(np.sqrt(self.harmonics.shape[1])) - 1
 
         def ask(rows: slice) -> None:
-            basis = spherical_harmonics.basis(along[rows].reshape(-1, 3), degree).astype(np.float32)
+            basis = spherical_harmonics.sh_basis(along[rows].reshape(-1, 3), degree).astype(np.float32)
             basis = basis.reshape(-1, views, basis.shape[1])
             kernels.colours(
                 self.packed,

@@ -160,7 +160,7 @@ class VoxelField:
             weight = np.where(offset == 1, frac, 1 - frac).prod(axis=1) * stored
             raw += weight * self.density[slot]
             coefficients += weight[:, None, None] * self.sh[slot]
-        basis = spherical_harmonics.basis(np.asarray(viewdirs), self.sh_degree)
+        basis = spherical_harmonics.sh_basis(np.asarray(viewdirs), self.sh_degree)
         rgb = np.clip(0.5 + np.einsum("nl,nlc->nc", basis, coefficients), 0, 1)
         sigma = np.where(inside, np.maximum(raw, 0), 0)
         return sigma.astype(np.float32), rgb.astype(np.float32)

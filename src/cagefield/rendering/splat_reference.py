@@ -68,7 +68,7 @@ def project(
     slopes = np.einsum("ni,nij,nkj,nkl->nl", along, C, M, np.linalg.inv(flat + SLOPE_BLUR * np.eye(2)))
     turned = along if splats.rotations is None else np.einsum("nji,nj->ni", splats.rotations[rows], along)
     degree = int(np.sqrt(splats.sh.shape[1])) - 1
-    colours = 0.5 + np.einsum("nk,nkc->nc", sh.basis(turned, degree), splats.sh[rows].astype(np.float64))
+    colours = 0.5 + np.einsum("nk,nkc->nc", sh.sh_basis(turned, degree), splats.sh[rows].astype(np.float64))
     return ProjectedSplats(rows, means, conics, opacities, np.maximum(colours, 0.0), distance, slopes)
 
 

@@ -39,7 +39,7 @@ SH_C0, SH_C1, SH_C2, SH_C3 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics
 
 @qd.func
 def sh_basis(d: vec3, K: qd.template()):
-    """The K real spherical harmonics of the unit direction d, degree 0 to 3 (as `cagefield.sh.basis`)."""
+    """The K real spherical harmonics of the unit direction d, degree 0 to 3 (as `cagefield.sh.sh_basis`)."""
     b = qd.Vector.zero(qd.f32, K)
     b[0] = SH_C0
     if qd.static(K > 1):
@@ -111,29 +111,29 @@ def to_grid(p: vec3, grid: GridArgs, contracted: qd.template()):
     """Grid coordinates of a world position."""
     g = (p - grid.lower) * grid.scale
     if qd.static(contracted):
-        g = (contract_point(g) + 2.0) * grid.half
+        g = (contract(g) + 2.0) * grid.half
     return g
 
 
 @qd.func
 def to_world(g: vec3, grid: GridArgs, contracted: qd.template()):
-    """The position at grid coordinates: the inverse of `to_grid`, up to that of `contract_point`."""
+    """The position at grid coordinates: the inverse of `to_grid`, up to that of `contract`."""
     p = g / grid.scale + grid.lower
     if qd.static(contracted):
-        p = uncontract_point(g / grid.half - 2.0) / grid.scale + grid.lower
+        p = uncontract(g / grid.half - 2.0) / grid.scale + grid.lower
     return p
 
 
 @qd.func
-def contract_point(q: vec3):
+def contract(q: vec3):
     """Contracted position of a normalised one (`cagefield.fields.contraction.contract`)."""
     m = qd.max(qd.abs(q).max(), 1.0)
     return ((2.0 - 1.0 / m) / m) * q
 
 
 @qd.func
-def uncontract_point(c: vec3):
-    """The inverse of `contract_point`, up to 1e-4 from the surface at infinity."""
+def uncontract(c: vec3):
+    """The inverse of `contract`, up to 1e-4 from the surface at infinity (`contraction.uncontract`)."""
     m = qd.min(qd.abs(c).max(), 2.0 - 1e-4)
     scale = 1.0
     if m > 1.0:

@@ -13,7 +13,7 @@ from cagefield.rendering.kernels.grid import (
     ivec3,
     to_grid,
     to_world,
-    uncontract_point,
+    uncontract,
     vec3,
 )
 from cagefield.rendering.kernels.occupancy_queries import MOST_CELLS, is_blocked, is_dense
@@ -96,7 +96,7 @@ def probe(g: vec3, grid: GridArgs, edits: EditArgs, contracted: qd.template(), f
         d = e / grid.scale
         if qd.static(contracted):
             d = (
-                (uncontract_point(c + 0.01 * e / grid.half) - uncontract_point(c - 0.01 * e / grid.half))
+                (uncontract(c + 0.01 * e / grid.half) - uncontract(c - 0.01 * e / grid.half))
                 * 50.0
                 / grid.scale
             )

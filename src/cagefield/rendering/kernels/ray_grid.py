@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import quadrants as qd
 
-from cagefield.rendering.kernels.grid import I32, contract_point, contract_velocity, ivec3, vec3
+from cagefield.rendering.kernels.grid import I32, contract, contract_velocity, ivec3, vec3
 
 vec2 = qd.types.vector(2, qd.f32)
 
@@ -101,7 +101,7 @@ def look_ahead(
     last = 0
     if qd.static(contracted):
         v = contract_velocity(q, gd) * half
-        g = (contract_point(q) + 2.0) * half
+        g = (contract(q) + 2.0) * half
         h = step / qd.abs(v).max()
         share = 1.0
         limit = 1e30

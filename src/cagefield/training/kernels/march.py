@@ -28,7 +28,7 @@ from cagefield.loops import Deal, dealt, turns
 from cagefield.rendering.kernels.grid import (
     F32,
     GridArgs,
-    contract_point,
+    contract,
     contract_velocity,
     corner_slots,
     corner_weights,
@@ -277,7 +277,7 @@ def march_batch(
                         )
                         g = q
                         if qd.static(contracted):
-                            g = (contract_point(q) + 2.0) * grid.half
+                            g = (contract(q) + 2.0) * grid.half
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
                         slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                         b = corner_weights(g - qd.cast(cell, qd.f32))
