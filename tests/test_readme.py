@@ -1,4 +1,4 @@
-"""What the README shows works: its edit file, its Python, its commands."""
+"""What the README and the documentation show works: their edit files, their Python, their commands."""
 
 from __future__ import annotations
 
@@ -13,33 +13,55 @@ from cagefield.cli import parse
 from cagefield.edits.files import parse_edits
 from scenes import ball_scene
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+PAGES = ("README.md", *sorted(page.relative_to(ROOT).as_posix() for page in (ROOT / "docs").rglob("*.md")))
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.S | re.M)
+def blocks(page: str, language: str) -> list[str]:
+    """The blocks of a language on a page, but for those that show a file of the repository."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    found: list[str] = re.findall(rf"^```{language}\n(.*?)^```", text, re.S | re.M)
+    return [block for block in found if "--8<--" not in block]
 
 
-def test_edit_file() -> None:
-    (text,) = blocks("yaml")
+@pytest.mark.parametrize("page", PAGES)
+def test_edit_files(page: str) -> None:
+    for text in blocks(page, "yaml"):
+        if text.startswith("version:"):
+            parse_edits(text).check()
+
+
+def test_edit_files_show_every_kind_of_edit() -> None:
+    (readme,) = blocks("README.md", "yaml")
+    assert [edit.name for edit in parse_edits(readme)] == ["raise the arm"]
+    (text,) = blocks("docs/how-to/edit-files.md", "yaml")
     edits = parse_edits(text)
-    edits.check()
     assert [edit.name for edit in edits] == ["raise the arm", "a second cone", "no beacon"]
     assert edits[1].keep_source and edits[2].deleted
 
 
-def test_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("page", ["README.md", "docs/how-to/python.md"])
+def test_python(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     ball_scene().save("scene")
-    (code,) = blocks("python")
+    (code,) = blocks(page, "python")
     names: dict[str, object] = {}
     exec(code, names)
     assert Scene.open("edited").edits == names["edited"].edits  # type: ignore[attr-defined]
 
 
-def test_commands_have_the_options_they_are_shown_with() -> None:
-    lines = [line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
-    commands = [shlex.split(line.rpartition("&& ")[2])[1:] for line in lines if "cagefield " in line]
-    assert {command[0] for command in commands} >= {"demo", "make-scene", "train", "info", "edit", "render"}
-    for command in commands:
+def commands(page: str) -> list[list[str]]:
+    lines = [line.partition("#")[0].strip() for block in blocks(page, "sh") for line in block.splitlines()]
+    return [shlex.split(line.rpartition("&& ")[2])[1:] for line in lines if "cagefield " in line]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_have_the_options_they_are_shown_with(page: str) -> None:
+    for command in commands(page):
         assert not isinstance(parse(command), int), command
+
+
+def test_commands_are_shown() -> None:
+    assert {command[0] for command in commands("README.md")} >= {"demo", "train", "view", "edit", "render"}
+    shown = {command[0] for page in PAGES for command in commands(page)}
+    assert shown >= {"demo", "make-scene", "train", "poses", "info", "edit", "render", "import", "bake", "view"}
