@@ -2,6 +2,7 @@
 
     python docs/tutorial/pictures.py digger SCENE
     python docs/tutorial/pictures.py chair SCENE
+    python docs/tutorial/pictures.py drag SCENE      # of the digger: the animation that the README begins with
 
 SCENE is the built-in digger, or the chair of NeRF's synthetic scenes, trained; it is copied first and left as
 it is. Cages are pasted as text; everything else is done with the mouse.
@@ -9,12 +10,15 @@ it is. Cages are pasted as text; everything else is done with the mouse.
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
 import tempfile
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+
+from PIL import Image
 
 import cagefield
 from editor_page import EditorPage, Point, editor_page
@@ -65,7 +69,7 @@ edits:
 def main() -> None:
     """Runs a session."""
     name, path = sys.argv[1:]
-    session = {"digger": digger, "chair": chair}[name]
+    session = {"digger": digger, "chair": chair, "drag": drag}[name]
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / name
         shutil.copytree(path, scene)
@@ -116,6 +120,38 @@ def chair(editor: EditorPage) -> None:
     shot(editor, "chair-copied")
     pasted(editor, ARM_REST)
     shot(editor, "chair-deleted")
+
+
+def drag(editor: EditorPage) -> None:
+    """The arm raised and turned: a picture at every step, as an animation."""
+    turned(editor, (-230, -20))
+    pasted(editor, ARM[: ARM.index("    operations:")])
+    editor.tools(mode="edit", tool="translate")
+    editor.settle()
+    frames: list[Image.Image] = []
+    filmed(editor, "Z", [(0.0, -3.0 * step) for step in range(19)], frames)
+    editor.tools(tool="rotate")
+    filmed(editor, "Y", [(0.0, -4.0 * step) for step in range(16)], frames)
+    times = [90] * len(frames)
+    times[0] = times[-1] = 900
+    frames[0].save(
+        HERE.parent / "drag.webp", save_all=True, append_images=frames[1:], duration=times, quality=70, method=6
+    )
+
+
+def filmed(editor: EditorPage, grip: str, path: list[Point], frames: list[Image.Image]) -> None:
+    """Drags a handle of the gizmo along a path of pixels; a picture of the view at each of its points."""
+    page, at = editor.page, editor.grip(grip)
+    page.mouse.move(*at)
+    page.mouse.down()
+    for x, y in path:
+        page.mouse.move(at[0] + x, at[1] + y)
+        page.wait_for_timeout(900)
+        picture = Image.open(io.BytesIO(page.screenshot(type="png"))).convert("RGB")
+        frames.append(picture.resize((picture.width * 5 // 8, picture.height * 5 // 8), Image.Resampling.LANCZOS))
+    page.mouse.up()
+    editor.until("cagefield.drag === null")
+    editor.settle()
 
 
 def shot(editor: EditorPage, name: str) -> None:
