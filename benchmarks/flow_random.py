@@ -26,7 +26,8 @@ from scipy.spatial.transform import Rotation
 from cagefield import devices
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, write_text
-from cagefield.cages import Cage, are_valid
+from cagefield.cage_checks import are_valid
+from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.limits import largest_of
 from cagefield.edits.operations import (

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cagefield.cages import Cage
-from cagefield.edits.edit import Edit, _is_valid, largest_safe
+from cagefield.edits.edit import Edit
+from cagefield.edits.limits import is_valid, largest_safe
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -69,7 +70,7 @@ def edits(draw: st.DrawFn, fold_free: float = 0.95, shell: str = "trilinear") ->
     gap = np.linalg.norm(A, axis=0).min() * 0.25
     for kind in draw(st.lists(st.integers(0, 6), min_size=1, max_size=3)):
         operation = random_operation(rng, kind, gap)
-        if _is_valid(operation, 1.0, edit.deformed):
+        if is_valid(operation, 1.0, edit.deformed):
             edit = edit.then(operation.part(fold_free * edit.safe_fraction(operation)))
     return edit
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from scipy.spatial.transform import Rotation
 
-from cagefield import trilinear_hex
+from cagefield import hex_determinant, trilinear_hex
 from cagefield.cages import Cage, outside_by
 from cagefield.errors import CageError
 from random_cages import cages, examples, seeds
@@ -125,7 +125,7 @@ def test_contains_the_points_of_bilinear_hexahedra_and_no_others(cage: Cage, see
 @examples(25)
 @given(cages(), seeds)
 def test_determinant_polynomial(cage: Cage, seed: int) -> None:
-    bernstein = trilinear_hex.determinant_coefficients(cage.corners)
+    bernstein = hex_determinant.determinant_coefficients(cage.corners)
     u = np.random.default_rng(seed).random((50, 3))
     basis = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u**2])
     value = np.einsum("ijk,in,jn,kn->n", bernstein, basis[:, :, 0], basis[:, :, 1], basis[:, :, 2])
@@ -139,8 +139,8 @@ def test_is_positive_decides_by_splitting() -> None:
     # (x - 1/3)^2 + c: positive at the corners, its least Bernstein coefficient is negative.
     square = np.array([1 / 9, 1 / 9 - 1 / 3, 4 / 9])
     block = np.broadcast_to(square[:, None, None], (1, 3, 3, 3))
-    assert not trilinear_hex.is_positive(block - 1e-3)
-    assert trilinear_hex.is_positive(block + 1e-3)
+    assert not hex_determinant.is_positive(block - 1e-3)
+    assert hex_determinant.is_positive(block + 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ from scipy.integrate import solve_ivp
 
 from cagefield.cages import Axes, Cage
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.edit import largest_safe
-from cagefield.edits.limits import along, flow_reach
+from cagefield.edits.limits import along, flow_reach, largest_safe
 from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
 from cagefield.errors import CageError, EditError
 from cagefield.typing import Array

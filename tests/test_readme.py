@@ -64,4 +64,15 @@ def test_commands_have_the_options_they_are_shown_with(page: str) -> None:
 def test_commands_are_shown() -> None:
     assert {command[0] for command in commands("README.md")} >= {"demo", "train", "view", "edit", "render"}
     shown = {command[0] for page in PAGES for command in commands(page)}
-    assert shown >= {"demo", "make-scene", "train", "poses", "info", "edit", "render", "import", "bake", "view"}
+    assert shown >= {
+        "demo",
+        "make-scene",
+        "train",
+        "poses",
+        "info",
+        "edit",
+        "render",
+        "import",
+        "bake",
+        "view",
+    }

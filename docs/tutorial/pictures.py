@@ -2,7 +2,7 @@
 
     python docs/tutorial/pictures.py digger SCENE
     python docs/tutorial/pictures.py chair SCENE
-    python docs/tutorial/pictures.py drag SCENE      # of the digger: the animation that the README begins with
+    python docs/tutorial/pictures.py drag SCENE      # of the digger: the animation at the README's top
 
 SCENE is the built-in digger, or the chair of NeRF's synthetic scenes, trained; it is copied first and left as
 it is. Cages are pasted as text; everything else is done with the mouse.
@@ -135,7 +135,12 @@ def drag(editor: EditorPage) -> None:
     times = [90] * len(frames)
     times[0] = times[-1] = 900
     frames[0].save(
-        HERE.parent / "drag.webp", save_all=True, append_images=frames[1:], duration=times, quality=70, method=6
+        HERE.parent / "drag.webp",
+        save_all=True,
+        append_images=frames[1:],
+        duration=times,
+        quality=70,
+        method=6,
     )
 
 
@@ -148,7 +153,9 @@ def filmed(editor: EditorPage, grip: str, path: list[Point], frames: list[Image.
         page.mouse.move(at[0] + x, at[1] + y)
         page.wait_for_timeout(900)
         picture = Image.open(io.BytesIO(page.screenshot(type="png"))).convert("RGB")
-        frames.append(picture.resize((picture.width * 5 // 8, picture.height * 5 // 8), Image.Resampling.LANCZOS))
+        frames.append(
+            picture.resize((picture.width * 5 // 8, picture.height * 5 // 8), Image.Resampling.LANCZOS)
+        )
     page.mouse.up()
     editor.until("cagefield.drag === null")
     editor.settle()

@@ -17,22 +17,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from cagefield import trilinear_hex
+from cagefield.cage_checks import check_orientation, corner_number, factors, read_only, vector
 from cagefield.errors import CageError
+from cagefield.trilinear_hex import EDGES as EDGES
+from cagefield.trilinear_hex import FACES as FACES
 from cagefield.typing import Array, Mask
 
 Axes: TypeAlias = Literal["world", "cage"]
-
-EDGES: tuple[tuple[int, int], ...] = tuple(
-    (i, i | 1 << axis) for axis in range(3) for i in range(8) if not i >> axis & 1
-)
-FACES: dict[str, tuple[int, int, int, int]] = {
-    f"{sign}{name}": tuple(k for k in range(8) if (k >> axis & 1) == bit)  # type: ignore[misc]
-    for axis, name in enumerate("xyz")
-    for sign, bit in (("+", 1), ("-", 0))
-}
-
-_FLAT = 1e-9
-"""Least Jacobian determinant of a valid cage, as a share of the product of its mean edge lengths."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +48,11 @@ class Cage:
     pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
-        corners = _read_only(self.corners, (8, 3), "cage corners")
+        corners = read_only(self.corners, (8, 3), "cage corners")
         pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
         object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "pivot", _read_only(pivot, (3,), "cage pivot"))
-        _check_orientation(corners)
+        object.__setattr__(self, "pivot", read_only(pivot, (3,), "cage pivot"))
+        check_orientation(corners)
 
     @classmethod
     def box(cls, center: ArrayLike, size: ArrayLike, rotation: ArrayLike = (0.0, 0.0, 0.0)) -> Cage:
@@ -214,11 +205,11 @@ class Cage:
 
     def move_corner(self, corner: int, by: ArrayLike) -> Cage:
         """The cage with corner k, 0 to 7, moved by a vector [3]; the pivot stays."""
-        return self._move((_corner_number(corner),), vector(by, "move_corner"))
+        return self._move((corner_number(corner),), vector(by, "move_corner"))
 
     def move_edge(self, edge: tuple[int, int], by: ArrayLike) -> Cage:
         """The cage with both corners of edge (i, j) moved by a vector [3]; the pivot stays."""
-        pair = tuple(sorted(_corner_number(k) for k in edge))
+        pair = tuple(sorted(corner_number(k) for k in edge))
         if pair not in EDGES:
             raise CageError(f"edge {tuple(edge)} is not an edge of a cage: the edges are {list(EDGES)}")
         return self._move(pair, vector(by, "move_edge"))
@@ -231,7 +222,7 @@ class Cage:
 
     def move_corners(self, corners: Iterable[int], by: ArrayLike) -> Cage:
         """The cage with some of its corners, each named once, moved by one vector [3]; the pivot stays."""
-        chosen = tuple(_corner_number(corner) for corner in corners)
+        chosen = tuple(corner_number(corner) for corner in corners)
         if not chosen or len(set(chosen)) < len(chosen):
             raise CageError(f"corners must name one or more corners, each once, got {list(chosen)}")
         return self._move(chosen, vector(by, "move_corners"))
@@ -252,22 +243,6 @@ class Cage:
 def rotation_matrix(theta: ArrayLike) -> Array:
     """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
     return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())
-
-
-def vector(value: ArrayLike, name: str) -> Array:
-    """A finite float64 vector [3], or a `CageError` that names it."""
-    v = _read_only(value, (3,), name)
-    return v
-
-
-def factors(value: ArrayLike, name: str) -> Array:
-    """Three positive finite factors [3] from one or three, or a `CageError` that names them."""
-    raw = np.asarray(value, dtype=np.float64)
-    v = _read_only(np.full(3, raw) if raw.ndim == 0 else raw, (3,), name)
-    if not (v > 0.0).all():
-        axis = int(np.argmin(v))
-        raise CageError(f"{name} must be positive along every axis, got {v[axis]:g} along {'xyz'[axis]}")
-    return v
 
 
 def outside_by(cage: Cage, point: ArrayLike) -> tuple[str, float]:
@@ -313,83 +288,6 @@ def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -
     return sign * float((p - x) @ normal) / float(np.linalg.norm(normal))
 
 
-def _read_only(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise CageError(f"{name} must be numbers of shape {list(shape)}, got {value!r}") from None
-    if array.shape != shape:
-        raise CageError(f"{name} must have shape {list(shape)}, got {list(array.shape)}")
-    if not np.isfinite(array).all():
-        where = np.argwhere(~np.isfinite(array))[0]
-        label = f"{name}: corner {where[0]}" if len(shape) == 2 else name
-        shown = array[where[0]] if len(shape) == 2 else array
-        raise CageError(f"{label} must be finite, got {format_vector(shown)}")
-    array.setflags(write=False)
-    return array
-
-
-def format_vector(v: Array) -> str:
-    """A point as text, "(0.41, 0.10, 0.93)"."""
-    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
-
-
-def _corner_number(corner: int) -> int:
-    if isinstance(corner, bool) or not isinstance(corner, (int, np.integer)) or not 0 <= corner <= 7:
-        raise CageError(f"corner {corner!r} is not a corner of a cage: corners are 0 to 7, k = x + 2y + 4z")
-    return int(corner)
-
-
 def _named_shears(S: Array) -> str:
     names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
     return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)
-
-
-def are_valid(corners: Array) -> Mask:
-    """Mask [B] of the corners [B,8,3] that a `Cage` may have."""
-    bernstein, lengths = _orientation(corners)
-    floor = _FLAT * lengths.prod(axis=1)
-    return (floor > 0.0) & trilinear_hex.are_positive(bernstein - floor[:, None, None, None])
-
-
-def _orientation(corners: Array) -> tuple[Array, Array]:
-    """(Bernstein coefficients [B,3,3,3] of the determinants, mean edges [B,3] along each axis)."""
-    tails, heads = np.array(EDGES).T
-    lengths = np.linalg.norm(corners[:, heads] - corners[:, tails], axis=2)
-    return trilinear_hex.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
-
-
-def _check_orientation(corners: Array) -> None:
-    """Raise `CageError` where the Jacobian determinant is not positive over the whole trilinear_hex."""
-    if are_valid(corners[None])[0]:
-        return
-    bernstein, lengths = (each[0] for each in _orientation(corners[None]))
-    floor = _FLAT * lengths.prod()
-    at_corners = bernstein[::2, ::2, ::2].transpose(2, 1, 0).ravel()  # corner k = x + 2y + 4z
-    k = int(np.argmin(at_corners))
-    where = f"corner {k} at {format_vector(corners[k])}"
-    if lengths.min() == 0.0 or np.abs(at_corners).max() <= floor:
-        raise CageError(
-            f"cage has zero size: its mean edges along x, y, z are {format_vector(lengths)} long and {where}"
-            " spans no volume; give it a positive size along every axis"
-        )
-    if at_corners.max() < 0.0:
-        raise CageError(
-            f"cage is mirrored: the Jacobian determinant is negative at every corner ({at_corners[k]:.3g} at"
-            f" {where}); list the corners in the order k = x + 2y + 4z of a right-handed frame"
-        )
-    if at_corners.min() > floor:
-        g = np.linspace(0.0, 1.0, 17)
-        u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
-        det = np.linalg.det(trilinear_hex.jacobian(corners, u))
-        worst = int(np.argmin(det))
-        k = int(np.argmin(((trilinear_hex.BITS - u[worst]) ** 2).sum(axis=1)))
-        raise CageError(
-            f"cage is inside out between its corners, nearest to corner {k} at {format_vector(corners[k])}:"
-            f" the Jacobian determinant there falls to {det[worst]:.3g} and must stay positive; move corner"
-            f" {k} away from the middle of the cage"
-        )
-    raise CageError(
-        f"cage is inside out at {where}: the Jacobian determinant there is {at_corners[k]:.3g} and must be"
-        f" positive; move corner {k} back from the opposite faces"
-    )

@@ -16,13 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield import lenses
+from cagefield.camera_checks import checked_number, checked_pose, checked_size
 from cagefield.errors import CameraError
 from cagefield.lenses import Lens
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
-_RIGID_TOLERANCE = 5e-3  # rotations printed with three decimals stay under it; a scale of 0.5 % does not
 _MAX_BLIND_SHARE = (
     0.1  # above this share of pixels without a ray, coefficients and image do not belong together
 )
@@ -53,11 +53,11 @@ class Camera:
         def set_field(name: str, value: object) -> None:
             object.__setattr__(self, name, value)
 
-        set_field("c2w", _checked_pose(self.c2w))
+        set_field("c2w", checked_pose(self.c2w))
         for name in ("width", "height"):
-            set_field(name, _checked_size(name, getattr(self, name)))
+            set_field(name, checked_size(name, getattr(self, name)))
         for name in ("fx", "fy", "cx", "cy"):
-            value = _checked_number(name, getattr(self, name))
+            value = checked_number(name, getattr(self, name))
             if name in ("fx", "fy") and value <= 0:
                 raise CameraError(f"{name} must be a positive focal length in pixels, got {value}")
             set_field(name, value)
@@ -70,7 +70,7 @@ class Camera:
                 f"a camera of model {self.model!r} takes {counts} distortion coefficients, "
                 f"got {len(self.distortion)}"
             )
-        set_field("distortion", tuple(_checked_number("distortion", k) for k in self.distortion))
+        set_field("distortion", tuple(checked_number("distortion", k) for k in self.distortion))
 
     @classmethod
     def from_fov(cls, c2w: npt.ArrayLike, width: int, height: int, fov_x: float) -> Camera:
@@ -79,7 +79,7 @@ class Camera:
             raise CameraError(
                 f"fov_x must lie between 0 and pi radians, got {fov_x}; convert degrees with math.radians"
             )
-        focal = 0.5 * _checked_size("width", width) / math.tan(0.5 * fov_x)
+        focal = 0.5 * checked_size("width", width) / math.tan(0.5 * fov_x)
         return cls(cast(FloatArray, c2w), width, height, focal, focal, 0.5 * width, 0.5 * height)
 
     @classmethod
@@ -180,7 +180,7 @@ class Camera:
 
     def resized(self, width: int, height: int) -> Camera:
         """The same view in an image of `width` x `height`: intrinsics in pixels scale with each side."""
-        sx, sy = _checked_size("width", width) / self.width, _checked_size("height", height) / self.height
+        sx, sy = checked_size("width", width) / self.width, checked_size("height", height) / self.height
         return replace(
             self, width=width, height=height,
             fx=self.fx * sx, fy=self.fy * sy, cx=self.cx * sx, cy=self.cy * sy,
@@ -321,45 +321,3 @@ def _local_directions(
         warnings.warn(f"{message}; these pixels get the nearest direction the lens sees", stacklevel=3)
     directions.flags.writeable = False
     return directions
-
-
-def _checked_pose(c2w: npt.ArrayLike) -> FloatArray:
-    """A read-only [4,4] float64 copy of a rigid camera-to-world matrix."""
-    try:
-        pose = np.array(c2w, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise CameraError("c2w must be a matrix [4,4] of numbers") from None
-    if pose.shape != (4, 4):
-        raise CameraError(f"c2w must have the shape [4,4], got {list(pose.shape)}")
-    if not np.isfinite(pose).all():
-        row, column = np.argwhere(~np.isfinite(pose))[0].tolist()
-        raise CameraError(f"c2w[{row}][{column}] is {pose[row, column]}; every entry must be finite")
-    if not np.array_equal(pose[3], (0.0, 0.0, 0.0, 1.0)):
-        raise CameraError(f"the last row of c2w must be 0 0 0 1, got {pose[3].tolist()}; is it transposed?")
-    rotation = pose[:3, :3]
-    deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if deviation > _RIGID_TOLERANCE:
-        raise CameraError(
-            f"c2w is not a rigid motion: its 3x3 part deviates from a rotation by {deviation:.3g} "
-            f"(allowed {_RIGID_TOLERANCE:g}); take scale and shear out of the pose"
-        )
-    if np.linalg.det(rotation) < 0:
-        raise CameraError(
-            "c2w is not a rigid motion: it mirrors (determinant -1); flip the sign of one camera axis"
-        )
-    pose.flags.writeable = False
-    return pose
-
-
-def _checked_size(name: str, value: Any) -> int:
-    number = _checked_number(name, value)
-    if number != int(number) or number < 1:
-        raise CameraError(f"{name} must be a whole number of pixels, at least 1, got {value!r}")
-    return int(number)
-
-
-def _checked_number(name: str, value: Any) -> float:
-    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value):
-        raise CameraError(f"{name} must be a finite number, got {value!r}")
-    return float(value)

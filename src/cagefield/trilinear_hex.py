@@ -1,4 +1,4 @@
-"""The trilinear hexahedron: map, Jacobian, inverse and a sign test for its determinant, in float64.
+"""The trilinear hexahedron: map, Jacobian and inverse, in float64.
 
 Notation: corners v_k, k = x + 2y + 4z with x, y, z in {0, 1} (VTK voxel order); u in [0,1]^3;
 x(u) = sum_k N_k(u) v_k with N_k the trilinear weights. Internally xi = 2u - 1 and the monomial form
@@ -7,7 +7,7 @@ x(u) = sum_k N_k(u) v_k with N_k the trilinear weights. Internally xi = 2u - 1 a
 
 whose index has the bits of its variables. The inverse works on y = W (x - C_0) with W the inverse of the
 Jacobian at the centre, so that y = xi + (four terms that vanish on parallelepipeds): thin and sheared
-hexahedra are as well conditioned as cubes.
+hexahedra are as well conditioned as cubes. `hex_determinant` tests the Jacobian's sign.
 """
 
 from __future__ import annotations
@@ -21,6 +21,18 @@ from cagefield.typing import Array, Mask
 
 BITS: Array = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=np.float64)
 """[8,3] u of the eight corners."""
+
+EDGES: tuple[tuple[int, int], ...] = tuple(
+    (i, i | 1 << axis) for axis in range(3) for i in range(8) if not i >> axis & 1
+)
+"""Pairs (i, j) of corners, i < j, that differ in one bit."""
+
+FACES: dict[str, tuple[int, int, int, int]] = {
+    f"{sign}{name}": tuple(k for k in range(8) if (k >> axis & 1) == bit)  # type: ignore[misc]
+    for axis, name in enumerate("xyz")
+    for sign, bit in (("+", 1), ("-", 0))
+}
+"""The corners of each face, by its name."""
 
 _SIGNS = 2.0 * BITS - 1.0
 _TO_MONOMIAL: Array = (
@@ -105,7 +117,7 @@ def invert(matrices: Array) -> Array:
     rows = [matrices[:, i].T for i in range(3)]
     size = np.abs(matrices).max(axis=(1, 2), initial=1e-300)
     a, b, c = (row / size for row in rows)
-    cofactors = [_cross(b, c), _cross(c, a), _cross(a, b)]
+    cofactors = [cross(b, c), cross(c, a), cross(a, b)]
     det = _off_zero((a * cofactors[0]).sum(axis=0), 1e-30)
     return np.ascontiguousarray(np.transpose(np.stack(cofactors) / (det * size), (2, 1, 0)))
 
@@ -113,47 +125,6 @@ def invert(matrices: Array) -> Array:
 def inside(u: Array, found: Mask) -> Mask:
     """Mask [N] of the points whose u, as `inverse` returns it, lies in the closed unit cube."""
     return found & np.asarray(((u >= 0.0) & (u <= 1.0)).all(axis=1))
-
-
-def determinant_coefficients(corners: Array) -> Array:
-    """Bernstein coefficients [...,3,3,3] over u in [0,1]^3 of det dx/du, axes (u_x, u_y, u_z).
-
-    The determinant has degree 2 in each variable. Its minimum is at least the least coefficient, and the
-    eight coefficients at the corners of the block are the determinants at the corners of the hexahedron.
-    """
-    along = [corners[..., _EDGE_HEADS[a], :] - corners[..., _EDGE_TAILS[a], :] for a in range(3)]
-    a, b, c = (np.moveaxis(edges, -1, 0) for edges in along)
-    normals = _cross(b[..., :, None], c[..., None, :])  # [3,...,4,4]
-    triple = np.einsum("d...i,d...jk->...ijk", a, normals).reshape(*a.shape[1:-1], 64)
-    return np.asarray((triple @ _TRIPLE_WEIGHTS.T).reshape(*triple.shape[:-1], 3, 3, 3))
-
-
-def are_positive(bernstein: Array) -> Mask:
-    """Mask [B] of the triquadratic polynomials with coefficients [B,3,3,3] that `is_positive` finds so."""
-    mask = np.asarray((bernstein > 0.0).all(axis=(1, 2, 3)))
-    doubtful = ~mask & (bernstein[:, ::2, ::2, ::2] > 0.0).all(axis=(1, 2, 3))
-    for row in np.flatnonzero(doubtful):
-        mask[row] = is_positive(bernstein[row])
-    return mask
-
-
-def is_positive(bernstein: Array, depth: int = 6) -> bool:
-    """True when every triquadratic polynomial with Bernstein coefficients [B,3,3,3] is > 0 on the unit cube.
-
-    Exact up to 2^-depth: blocks are split until the least coefficient is positive (proof), a corner is not
-    (counter-example), or `depth` splits have not decided, which counts as not positive.
-    """
-    blocks = bernstein.reshape(-1, 3, 3, 3)
-    for _ in range(depth):
-        blocks = blocks[blocks.min(axis=(1, 2, 3)) <= 0.0]
-        if len(blocks) == 0:
-            return True
-        if blocks[:, ::2, ::2, ::2].min() <= 0.0:
-            return False
-        for axis in (1, 2, 3):
-            halves = np.tensordot(_SPLIT, blocks, axes=(2, axis))  # [2,3,B,...]
-            blocks = np.moveaxis(halves, 1, axis + 1).reshape(-1, 3, 3, 3)
-    return bool(blocks.min() > 0.0)
 
 
 def _evaluate(C: Array, xi: Array) -> Array:
@@ -298,7 +269,7 @@ def _in_hull(local: Array, y: Array) -> Mask:
 def solve(J: tuple[Array, Array, Array], r: Array) -> Array:
     """J^-1 r [3,N] by Cramer's rule, from the columns [3,N] of J; singular J are moved off zero."""
     a, b, c = J
-    bc, ar = _cross(b, c), _cross(a, r)
+    bc, ar = cross(b, c), cross(a, r)
     det = _off_zero((a * bc).sum(axis=0), 1e-12)
     return np.stack([(r * bc).sum(axis=0), (c * ar).sum(axis=0), -(b * ar).sum(axis=0)]) / det
 
@@ -307,29 +278,6 @@ def _off_zero(values: Array, least: float) -> Array:
     return np.where(np.abs(values) < least, np.copysign(least, values), values)
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross(a: Array, b: Array) -> Array:
+    """a x b of vectors [3,...]; the component axis comes first."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def _triples() -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]], Array]:
-    """Edge tails and heads per axis, and the Bernstein weights [27,64] of products of one edge per axis."""
-    tails, heads = [], []
-    for axis in range(3):
-        tail = np.array([k for k in range(8) if not k >> axis & 1])
-        tails.append(tail)
-        heads.append(tail | 1 << axis)
-    weights = np.zeros((27, 64))
-    for n, (i, j, k) in enumerate(product(range(4), repeat=3)):
-        degree = (BITS[tails[0][i]] + BITS[tails[1][j]] + BITS[tails[2][k]]).astype(int)
-        # B1_i B1_j = C(1,i) C(1,j) / C(2,i+j) B2_{i+j}: one half where the two indices differ.
-        weights[degree[0] * 9 + degree[1] * 3 + degree[2], n] = np.prod(np.where(degree == 1, 0.5, 1.0))
-    return tails, heads, weights
-
-
-_EDGE_TAILS, _EDGE_HEADS, _TRIPLE_WEIGHTS = _triples()
-_SPLIT: Array = np.array(
-    [
-        [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.25, 0.5, 0.25]],
-        [[0.25, 0.5, 0.25], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]],
-    ]
-)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import trilinear_hex
+from cagefield import hex_determinant
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.splat import SplatField
@@ -107,7 +107,7 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
 
 def _volume(cage: Cage) -> float:
     """Volume of a hexahedron: the mean of the Bernstein coefficients of its Jacobian determinant."""
-    return float(trilinear_hex.determinant_coefficients(cage.corners).mean())
+    return float(hex_determinant.determinant_coefficients(cage.corners).mean())
 
 
 def _vertex_positions(field: VoxelField) -> Array:

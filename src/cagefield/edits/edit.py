@@ -6,29 +6,27 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cagefield.cages import Axes, Cage, format_vector, outside_by
+from cagefield.cage_checks import format_vector
+from cagefield.cages import Axes, Cage, outside_by
 from cagefield.edits import operations as ops
-from cagefield.edits.limits import flow_reach
+from cagefield.edits.limits import as_text, flow_reach, is_valid, largest_safe
 from cagefield.edits.operations import Operation
+from cagefield.edits.options import Adjustment, problem_of_options
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.typing import Array
-from cagefield.warps import FALLOFFS, SHELLS, Falloff, FlowShell, Shell, Warp
+from cagefield.warps import SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.inner_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
-Adjustment: TypeAlias = Literal["continuous", "discrete"]
-
 AT_ONCE = 500
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
-
-LATTICE_RANGE = (2, 512)
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,18 @@ class Edit:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
-        self._check_options()
+        problem = problem_of_options(
+            self.adjustment,
+            self.shell,
+            has_outer=self.outer is not None,
+            has_operations=bool(self.operations),
+            keep_source=self.keep_source,
+            deleted=self.deleted,
+            fading=(self.falloff, self.width),
+            lattice=self.lattice,
+        )
+        if problem is not None:
+            raise self._error(problem)
         self.deformed  # noqa: B018  an operation that makes an impossible cage is an error here
 
     @classmethod
@@ -88,9 +97,9 @@ class Edit:
                 cage = operation.apply(cage)
             except CageError as error:
                 message = f"operation {number}, {operation.noun} {operation}: {error}"
-                safe = largest_safe(lambda t, c=cage, o=operation: _is_valid(o, t, c))  # type: ignore[misc]
+                safe = largest_safe(lambda t, c=cage, o=operation: is_valid(o, t, c))  # type: ignore[misc]
                 raise self._error(
-                    message + (f"; {_share(safe)} of it is safe" if safe > 0.0 else "")
+                    message + (f"; {as_text(safe)} of it is safe" if safe > 0.0 else "")
                 ) from None
         return cage
 
@@ -264,7 +273,7 @@ class Edit:
             before = self.replace(operations=self.operations[: number - 1])
             if before._is_safe(before.deformed):
                 operation = self.operations[number - 1]
-                share = _share(before._largest_part(operation))
+                share = as_text(before._largest_part(operation))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 
@@ -313,83 +322,10 @@ class Edit:
         falloff = Falloff(self.falloff, self.width)
         return SHELLS[self.shell](self.inner, self.deformed, self.outer, falloff)
 
-    def _check_options(self) -> None:
-        if self.adjustment not in ("continuous", "discrete"):
-            raise self._error(f'adjustment must be "continuous" or "discrete", got "{self.adjustment}"')
-        if self.shell not in SHELLS:
-            raise self._error(f'shell must be one of {", ".join(SHELLS)}, got "{self.shell}"')
-        if self.adjustment == "continuous":
-            if self.outer is None:
-                raise self._error(
-                    "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
-                    ' adjustment="discrete"'
-                )
-            if self.keep_source or self.deleted:
-                raise self._error(
-                    f'{"deleted" if self.deleted else "keep_source"} needs adjustment="discrete"'
-                )
-        if self.deleted and (self.operations or self.keep_source):
-            raise self._error("a delete has no operations and keeps no source")
-        self._check_falloff()
-        low, high = LATTICE_RANGE
-        if self.lattice is not None and not (
-            isinstance(self.lattice, int)
-            and not isinstance(self.lattice, bool)
-            and low <= self.lattice <= high
-        ):
-            raise self._error(
-                f"lattice must be None (exact) or a whole number of nodes per axis from {low} to {high}"
-                f" (64, 128 or 256, say), got {self.lattice!r}"
-            )
-
-    def _check_falloff(self) -> None:
-        if self.falloff not in FALLOFFS:
-            raise self._error(f'falloff must be one of {", ".join(FALLOFFS)}, got "{self.falloff}"')
-        if not 0.0 < self.width <= 1.0:
-            raise self._error(f"width must be above 0 and at most 1 (the whole shell), got {self.width!r}")
-        fades = self.adjustment == "continuous" and self.shell == "flow"
-        for name, value, default in (("falloff", self.falloff, "smooth"), ("width", self.width, 1.0)):
-            if value != default and not fades:
-                other = "discrete edit" if self.adjustment == "discrete" else f"{self.shell} shell"
-                raise self._error(
-                    f'{name} is an option of the flow shell, and a {other} has none; set shell="flow" (and'
-                    f' adjustment="continuous") or leave {name} out'
-                )
-
     def _error(self, message: str) -> EditError:
         return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")
-
-
-def _is_valid(operation: Operation, t: float, cage: Cage) -> bool:
-    try:
-        operation.part(t).apply(cage)
-    except CageError:
-        return False
-    return True
-
-
-def _share(fraction: float) -> str:
-    """A share as text, rounded down so that what is said to be safe is."""
-    return f"{np.floor(100.0 * fraction) / 100.0:.2f}"
 
 
 def bounds_of(boxes: Array) -> Array:
     """The box [2,3] that holds boxes [B,2,3]; (inf, -inf) for none."""
     return np.stack([boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)])
-
-
-def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:
-    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe; 1.0 where safe(1).
-
-    Goes up in sixteenths to the first that is not safe and bisects in front of it.
-    """
-    if safe(1.0):
-        return 1.0
-    if not safe(0.0):
-        return 0.0
-    high = next((n / 16.0 for n in range(1, 17) if not safe(n / 16.0)), 1.0)
-    low = high - 1.0 / 16.0
-    while high - low > tolerance:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if safe(middle) else (low, middle)
-    return low

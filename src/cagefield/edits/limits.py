@@ -1,4 +1,4 @@
-"""How far an operation may go: many shares of it tested together."""
+"""How far an operation may go: by bisection, or many shares of it tested together."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Cage, factors
+from cagefield.cage_checks import factors
+from cagefield.cages import Cage
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Operation, Rotate, Scale, Translate
+from cagefield.errors import CageError
 from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell
 
@@ -67,3 +69,34 @@ def largest_of(safe: Callable[[Array], Mask], tolerance: float = TOLERANCE) -> f
         first = int(np.argmin(mask))
         low, high = float(t[first]), float(t[first + 1])
     return low
+
+
+def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:
+    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe; 1.0 where safe(1).
+
+    Goes up in sixteenths to the first that is not safe and bisects in front of it.
+    """
+    if safe(1.0):
+        return 1.0
+    if not safe(0.0):
+        return 0.0
+    high = next((n / 16.0 for n in range(1, 17) if not safe(n / 16.0)), 1.0)
+    low = high - 1.0 / 16.0
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if safe(middle) else (low, middle)
+    return low
+
+
+def is_valid(operation: Operation, t: float, cage: Cage) -> bool:
+    """True where the share t of an operation makes a cage of this one."""
+    try:
+        operation.part(t).apply(cage)
+    except CageError:
+        return False
+    return True
+
+
+def as_text(share: float) -> str:
+    """A share as text, rounded down so that what is said to be safe is."""
+    return f"{np.floor(100.0 * share) / 100.0:.2f}"

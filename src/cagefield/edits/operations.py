@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import FACES, Axes, Cage, factors, vector
+from cagefield.cage_checks import factors, vector
+from cagefield.cages import FACES, Axes, Cage
 
 Triple: TypeAlias = tuple[float, float, float]
 

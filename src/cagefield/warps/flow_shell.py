@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield.cages import Cage, are_valid
+from cagefield.cage_checks import are_valid
+from cagefield.cages import Cage
 from cagefield.typing import Array, Mask
 from cagefield.warps.cage_motion import TIMES, Motion, gaps, may_bend
 from cagefield.warps.extended_coordinates import Extended

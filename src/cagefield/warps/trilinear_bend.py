@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import trilinear_hex
+from cagefield import hex_determinant, trilinear_hex
 from cagefield.typing import Array, Mask
 
 BENDS = [3, 5, 6, 7]
@@ -130,7 +130,7 @@ def _are_one_to_one(form: Array) -> Mask:
     mask = (mixed.reshape(len(K), 8, 8) > 0.0).all(axis=(1, 2))
     rows = np.flatnonzero(mask)
     corners = SIGNS + np.einsum("nk,bki->bni", _products(SIGNS), K[rows])
-    mask[rows] = trilinear_hex.are_positive(trilinear_hex.determinant_coefficients(corners))
+    mask[rows] = hex_determinant.are_positive(hex_determinant.determinant_coefficients(corners))
     return np.asarray(mask)
 
 

@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import trilinear_hex
+from cagefield import hex_determinant, trilinear_hex
 from cagefield.cages import Cage
 from cagefield.typing import Array
 from cagefield.warps.inner_map import between
@@ -69,35 +69,35 @@ class TrilinearShell:
         """
         C, D = self._determinants
         low, high = -1e3, float((_at_corners(D) / _at_corners(C)).min())
-        if trilinear_hex.is_positive(D - high * (1.0 - 1e-3) * C):
+        if hex_determinant.is_positive(D - high * (1.0 - 1e-3) * C):
             return high
         step = max(1e-3, 1e-3 * abs(high))
-        while not trilinear_hex.is_positive(D - (high - step) * C) and high - step > low:
+        while not hex_determinant.is_positive(D - (high - step) * C) and high - step > low:
             high, step = high - step, 2.0 * step
         low = high - step
         while high - low > 1e-3 * max(1.0, abs(high)):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if trilinear_hex.is_positive(D - middle * C) else (low, middle)
+            low, high = (middle, high) if hex_determinant.is_positive(D - middle * C) else (low, middle)
         return low
 
     def problem(self) -> str | None:
         """Why the shell is not one to one, or None."""
         C, D = self._determinants
-        if not trilinear_hex.is_positive(C):
+        if not hex_determinant.is_positive(C):
             side = SIDES[_worst(C)]
             return (
                 f"is folded before any operation, at side {side}: leave a gap between the cages on every"
                 " side, and turn the inner cage's axes towards the outer cage's"
             )
-        if not trilinear_hex.is_positive(D - LEAST_RATIO * C):
+        if not hex_determinant.is_positive(D - LEAST_RATIO * C):
             return f"folds at side {SIDES[_worst(D - LEAST_RATIO * C)]}"
         return None
 
     @cached_property
     def _determinants(self) -> tuple[Array, Array]:
         return (
-            trilinear_hex.determinant_coefficients(self.canonical_hexahedra),
-            trilinear_hex.determinant_coefficients(self.deformed_hexahedra),
+            hex_determinant.determinant_coefficients(self.canonical_hexahedra),
+            hex_determinant.determinant_coefficients(self.deformed_hexahedra),
         )
 
 

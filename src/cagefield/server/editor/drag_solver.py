@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias
 from cagefield.cages import EDGES, FACES, Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
-from cagefield.edits.edit import largest_safe
+from cagefield.edits.limits import largest_safe
 from cagefield.edits.operations import Operation, Triple
 from cagefield.errors import CagefieldError, EditError
 from cagefield.server.editor.document import Entry

@@ -1,0 +1,71 @@
+"""What the options of an edit may be, and which of them go together."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from cagefield.warps import FALLOFFS, SHELLS
+
+Adjustment: TypeAlias = Literal["continuous", "discrete"]
+
+LATTICE_RANGE = (2, 512)
+
+
+def problem_of_options(
+    adjustment: str,
+    shell: str,
+    *,
+    has_outer: bool,
+    has_operations: bool,
+    keep_source: bool,
+    deleted: bool,
+    fading: tuple[str, float],
+    lattice: int | None,
+) -> str | None:
+    """What is wrong with an edit's options, and the cure; None where they go together.
+
+    `fading` is (falloff, width). See `cagefield.edits.edit.Edit` for what each of them means.
+    """
+    if adjustment not in ("continuous", "discrete"):
+        return f'adjustment must be "continuous" or "discrete", got "{adjustment}"'
+    if shell not in SHELLS:
+        return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
+    if adjustment == "continuous":
+        if not has_outer:
+            return (
+                "a continuous edit needs an outer cage; give one (inner.grown(margin), say) or use"
+                ' adjustment="discrete"'
+            )
+        if keep_source or deleted:
+            return f'{"deleted" if deleted else "keep_source"} needs adjustment="discrete"'
+    if deleted and (has_operations or keep_source):
+        return "a delete has no operations and keeps no source"
+    return _problem_of_falloff(adjustment, shell, *fading) or _problem_of_lattice(lattice)
+
+
+def _problem_of_falloff(adjustment: str, shell: str, falloff: str, width: float) -> str | None:
+    if falloff not in FALLOFFS:
+        return f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff}"'
+    if not 0.0 < width <= 1.0:
+        return f"width must be above 0 and at most 1 (the whole shell), got {width!r}"
+    fades = adjustment == "continuous" and shell == "flow"
+    for name, value, default in (("falloff", falloff, "smooth"), ("width", width, 1.0)):
+        if value != default and not fades:
+            other = "discrete edit" if adjustment == "discrete" else f"{shell} shell"
+            return (
+                f'{name} is an option of the flow shell, and a {other} has none; set shell="flow" (and'
+                f' adjustment="continuous") or leave {name} out'
+            )
+    return None
+
+
+def _problem_of_lattice(lattice: int | None) -> str | None:
+    low, high = LATTICE_RANGE
+    if lattice is None or (
+        isinstance(lattice, int) and not isinstance(lattice, bool) and low <= lattice <= high
+    ):
+        return None
+    return (
+        f"lattice must be None (exact) or a whole number of nodes per axis from {low} to {high}"
+        f" (64, 128 or 256, say), got {lattice!r}"
+    )
