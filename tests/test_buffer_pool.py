@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.warps.buffer_pool import Joined
+from cagefield.warps.buffer_pool import BufferPool
 
 
 def part(value: float, rows: int = 4) -> np.ndarray:
@@ -17,10 +17,10 @@ def address(array: np.ndarray) -> int:
 
 
 def test_what_somebody_holds_is_not_written_into() -> None:
-    joined, parts = Joined(), [part(n) for n in range(5)]
-    first = joined.join(parts)
+    pool, parts = BufferPool(), [part(n) for n in range(5)]
+    first = pool.join(parts)
     before = first.copy()
-    other = joined.join([*parts[:2], part(9.0), *parts[3:]])
+    other = pool.join([*parts[:2], part(9.0), *parts[3:]])
     assert np.array_equal(first, before) and np.array_equal(first, np.concatenate(parts))
     before[8:12] = 9.0
     assert np.array_equal(other, before)
@@ -29,18 +29,18 @@ def test_what_somebody_holds_is_not_written_into() -> None:
 
 
 def test_only_what_changed_is_copied_once_nobody_holds_it() -> None:
-    joined, parts = Joined(), [part(n) for n in range(5)]
-    here = address(joined.join(parts))
+    pool, parts = BufferPool(), [part(n) for n in range(5)]
+    here = address(pool.join(parts))
     parts[0][:] = -1.0  # nobody may do this: it shows that it is not read again
     changed = [*parts[:2], part(9.0), *parts[3:]]
-    again = joined.join(changed)
+    again = pool.join(changed)
     assert address(again) == here
     assert (again[:4] == 0.0).all() and (again[8:12] == 9.0).all()
 
 
 def test_other_lengths_get_an_array_of_their_own_and_few_are_kept() -> None:
-    joined = Joined(most=2)
+    pool = BufferPool(most=2)
     for rows in (1, 2, 3, 4):
-        assert len(joined.join([part(1.0, rows), part(2.0)])) == rows + 4
-    assert len(joined._made) == 2
-    assert len(joined.join([])) == 0
+        assert len(pool.join([part(1.0, rows), part(2.0)])) == rows + 4
+    assert len(pool.made) == 2
+    assert len(pool.join([])) == 0

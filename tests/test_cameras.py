@@ -90,7 +90,7 @@ def test_unproject_is_exact_in_float64(lens):
 )
 def test_directions_the_lens_sees_come_back(k, fisheye):
     model, coefficients = ("opencv_fisheye", (k[0], k[1], k[4], k[5])) if fisheye else ("opencv", k)
-    fold = lenses._fold(lenses._radial(model, coefficients), np.pi if fisheye else 2.0)
+    fold = lenses.polynomial_fold(lenses.radial_coefficients(model, coefficients), np.pi if fisheye else 2.0)
     # inside 90 % of the fold (tangential terms shift it a little), all round
     r, a = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 0.9 * fold, 12), np.linspace(0, 6, 9)))
     tangent = np.sin(r) if fisheye else r
@@ -116,8 +116,7 @@ def test_directions_the_lens_sees_come_back(k, fisheye):
 def _jacobian_determinants(directions: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
     plane, h = directions[:, :2] / directions[:, 2:], 1e-6
     columns = [
-        (lenses._distort(plane + h * e, coefficients) - lenses._distort(plane - h * e, coefficients))
-        / (2 * h)
+        (lenses.distort(plane + h * e, coefficients) - lenses.distort(plane - h * e, coefficients)) / (2 * h)
         for e in np.eye(2)
     ]
     return columns[0][:, 0] * columns[1][:, 1] - columns[0][:, 1] * columns[1][:, 0]
@@ -158,11 +157,10 @@ def test_newtons_jacobian_is_the_derivative():
     coefficients, h = (0.1, 0.2, 0.03, 0.04, 0.5, 0.6), 1e-6
     plane = np.random.default_rng(4).uniform(-0.7, 0.7, (30, 2))
     dx, dy = (
-        (lenses._distort(plane + h * e, coefficients) - lenses._distort(plane - h * e, coefficients))
-        / (2 * h)
+        (lenses.distort(plane + h * e, coefficients) - lenses.distort(plane - h * e, coefficients)) / (2 * h)
         for e in np.eye(2)
     )
-    a, b, d = lenses._distort_jacobian(plane, coefficients)
+    a, b, d = lenses.distort_jacobian(plane, coefficients)
     # central differences: h^2 times third derivatives of order 100, and rounding 1e-16 / h
     np.testing.assert_allclose(np.stack([a, b, b, d]), np.stack([*dx.T, *dy.T]), atol=1e-8)
 

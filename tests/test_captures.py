@@ -20,8 +20,8 @@ from cagefield.datasets.procedural.hand_held import picture
 from cagefield.datasets.views import SparsePoints
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import read_image
+from cagefield.rendering.render_result import RenderResult
 from commands import printed, refused
 
 
@@ -40,9 +40,9 @@ def taken(case: Case | None, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
 def exact(further: float = 1.0, veil: float = 0.0, gain: float = 1.0) -> Learnt:
     """The room itself as a field: `further` times as far, behind a veil half way, in another exposure."""
 
-    def show(camera: Camera, case: Case | None = None) -> Frame:
+    def show(camera: Camera, case: Case | None = None) -> RenderResult:
         rgb, depth = taken(case, camera)
-        return Frame(np.minimum(rgb, 1) * gain, np.ones_like(depth), depth * np.float32(further))
+        return RenderResult(np.minimum(rgb, 1) * gain, np.ones_like(depth), depth * np.float32(further))
 
     def before(camera: Camera, pixels: np.ndarray, distances: np.ndarray) -> np.ndarray:
         depth = taken(None, camera)[1][pixels[:, 1], pixels[:, 0]]

@@ -81,7 +81,7 @@ def test_interrupted_training_is_saved_and_resumed(
     monkeypatch.setattr(VoxelRun, "advance", pressed_at_40)
     assert main(argv) == 130
     out, err = capsys.readouterr()
-    assert "40 steps" in out and "--resume goes on" in out and err.endswith("cagefield: interrupted\n")
+    assert "40 steps" in out and "--resume continues" in out and err.endswith("cagefield: interrupted\n")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["scene", "scene.training"]
     partial = Scene.open(tmp_path / "scene")
     monkeypatch.undo()

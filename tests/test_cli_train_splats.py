@@ -89,7 +89,7 @@ def test_interrupted_training_is_saved_and_resumed(
     monkeypatch.setattr(SplatRun, "advance", pressed_at_20)
     assert main(argv) == 130
     out, err = capsys.readouterr()
-    assert "20 steps" in out and "--resume goes on" in out and err.endswith("cagefield: interrupted\n")
+    assert "20 steps" in out and "--resume continues" in out and err.endswith("cagefield: interrupted\n")
     assert (tmp_path / "scene.training").is_file()
     partial = Scene.open(tmp_path / "scene").field
     monkeypatch.setattr(SplatRun, "advance", advance)

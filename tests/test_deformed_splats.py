@@ -390,7 +390,7 @@ def test_a_longer_stack_begins_where_the_shorter_one_ended(monkeypatch):
     np.testing.assert_allclose(quick.means, exact.means, atol=2e-3)
     for n in range(20):
         deformed_splats(field, EditStack([edits[0].translate((1e-3 * n, 0, 0))]))
-    assert len(module._known[field]) <= module.KEPT_STACKS
+    assert len(module.known_stacks[field]) <= module.KEPT_STACKS
 
 
 def test_what_is_kept_of_a_field_ends_with_it():

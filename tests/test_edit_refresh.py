@@ -84,12 +84,12 @@ def field(contracted: bool = False) -> VoxelField:
 def test_occupancy_after_a_change_is_that_of_a_new_renderer(name: str, contracted: bool) -> None:
     before, after = CHANGES[name]
     start = Renderer(field(contracted), before)
-    changed, new = start.with_edits(after)._occupancy, Renderer(field(contracted), after)._occupancy
+    changed, new = start.with_edits(after).occupancy, Renderer(field(contracted), after).occupancy
     np.testing.assert_array_equal(changed.origin, new.origin)
     np.testing.assert_array_equal(changed.blocks, new.blocks)
     np.testing.assert_array_equal(changed.codes, new.codes)
     if name != "nothing" and not contracted:  # whose box of interest has half as many blocks
-        assert not np.array_equal(new.blocks, start._occupancy.blocks)
+        assert not np.array_equal(new.blocks, start.occupancy.blocks)
 
 
 def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int]:
@@ -173,8 +173,8 @@ def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
     quick, together = drag(chain, place)
     assert alone == together and alone[0][0] == 1 and len(alone) == 1
     # It holds what all ten, looked at closely, hold; and is not much larger than what they hold by bricks.
-    fine = Renderer(field(), quick.edits)._occupancy
-    whole = Renderer(field(), EditStack([])).with_edits(quick.edits, coarse=True)._occupancy
-    np.testing.assert_array_equal(fine.origin, quick._occupancy.origin)
-    assert not (fine.blocks & ~quick._occupancy.blocks).any()
-    assert quick._occupancy.blocks.sum() < 1.6 * whole.blocks.sum()
+    fine = Renderer(field(), quick.edits).occupancy
+    whole = Renderer(field(), EditStack([])).with_edits(quick.edits, coarse=True).occupancy
+    np.testing.assert_array_equal(fine.origin, quick.occupancy.origin)
+    assert not (fine.blocks & ~quick.occupancy.blocks).any()
+    assert quick.occupancy.blocks.sum() < 1.6 * whole.blocks.sum()

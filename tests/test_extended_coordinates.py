@@ -9,7 +9,7 @@ from cagefield.cages import Cage
 from cagefield.errors import CageError
 from cagefield.typing import Array
 from cagefield.warps.extended_coordinates import Extended
-from cagefield.warps.trilinear_bend import _middles, bends_one_to_one, forms
+from cagefield.warps.trilinear_bend import bends_one_to_one, face_directions, forms
 from random_cages import dragged, trilinear, unit_vectors
 
 BOX = Cage.box((0.1, 0.2, 0.3), (1.0, 0.7, 0.8), (0.3, 0.5, 0.1))
@@ -93,7 +93,7 @@ def test_tilts_are_the_middles_of_the_least_cones_of_normals() -> None:
     n[:5, 1:] = n[:5, :1]  # all alike
     n[5:10, 2:] = n[5:10, :2]  # two and two
     n /= np.linalg.norm(n, axis=2, keepdims=True)
-    found = _middles(n)
+    found = face_directions(n)
     least = (n @ found[:, :, None]).min(axis=(1, 2))
     others = base[:, None] + rng.normal(size=(30, 4000, 3))
     others /= np.linalg.norm(others, axis=2, keepdims=True)

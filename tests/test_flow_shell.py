@@ -168,7 +168,7 @@ def test_cage_stays_inside_the_outer_cage_all_the_way(edit: Edit) -> None:
 def test_a_rod_in_a_slot_turns_by_shrinking_just_enough() -> None:
     motion = shell_of(EDITS["turn in a slot"]).motion
     assert motion.shrink > 0.3
-    assert motion._gap(TIMES, 0.0).min() < 0.0 < motion._gap(TIMES, motion.shrink).min()
+    assert motion.gap(TIMES, 0.0).min() < 0.0 < motion.gap(TIMES, motion.shrink).min()
     assert shell_of(EDITS["turn of 180"]).motion.shrink == 0.0
 
 

@@ -77,7 +77,7 @@ def test_two_sides_that_lie_on_each_other_are_found(photos, tmp_path):
     fold = folds.find_fold(
         dataset(tmp_path / "room", folded(), photos), lambda done, note: steps.append((done, note))
     )
-    assert fold is not None and fold.looked_at == COUNT and fold.photos >= COUNT // 2
+    assert fold is not None and fold.compared == COUNT and fold.photos >= COUNT // 2
     first, second = sorted(int(name[:2]) for name in fold.pair)
     assert first < COUNT // 2 <= second and second - first - COUNT // 2 in (-1, 0, 1)
     assert steps[-1][0] == 1.0 and "pairs of photos compared" in steps[-1][1]

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from cagefield.errors import CagefieldError, DatasetError
-from cagefield.rendering.frame import Frame, background_rgb, to_uint8
 from cagefield.rendering.images import read_image, side_by_side, write_png, write_video
+from cagefield.rendering.render_result import RenderResult, background_rgb, to_uint8
 
 
 def gradient(height: int, width: int, channels: int = 3) -> np.ndarray:
@@ -135,7 +135,9 @@ def frame(background):
     opacity[0, 0] = 0
     straight = rng.uniform(size=(4, 5, 3))
     depth = np.where(opacity > 0, 2.0, np.inf)
-    made = Frame.from_premultiplied(straight * opacity[..., None], opacity, depth, background=background)
+    made = RenderResult.from_premultiplied(
+        straight * opacity[..., None], opacity, depth, background=background
+    )
     return made, straight, opacity
 
 
@@ -166,7 +168,7 @@ def test_frame_is_read_only_and_checked():
     with pytest.raises(ValueError, match="read-only"):
         made.rgb[0, 0] = 0
     with pytest.raises(CagefieldError, match=r"depth must be \[4, 5\] like opacity, not \[4, 4\]"):
-        Frame(made.rgb, made.opacity, made.depth[:, :4])
+        RenderResult(made.rgb, made.opacity, made.depth[:, :4])
     with pytest.raises(CagefieldError, match=r'"white", "black", "none" or \(r, g, b\), not "grey"'):
         background_rgb("grey")
     with pytest.raises(CagefieldError, match=r"three numbers in \[0, 1\]"):

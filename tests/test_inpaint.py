@@ -9,12 +9,12 @@ from scipy.sparse.linalg import spsolve
 
 from cagefield import devices
 from cagefield.cameras import Camera
-from cagefield.fields.seen import seen_by
+from cagefield.fields.frusta import in_frusta
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.renderer import Renderer
 from cagefield.training import inpaint
 from cagefield.training.inpaint import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
-from cagefield.training.visibility import LEAST_TRANSMITTANCE, unseen
+from cagefield.training.visibility import LEAST_TRANSMITTANCE, unseen_vertices
 
 devices.start("cpu")
 
@@ -58,7 +58,7 @@ def test_behind_a_wall_photos_show_as_deep_as_its_light_comes(sigma: float) -> N
     # Head-on rays: T = exp(-sigma depth) falls under the least at depth = -ln(least) / sigma. The wall's
     # front is a ramp of one voxel beyond 0.5, which counts as half a voxel.
     camera = Camera.look_at((12.0, 0, 0), (0, 0, 0), width=160, height=160, fov_x=0.18, up=(0, 0, 1))
-    hidden = unseen(field_of(density, np.zeros((N, N, N, 3))), [camera])
+    hidden = unseen_vertices(field_of(density, np.zeros((N, N, N, 3))), [camera])
     shown_to = 0.5 + 0.5 * VOXEL + np.log(LEAST_TRANSMITTANCE) / sigma
     middle = hidden[:, N // 2, N // 2]
     x = np.linspace(-1, 1, N)
@@ -71,8 +71,8 @@ def test_all_is_unseen_from_a_camera_that_looks_away() -> None:
     density = np.ones((N, N, N), np.float32)
     away = Camera.look_at((3, 0, 0), (6, 0, 0), width=16, height=16, fov_x=0.5)
     field = field_of(density, np.zeros((N, N, N, 3)))
-    assert unseen(field, [away]).all()
-    assert not unseen(field, ring())[-1, N // 2].any()
+    assert unseen_vertices(field, [away]).all()
+    assert not unseen_vertices(field, ring())[-1, N // 2].any()
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def ball() -> tuple[VoxelField, np.ndarray]:
     share = (p[..., :1] + 1) / 2
     colour = share * np.array([1.0, 0.0, -1.0]) + (1 - share) * np.array([-1.0, 0.0, 1.0])
     field = field_of(density, colour.astype(np.float32))
-    return field, unseen(field, ring())
+    return field, unseen_vertices(field, ring())
 
 
 def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
@@ -138,7 +138,7 @@ def test_under_a_block_the_ground_goes_on() -> None:
     block = (np.abs(p[..., :2]).max(axis=-1) <= 0.3) & (p[..., 2] > -0.5) & (p[..., 2] <= 0.3)
     density = np.where(ground | block, 3.0 / VOXEL, 0.0).astype(np.float32)
     colour = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
-    hidden = unseen(field_of(density, colour), ring())
+    hidden = unseen_vertices(field_of(density, colour), ring())
     # What a training leaves where no photo looks.
     colour[hidden] = [-1.0, -1.0, 2.0]
     field = field_of(density, colour)
@@ -157,11 +157,11 @@ def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
 ) -> None:
     field, hidden = ball
     whole = filled(field, hidden)
-    swept = inpaint._swept
+    swept = inpaint.jacobi_sweeps
     calls = []
     # Sweeps bring colours one voxel on each: DEPTH of them reach all that is filled of a ball.
     monkeypatch.setattr(inpaint, "MOST_STEPS", DEPTH + 2)
-    monkeypatch.setattr(inpaint, "_swept", lambda *system: calls.append(1) or swept(*system))
+    monkeypatch.setattr(inpaint, "jacobi_sweeps", lambda *system: calls.append(1) or swept(*system))
     short = filled(field, hidden)
     assert len(calls) == 3  # each of the three axes
     np.testing.assert_array_equal(short.vertices, whole.vertices)
@@ -180,7 +180,7 @@ def block(n: int = 16) -> tuple[sparse.csr_matrix, np.ndarray]:
     number = np.arange(n**3).reshape(n, n, n)
     pull = sparse.csr_matrix((n**3, n**3))
     for axis, share in enumerate(REACH**2 * np.array([1.0, 1.0, ACROSS])):
-        a, b = inpaint._links(number, number, axis)
+        a, b = inpaint.links_of(number, number, axis)
         pull += sparse.csr_matrix((np.full(len(a), share), (a, b)), pull.shape)
     return pull, 1.0 + np.asarray(pull.sum(axis=1))[:, 0]
 
@@ -194,8 +194,8 @@ def test_the_bound_on_the_steps_holds_where_the_system_is_hardest(monkeypatch: p
         raise AssertionError("not solved within the bound")
 
     monkeypatch.setattr(inpaint, "MOST_STEPS", 111)
-    monkeypatch.setattr(inpaint, "_swept", never)
-    found = inpaint._solved(pull, diagonal, source)
+    monkeypatch.setattr(inpaint, "jacobi_sweeps", never)
+    found = inpaint.solve_diffusion(pull, diagonal, source)
     direct = spsolve((sparse.diags(diagonal) - pull).tocsc(), source[:, 0])
     # No eigenvalue is under 1, so the error is at most the residual.
     assert np.linalg.norm(found - direct[:, None] * source[0]) < TOLERANCE * np.linalg.norm(source[0])
@@ -206,7 +206,7 @@ def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: py
     source = np.zeros((len(diagonal), 2))
     source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
     monkeypatch.setattr(inpaint, "MOST_STEPS", 40)
-    weight, colour = inpaint._solved(pull, diagonal, source).T
+    weight, colour = inpaint.solve_diffusion(pull, diagonal, source).T
     # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
     assert (weight > 0).all()
     assert (colour >= 0).all() and (colour <= weight).all()
@@ -228,9 +228,9 @@ def test_as_many_cameras_as_asked_have_a_point_in_their_picture() -> None:
         Camera.look_at(eye, at, width=20, height=20, fov_x=0.5) for eye, at in zip(eyes, targets, strict=True)
     ]
     points = np.array([[0.0, 0, 0], [6.0, 0, 0], [0, 5.0, 0], [-2.5, 0.05, 0]])
-    assert [seen_by(cameras, points, least=n).tolist() for n in (1, 2, 3)] == [
+    assert [in_frusta(cameras, points, least=n).tolist() for n in (1, 2, 3)] == [
         [True, True, False, True],
         [True, True, False, True],
         [False, True, False, False],
     ]
-    assert seen_by(cameras, points, near=1.0).tolist() == [True, True, False, False]
+    assert in_frusta(cameras, points, near=1.0).tolist() == [True, True, False, False]

@@ -47,7 +47,7 @@ except ValueError as error:
         ({"near": 0.0, "lindisp": True}, "near must be above 0 where samples are even in 1/depth"),
         ({"samples": (2, 8)}, r"samples must be \(coarse from 3, fine from 0\)"),
         ({"ndc": (0.0, 1.0)}, "ndc must be two ratios"),
-        ({"ndc": (0.6, 0.5), "bounded": True}, "goes on to infinity; leave out bounded"),
+        ({"ndc": (0.6, 0.5), "bounded": True}, "reaches to infinity; leave out bounded"),
     ],
 )
 def test_impossible_sampling_is_refused(options, message) -> None:
@@ -338,10 +338,10 @@ def test_pixels_may_be_chosen() -> None:
 
 
 def test_lindisp_samples_are_even_in_disparity() -> None:
-    from cagefield.rendering.nerf import _stratified
+    from cagefield.rendering.nerf import stratified_samples
 
     field = small_field(lindisp=True, near=1.0, far=4.0, samples=(4, 0))
-    s = _stratified(field, Rays.of(camera(1), torch.device("cpu")), 4, None)
+    s = stratified_samples(field, Rays.of(camera(1), torch.device("cpu")), 4, None)
     np.testing.assert_allclose(1 / s[0], [1.0, 0.75, 0.5, 0.25], rtol=1e-6)
 
 
@@ -349,7 +349,7 @@ def in_float64(field: NerfField) -> TorchNerf:
     double = TorchNerf(field, torch.device("cpu"))
     for network in (double.coarse, double.fine):
         assert network is not None
-        network._layers = {name: (w.double(), b.double()) for name, (w, b) in network._layers.items()}
+        network.layers = {name: (w.double(), b.double()) for name, (w, b) in network.layers.items()}
     return double
 
 

@@ -249,7 +249,7 @@ def test_reasons_why_photos_found_no_place():
         def reg_image_ids(self):
             return [7]
 
-    found = structure_from_motion._reasons(
+    found = structure_from_motion.reasons_left_out(
         raw, {0, 1}, [Other()], structure_from_motion._Matches(counts, flat)
     )
     assert found == {
@@ -269,13 +269,13 @@ def test_photos_of_one_size_and_focal_length_share_a_camera(tmp_path):
     Image.new("RGB", (400, 300)).save(tmp_path / "3.png")
     Image.new("RGB", (300, 400)).save(tmp_path / "4.png")
     raw = [upright(file, file.name, tmp_path / "out") for file in find_raw_photos(tmp_path)]
-    cameras, numbers = structure_from_motion._cameras(raw)
+    cameras, numbers = structure_from_motion.camera_guesses(raw)
     assert numbers == [0, 0, 0, 1, 2]
     # 26 mm on film of 36 x 24 mm, whose diagonal is 43.27 mm, on a photo whose diagonal is 500 pixels
     assert cameras[0].params[0] == pytest.approx(26 * 500 / 43.267) and cameras[0].has_prior_focal_length
     assert cameras[1].params[0] == pytest.approx(1.2 * 400) and not cameras[1].has_prior_focal_length
     assert {camera.model.name for camera in cameras} == {"SIMPLE_RADIAL"}
-    many, _ = structure_from_motion._cameras(raw[:3] * 4)
+    many, _ = structure_from_motion.camera_guesses(raw[:3] * 4)
     assert many[0].model.name == "OPENCV"
 
 

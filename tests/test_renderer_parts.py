@@ -70,7 +70,7 @@ def test_bands_of_a_region_are_the_region(plain: Renderer) -> None:
 def test_the_coarse_occupancy_holds_the_fine_one_and_shows_the_same(plain: Renderer, name: str) -> None:
     stack = EditStack(EDITS[name])
     fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
-    assert (coarse._occupancy.blocks >= fine._occupancy.blocks).all()
+    assert (coarse.occupancy.blocks >= fine.occupancy.blocks).all()
     pictures = [renderer.render(CAMERA) for renderer in (fine, coarse)]
     assert pictures[0] is not None and pictures[1] is not None
     assert pictures[0].opacity.max() > 0.9
@@ -91,8 +91,8 @@ def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None
     plain = Renderer(field)
     stack = EditStack([Edit(INNER, Cage.box((0, 0, 0), 1.6), lattice=48).scale(0.15)])
     fine, coarse = plain.with_edits(stack), plain.with_edits(stack, coarse=True)
-    assert fine._occupancy.blocks.sum() > 50
-    assert (coarse._occupancy.blocks >= fine._occupancy.blocks).all()
+    assert fine.occupancy.blocks.sum() > 50
+    assert (coarse.occupancy.blocks >= fine.occupancy.blocks).all()
 
 
 def test_short_leaps_are_long_ones_cut_off() -> None:

@@ -83,7 +83,7 @@ def _verified(path: Path) -> int:
 def test_removed_pairs_are_gone_from_the_copy_alone(synthetic):
     path, _ = synthetic
     before = _verified(path)
-    copy = structure_from_motion._without(path, {(0, 1), (3, 7)})
+    copy = structure_from_motion.without_pairs(path, {(0, 1), (3, 7)})
     assert _verified(copy) == before - 2 and _verified(path) == before
 
 
@@ -105,6 +105,6 @@ def test_the_unfolded_model_must_not_lose_photos_or_points(tmp_path, monkeypatch
     monkeypatch.setattr(repeated_views, "contradicting", lambda *_: {(2, 20)})
     counts = _counts(40, 6, period=20)
     matches = structure_from_motion._Matches(counts, np.zeros_like(counts, dtype=bool))
-    (found,) = structure_from_motion._unfolded(tmp_path, matches, 0, lambda *_: None)
+    (found,) = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)
     assert found is models["pruned" if wins else "plain"]
     assert removed == [far_pairs(counts), {(2, 20)}]

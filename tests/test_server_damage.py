@@ -12,10 +12,10 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.rendering.renderer import Renderer
-from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, joined, pixels, seen, tiles
+from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, pixels, screen_bounds, tiles, union
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
 from scenes import ball_scene
@@ -36,7 +36,7 @@ def test_boxes_are_seen_within_their_rectangle() -> None:
     for _ in range(50):
         low = rng.uniform(-1, 0.5, (2, 3))
         boxes = np.stack([low, low + rng.uniform(0.1, 0.8, (2, 3))], axis=1)
-        rect = seen(CAMERA, boxes)
+        rect = screen_bounds(CAMERA, boxes)
         assert rect is not None
         p = rng.uniform(boxes[:, :1], boxes[:, 1:], (2, 400, 3)).reshape(-1, 3)
         at = CAMERA.project(p)[0] / SIDE
@@ -54,10 +54,10 @@ def test_boxes_are_seen_within_their_rectangle() -> None:
 def test_boxes_beside_and_behind_a_camera_are_not_seen_and_around_it_everywhere() -> None:
     eye = CAMERA.origin
     behind = eye - 3.0 * (np.zeros(3) - eye)
-    assert seen(CAMERA, np.array([[behind - 0.1, behind + 0.1]])) is None
-    assert seen(CAMERA, np.array([[[40.0, 0, 0], [40.5, 1, 1]]])) is None
-    assert seen(CAMERA, np.array([[eye - 0.1, eye + 0.1]])) == WHOLE
-    assert seen(CAMERA, np.zeros((0, 2, 3))) is None
+    assert screen_bounds(CAMERA, np.array([[behind - 0.1, behind + 0.1]])) is None
+    assert screen_bounds(CAMERA, np.array([[[40.0, 0, 0], [40.5, 1, 1]]])) is None
+    assert screen_bounds(CAMERA, np.array([[eye - 0.1, eye + 0.1]])) == WHOLE
+    assert screen_bounds(CAMERA, np.zeros((0, 2, 3))) is None
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ class Played:
         return x, y, right - x, bottom - y
 
     def differing(self, page: int, one: int, another: int) -> Rect | None:
-        return joined(self.rects.get(one), self.rects.get(another))
+        return union(self.rects.get(one), self.rects.get(another))
 
     def edit(self) -> None:
         self.revision += 1
@@ -174,9 +174,9 @@ class Bench:
         self.scheduler = Scheduler(lambda page, one, another: (0.25, 0.5, 0.5, 1.0))
         self.now = 0.0
         self.scheduler.join(1)
-        self.look(1)
+        self.display(1)
 
-    def look(self, seq: int) -> None:
+    def display(self, seq: int) -> None:
         self.scheduler.camera(1, seq, 800, 800, False, self.now)
 
     def all(self) -> list[Request]:
@@ -214,16 +214,16 @@ def test_a_drag_renders_the_part_that_it_changes_and_rest_too() -> None:
     assert moving[0].region.full_width > 1.2 * Bench().all()[0].region.full_width
 
 
-@pytest.mark.parametrize("what", ["camera", "look", "renderer lost"])
+@pytest.mark.parametrize("what", ["camera", "display", "renderer lost"])
 def test_another_view_is_rendered_as_a_whole(what: str) -> None:
     bench = Bench()
     bench.all()
     bench.scheduler.edits(1, True, bench.now)
     bench.all()
     if what == "camera":
-        bench.look(2)
-    elif what == "look":
-        bench.scheduler.look(1, Look("depth"), bench.now)
+        bench.display(2)
+    elif what == "display":
+        bench.scheduler.display(1, Display("depth"), bench.now)
     else:
         bench.scheduler.refresh(bench.now)
     assert share(bench.all()[:1]) == 1.0
@@ -268,7 +268,7 @@ def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache
     before, after = (EditStack(stack) for stack in STACKS[name])
     first, second = (renderers.plain.with_edits(stack).render(CAMERA) for stack in (before, after))
     assert first is not None and second is not None
-    x, y, w, h = pixels(seen(CAMERA, after.changed_boxes(before)), SIDE, SIDE)
+    x, y, w, h = pixels(screen_bounds(CAMERA, after.changed_boxes(before)), SIDE, SIDE)
     difference = np.abs(first.rgb - second.rgb).max(axis=2)
     assert difference.max() > 0.1  # the change shows
     difference[y : y + h, x : x + w] = 0.0
@@ -279,16 +279,16 @@ def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
 def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCache, view: Any) -> None:
     before, after = STACKS["under another"]
-    look = Look(view, split=0.55)
+    display = Display(view, split=0.55)
 
     def shown(edits: tuple[Edit, ...], region: Region) -> np.ndarray[Any, Any]:
-        task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, False, True, 0)
+        task = PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, False, True, 0)
         done = renderers.picture(task, lambda: False)
         assert isinstance(done, PictureDone)
         return pixels_of(done.picture, done.format, region.width, region.height).astype(float)
 
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
-    x, y, w, h = pixels(seen(CAMERA, EditStack(after).changed_boxes(EditStack(before))), SIDE, SIDE)
+    x, y, w, h = pixels(screen_bounds(CAMERA, EditStack(after).changed_boxes(EditStack(before))), SIDE, SIDE)
     composed = shown(before, whole)
     composed[y : y + h, x : x + w] = shown(after, Region(x, y, w, h, SIDE, SIDE))
     expected = shown(after, whole)
@@ -301,7 +301,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
     renderers = RendererCache(ball_scene())
     edits = (PART.translate((0.12, 0, 0)), OTHER)
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
-    task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Look(), False, True, 0)
+    task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Display(), False, True, 0)
     expected = Renderer(renderers.scene.field, EditStack(edits))
     for looks in range(1, 6):
         left = looks
@@ -313,7 +313,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
 
         assert isinstance(renderers.picture(task, stop), Stopped)
         if looks <= 4:  # between the passes; later, between bands of the picture
-            assert renderers._exact == []
+            assert renderers.exact_renderers == []
     done = renderers.picture(task, lambda: False)
     assert isinstance(done, PictureDone)
-    assert np.array_equal(renderers._exact[-1].renderer._occupancy.codes, expected._occupancy.codes)
+    assert np.array_equal(renderers.exact_renderers[-1].renderer.occupancy.codes, expected.occupancy.codes)

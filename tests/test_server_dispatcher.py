@@ -55,7 +55,7 @@ class PlayedWorker:
         self.tasks.clear()
 
 
-class PlayedOffice:
+class PlayedDispatcher:
     """Notes down what the dispatcher tells it."""
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class PlayedOffice:
             Shown(()),
             CAMERA,
             request.region,
-            request.look,
+            request.display,
             request.moving,
             request.exact,
             generation,
@@ -90,12 +90,12 @@ class PlayedOffice:
 
 
 @pytest.fixture
-def source() -> PlayedOffice:
-    return PlayedOffice()
+def source() -> PlayedDispatcher:
+    return PlayedDispatcher()
 
 
 def play(
-    source: PlayedOffice,
+    source: PlayedDispatcher,
     monkeypatch: pytest.MonkeyPatch,
     script: Callable[[Dispatcher, Any], Awaitable[None]],
 ) -> None:
@@ -128,7 +128,7 @@ def surface(number: int) -> SurfaceTask:
 
 
 def test_one_task_at_a_time_and_answers_before_pictures(
-    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         dispatcher.scheduler.join(1)
@@ -152,7 +152,7 @@ def test_one_task_at_a_time_and_answers_before_pictures(
     play(source, monkeypatch, script)
 
 
-def test_chores_wait_until_no_page_does(source: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chores_wait_until_no_page_does(source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         results: list[Result] = []
         dispatcher.scheduler.join(1)
@@ -184,7 +184,7 @@ def test_chores_wait_until_no_page_does(source: PlayedOffice, monkeypatch: pytes
     play(source, monkeypatch, script)
 
 
-def test_a_failure_is_told_to_who_asked(source: PlayedOffice, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_is_told_to_who_asked(source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         asked = asyncio.ensure_future(dispatcher.ask(surface))
         await settle()
@@ -202,7 +202,7 @@ def test_a_failure_is_told_to_who_asked(source: PlayedOffice, monkeypatch: pytes
 
 
 def test_a_lost_process_is_started_again_and_its_picture_rendered_again(
-    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         dispatcher.scheduler.join(1)
@@ -220,7 +220,7 @@ def test_a_lost_process_is_started_again_and_its_picture_rendered_again(
 
 
 def test_a_process_that_is_lost_again_and_again_is_given_up(
-    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         asked = asyncio.ensure_future(dispatcher.ask(surface))
@@ -242,7 +242,7 @@ def test_a_process_that_is_lost_again_and_again_is_given_up(
 
 
 def test_a_scene_that_the_process_cannot_read_is_told(
-    source: PlayedOffice, monkeypatch: pytest.MonkeyPatch
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
         worker.answer(Failed(0, "scene x does not exist"))

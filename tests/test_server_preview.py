@@ -188,11 +188,11 @@ class Played:
     """A coordinator with two pages that look at a ball, and no renderer."""
 
     def __init__(self, path: Path) -> None:
-        self.coordinator, self._hello = open_scene(path, "cpu")
-        self.pages = [self.coordinator.join(self._hello) for _ in range(2)]
+        self.coordinator, self.hello = open_scene(path, "cpu")
+        self.pages = [self.coordinator.join(self.hello) for _ in range(2)]
         self.speakers = [MessageHandlers(self.coordinator, page) for page in self.pages]
         for n in range(2):
-            self.say(n, "camera", **{**self._hello.start.model_dump(exclude={"type"}), "seq": 1})
+            self.say(n, "camera", **{**self.hello.start.model_dump(exclude={"type"}), "seq": 1})
         self.heard()
 
     def say(self, page: int, kind: str, **values: Any) -> None:
@@ -247,7 +247,7 @@ def test_all_pages_show_the_preview_and_are_told_of_its_beginning_and_its_end(pl
     )
     for task in (played.rendered(), played.rendered()):  # one for each page
         assert task.shown == coordinator.shown() and task.moving and not task.exact
-    late = coordinator.join(played._hello)
+    late = coordinator.join(played.hello)
     told = [json.loads(asyncio.run(late.send_queue.get())) for _ in range(len(late.send_queue))]
     assert [m["play"] for m in told if m["type"] == "preview"] == [4]
     played.say(0, "play_end", play=4)
@@ -319,5 +319,5 @@ def test_of_messages_on_the_way_along_the_path_only_the_newest_wait() -> None:
         camera(9),
     ):
         receive_queue.put(message)
-    waiting = list(receive_queue._waiting)
+    waiting = list(receive_queue.waiting)
     assert waiting == [begin, client_messages.Play(play=1, seconds=4), camera(4), end, camera(9)]

@@ -23,7 +23,7 @@ from cagefield.server.editor.path_edits import blended
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.task_handlers import SAMPLES, TaskHandlers
 from cagefield.server.render_worker.tasks import (
@@ -68,11 +68,11 @@ def renderers() -> RendererCache:
 def task(
     *edits: Edit,
     region: Region = WHOLE,
-    look: Look = Look(),  # noqa: B008  immutable
+    display: Display = Display(),  # noqa: B008  immutable
     moving: bool = False,
     exact: bool = True,
 ) -> PictureTask:
-    return PictureTask(1, Shown(values_of(edits)), CAMERA, region, look, moving, exact, 0)
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, region, display, moving, exact, 0)
 
 
 def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
@@ -88,14 +88,14 @@ def test_pictures_are_those_of_the_scene(renderers: RendererCache) -> None:
 
 
 def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> None:
-    whole = renderers._part(
+    whole = renderers.part(
         task(MOVED), renderers.renderer(task(MOVED).shown, exact=True), WHOLE, lambda: False
     )
     assert whole is not None
     joined = np.zeros_like(whole.rgb)
     for x, width in ((0, 16), (16, 13), (29, 19)):
         for y, height in ((0, 21), (21, 27)):
-            part = renderers._part(
+            part = renderers.part(
                 task(MOVED),
                 renderers.renderer(task(MOVED).shown, exact=True),
                 Region(x, y, width, height, SIDE, SIDE),
@@ -109,8 +109,8 @@ def test_tiles_put_together_are_the_whole_picture(renderers: RendererCache) -> N
 @pytest.mark.parametrize("edits", [(MOVED,), (COPY,), (MOVED, COPY)], ids=["continuous", "copy", "both"])
 def test_quick_pictures_show_the_same(renderers: RendererCache, edits: tuple[Edit, ...]) -> None:
     shown = Shown(values_of(edits))
-    quick = renderers._part(task(*edits), renderers.renderer(shown, exact=False), WHOLE, lambda: False)
-    exact = renderers._part(task(*edits), renderers.renderer(shown, exact=True), WHOLE, lambda: False)
+    quick = renderers.part(task(*edits), renderers.renderer(shown, exact=False), WHOLE, lambda: False)
+    exact = renderers.part(task(*edits), renderers.renderer(shown, exact=True), WHOLE, lambda: False)
     assert quick is not None and exact is not None
     # The lattices are the same here (24 nodes), and what the coarse occupancy adds is empty.
     np.testing.assert_array_equal(quick.rgb, exact.rgb)
@@ -120,7 +120,7 @@ def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:
     fine = MOVED.replace(lattice=96)
     quick = renderers.renderer(Shown(values_of((fine,))), exact=False)
     assert quick.edits[0].lattice == 32
-    near = renderers._part(task(fine), quick, WHOLE, lambda: False)
+    near = renderers.part(task(fine), quick, WHOLE, lambda: False)
     assert near is not None
     exact = renderers.scene.with_edits(EditStack([fine])).render(CAMERA)
     assert np.abs(near.rgb - exact.rgb).mean() < 0.003
@@ -129,25 +129,25 @@ def test_a_quick_lattice_is_coarser_and_close(renderers: RendererCache) -> None:
 def test_before_leaves_the_edits_out_left_of_the_split(renderers: RendererCache) -> None:
     plain, edited = picture(renderers, task()), picture(renderers, task(MOVED))
     assert np.abs(plain - edited).max() > 100
-    half = picture(renderers, task(MOVED, look=Look(split=0.5)))
+    half = picture(renderers, task(MOVED, display=Display(split=0.5)))
     # Blocks of 8 pixels beside the split mix in a JPEG.
     assert np.abs(half[:, :16] - plain[:, :16]).max() < 12
     assert np.abs(half[:, 32:] - edited[:, 32:]).max() < 12
-    assert np.abs(picture(renderers, task(MOVED, look=Look(before=True))) - plain).max() < 12
+    assert np.abs(picture(renderers, task(MOVED, display=Display(before=True))) - plain).max() < 12
     tile = Region(32, 0, 16, SIDE, SIDE, SIDE)
-    right = picture(renderers, task(MOVED, region=tile, look=Look(split=0.5)))
+    right = picture(renderers, task(MOVED, region=tile, display=Display(split=0.5)))
     assert np.abs(right - edited[:, 32:]).max() < 12
 
 
 def test_views(renderers: RendererCache) -> None:
     frame = renderers.plain.render(CAMERA, background="white", normals=True)
     assert frame is not None and frame.normals is not None
-    opacity = picture(renderers, task(look=Look("opacity")))
+    opacity = picture(renderers, task(display=Display("opacity")))
     assert np.abs(opacity[..., 0] / 255 - frame.opacity).mean() < 0.01
-    normals = picture(renderers, task(look=Look("normals"))) / 127.5 - 1.0
+    normals = picture(renderers, task(display=Display("normals"))) / 127.5 - 1.0
     seen = frame.opacity > 0.99
     assert np.abs(normals[seen] - frame.normals[seen]).mean() < 0.05
-    depth = picture(renderers, task(look=Look("depth")))[..., 0]
+    depth = picture(renderers, task(display=Display("depth")))[..., 0]
     middle, edge = depth[SIDE // 2, SIDE // 2], depth[SIDE // 2, np.flatnonzero(seen[SIDE // 2])[0]]
     assert middle > edge > 0 and depth[0, 0] < 5
 
@@ -261,7 +261,7 @@ def test_measuring_a_lattice_is_given_up_and_done_again_later(renderers: Rendere
     session: Any = SimpleNamespace(moving=False, drawn=lambda: (MOVED,))
     measured = []
     background = BackgroundWork(session, Any, lambda: measured.append(1), lambda _: None)  # type: ignore[arg-type]
-    background._warming = []
+    background.warming = []
     background_task = background.next(0)
     assert background_task is not None
     background_task.done(stopped)

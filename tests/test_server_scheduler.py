@@ -12,7 +12,7 @@ from cagefield.server.render_queue.scheduler import (
     SETTLE_SECONDS,
     Scheduler,
 )
-from cagefield.server.render_worker.pictures import Look
+from cagefield.server.render_worker.pictures import Display
 
 SIDE = 800
 RATE = 1e6
@@ -291,10 +291,10 @@ def test_another_view_is_another_picture() -> None:
     b = Bench()
     b.open(1)
     b.finish()
-    b.scheduler.look(1, Look("depth", True, 0.5), b.now)
+    b.scheduler.display(1, Display("depth", True, 0.5), b.now)
     request = b.step()
-    assert request is not None and request.look == Look("depth", True, 0.5)
-    b.scheduler.look(1, Look("depth", True, 0.5), b.now)
+    assert request is not None and request.display == Display("depth", True, 0.5)
+    b.scheduler.display(1, Display("depth", True, 0.5), b.now)
     assert b.step() is None
 
 

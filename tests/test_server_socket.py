@@ -26,7 +26,7 @@ from cagefield.edits import load_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol.common import MOST_BYTES
 from cagefield.server.render_queue.coordinator import Page
-from cagefield.server.web.websocket import _told
+from cagefield.server.web.websocket import errors_reported_to
 from editor_server import PATIENCE, EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from sent_pictures import pixels_of
@@ -347,9 +347,9 @@ def test_a_question_that_waits_for_the_renderer_holds_up_nothing_else(server: Ed
 
 def test_what_the_server_did_not_expect_is_told_too(caplog: pytest.LogCaptureFixture) -> None:
     one = Page(1)
-    with _told(one):
+    with errors_reported_to(one):
         raise ZeroDivisionError("by zero")
-    with _told(one):
+    with errors_reported_to(one):
         raise CagefieldError("a line\nwith its cure")
     first, second = (json.loads(asyncio.run(one.send_queue.get())) for _ in range(2))
     assert "could not do that (ZeroDivisionError: by zero)" in first["text"] and "by zero" in caplog.text

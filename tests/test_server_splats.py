@@ -23,10 +23,9 @@ from cagefield.server.editor.cage_placement import fitted
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.coordinator import Coordinator
-from cagefield.server.render_queue.damage import WHOLE, Showing
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_queue.splat_extent import spread
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
 from cagefield.server.render_worker.task_handlers import TaskHandlers
@@ -68,8 +67,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "ball"
 
 
-def task(*edits: Edit, look: Look = Look(), moving: bool = False, exact: bool = True) -> PictureTask:  # noqa: B008
-    return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, look, moving, exact, 0)
+def task(*edits: Edit, display: Display = Display(), moving: bool = False, exact: bool = True) -> PictureTask:  # noqa: B008
+    return PictureTask(1, Shown(values_of(edits)), CAMERA, PART, display, moving, exact, 0)
 
 
 def picture(renderers: RendererCache, asked: PictureTask) -> np.ndarray[Any, Any]:
@@ -91,7 +90,8 @@ def test_pictures_are_those_of_the_scene_at_rest_and_near_them_in_a_drag(
 
 def test_views(renderers: RendererCache) -> None:
     depth, opacity, normals = (
-        picture(renderers, task(MOVED, look=Look(view=view))) for view in ("depth", "opacity", "normals")
+        picture(renderers, task(MOVED, display=Display(view=view)))
+        for view in ("depth", "opacity", "normals")
     )
     solid = opacity[..., 0] > 200
     assert 300 < solid.sum() < 1500 and (opacity[0, 0] == 0).all()
@@ -213,24 +213,31 @@ def test_what_differs_is_as_much_larger_as_splats_reach(folder: Path) -> None:
     reach = spread(scene.field)
     size = 2.5 * 0.5 / np.sqrt(600)  # of the ball's discs
     assert reach == pytest.approx(3.0 * size, rel=1e-3)
-    assert coordinator._spread == reach and coordinator.dispatcher.scheduler._whole_at_rest
+    assert coordinator.spread == reach and coordinator.dispatcher.scheduler.whole_at_rest
     assert spread(scene.field.take(np.zeros(0, int))) == 0.0
 
 
 def test_all_of_a_picture_is_drawn_anew_at_rest() -> None:
     part = (0.25, 0.25, 0.5, 0.5)
 
-    def region(whole_at_rest: bool) -> tuple[int, int]:
+    def redrawn(whole_at_rest: bool) -> int:
+        """Pixels drawn at rest after a change of the edits that differs in a part of the picture."""
         scheduler = Scheduler(lambda *_: part, whole_at_rest=whole_at_rest)
         scheduler.join(1)
         scheduler.camera(1, 1, 80, 80, False, 0.0)
-        page = scheduler._pages[1]
-        page.showing = Showing((page.camera, page.look), 0, True)
-        scheduler._revision = 1
-        scheduler._cut(1, exact=True)
-        assert page.tiles is not None
-        return sum(tile.width * tile.height for tile in page.tiles), page.whole
 
-    assert region(False) == (24 * 24, False)
-    assert region(True) == (80 * 80, True)
-    assert WHOLE == (0.0, 0.0, 1.0, 1.0)
+        def drawn_at_rest(now: float) -> int:
+            pixels = 0
+            while (request := scheduler.next(now)) is not None:
+                area = request.region.width * request.region.height
+                pixels += 0 if request.moving else area
+                scheduler.finished(request, area, 1e-3, 0.0)
+                scheduler.presented(1, request.number)
+            return pixels
+
+        assert drawn_at_rest(1.0) + drawn_at_rest(2.0) == 80 * 80
+        scheduler.edits(1, False, 3.0)
+        return drawn_at_rest(3.0) + drawn_at_rest(4.0)
+
+    assert redrawn(False) == 24 * 24
+    assert redrawn(True) == 80 * 80

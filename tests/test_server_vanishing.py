@@ -1,4 +1,4 @@
-"""Pages and programs that go away in the middle: the server goes on, and says nothing."""
+"""Pages and programs that go away in the middle: the server keeps running, and says nothing."""
 
 from __future__ import annotations
 

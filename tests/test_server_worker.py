@@ -29,7 +29,7 @@ def test_it_ends_by_itself_and_keeps_the_kernels_that_it_compiled(
         assert results.get(timeout=PATIENCE) == Answered(1)
     finally:
         worker.close()
-    assert worker._process.exitcode == 0
+    assert worker.process.exitcode == 0
     assert list((tmp_path / "cache").rglob("*.qdc"))
 
 
@@ -57,7 +57,7 @@ def test_a_process_that_has_no_scene_yet_is_not_waited_for(
     worker = Worker(str(tmp_path / "ball"), "cpu", lambda _: None, lambda: None)
     worker.start()
     worker.close()
-    assert worker._process.exitcode == -signal.SIGTERM
+    assert worker.process.exitcode == -signal.SIGTERM
     assert capfd.readouterr().err == ""
 
 
@@ -69,7 +69,7 @@ def test_a_process_that_dies_while_it_is_started_is_lost_and_nothing_more(
 
     lost: queue.Queue[bool] = queue.Queue()
     worker = Worker("ball", "cpu", lambda _: None, lambda: lost.put(True))
-    monkeypatch.setattr(worker._context.Process, "start", dies)
+    monkeypatch.setattr(multiprocessing.get_context("spawn").Process, "start", dies)
     worker.start()
     assert lost.get(timeout=PATIENCE)
     worker.send(WarmTask(1, WarmStage.COARSE_EDIT))

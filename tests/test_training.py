@@ -1,4 +1,4 @@
-"""Training end to end: it learns, the seed decides, an interrupted run goes on to the same field."""
+"""Training end to end: it learns, the seed decides, an interrupted run continues to the same field."""
 
 from __future__ import annotations
 

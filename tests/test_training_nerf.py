@@ -94,7 +94,7 @@ def test_warm_up_rays_come_from_the_middle(photos) -> None:
     run = NerfRun(load_dataset(photos), tiny(batch_rays=400))
 
     def edge_cosine() -> float:
-        return float(run._batch()[0].cosines.min())
+        return float(run.next_batch()[0].cosines.min())
 
     early = edge_cosine()
     run.step = 3
@@ -108,7 +108,7 @@ def test_warm_up_rays_come_from_the_middle(photos) -> None:
 def test_targets_are_the_photos_colours_on_white(photos) -> None:
     dataset = load_dataset(photos)
     run = NerfRun(dataset, tiny(batch_rays=50))
-    rays, target = run._batch()
+    rays, target = run.next_batch()
     origin = rays.origins[0].numpy()
     (view,) = [v for v in dataset.train if np.allclose(v.camera.origin, origin, atol=1e-5)]
     pixels = view.camera.project(origin + 2.0 * rays.directions.numpy())[0].astype(int)

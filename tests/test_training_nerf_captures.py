@@ -164,7 +164,7 @@ def test_captures_are_trained_with_noise_on_the_density(forward, tmp_path) -> No
 
 def test_a_batch_of_a_capture_holds_rays_of_several_photos(forward) -> None:
     run = NerfRun(load_dataset(forward), tiny(batch_rays=33))
-    rays, target = run._batch()
+    rays, target = run.next_batch()
     assert len(rays.origins) == len(target) == 33
     assert 3 <= len(np.unique(rays.origins.numpy(), axis=0)) <= PHOTOS
 

@@ -204,7 +204,7 @@ def test_exposures_of_the_photos_are_found(capture, tmp_path):
 def test_more_and_more_splats_are_left_out_of_the_pictures_by_chance(capture):
     def seen(dropout: float, done: float) -> int:
         run = SplatRun(capture, SplatConfig(steps=100, splats=400, dropout=dropout))
-        run._photo(0, done)
+        run.step_photo(0, done)
         return int(run.state.hits.sum())
 
     everything = seen(0.0, 0.5)
@@ -304,7 +304,7 @@ def test_no_fog_stays_where_space_is_known_to_be_empty(capture):
     dataset, fog = replace(capture, points=points), []
     for veil in (0.0, 0.1):
         run = SplatRun(dataset, SplatConfig(steps=200, splats=800, sh_degree=1, veil=veil))
-        for view, empty in zip(run.views, run._empty, strict=True):
+        for view, empty in zip(run.views, run.empty, strict=True):
             empty[0, 20:-20, 20:-20] = np.linalg.norm(view.cameras[0].origin) - 0.6
             empty[1, 20:-20, 20:-20] = 1.0
         while run.done < 1.0:

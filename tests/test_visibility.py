@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.benchmarking.visibility import unseen
+from cagefield.benchmarking.visibility import unseen_pixels
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets.procedural.parts import Part, Primitive, place
 from cagefield.datasets.procedural.scene import ProceduralScene
@@ -30,12 +30,12 @@ def above() -> Camera:
 
 def test_nothing_is_unseen_where_nothing_moved() -> None:
     scene = box_on_plate()
-    assert not unseen(scene, above(), scene, photos()).any()
+    assert not unseen_pixels(scene, above(), scene, photos()).any()
 
 
 def test_ground_under_a_moved_box_is_unseen() -> None:
     scene = box_on_plate()
-    hidden = unseen(scene.move("box", translate=(0.0, 0.55, 0.0)), above(), scene, photos())
+    hidden = unseen_pixels(scene.move("box", translate=(0.0, 0.55, 0.0)), above(), scene, photos())
     # the box's foot, 0.4 x 0.4 of a picture 2 * 4 * tan(0.25) wide, less the rows the box now hides: none
     share = 0.4**2 / (8 * np.tan(0.25)) ** 2
     np.testing.assert_allclose(hidden.mean(), share, rtol=0.15)
@@ -44,7 +44,7 @@ def test_ground_under_a_moved_box_is_unseen() -> None:
 def test_foot_of_a_turned_box_is_unseen() -> None:
     scene = box_on_plate()
     lying = scene.move("box", rotate=(np.pi, 0.0, 0.0), translate=(0, 0, 0.3), pivot=(0, 0, 0.2))
-    hidden = unseen(lying, above(), scene, photos())
+    hidden = unseen_pixels(lying, above(), scene, photos())
     assert hidden[40, 40]
     assert not hidden[8, 8]
 
@@ -54,8 +54,8 @@ def test_only_pixels_of_the_mask_are_looked_at() -> None:
     moved = scene.move("box", translate=(0.0, 0.55, 0.0))
     where = np.zeros((80, 80), bool)
     where[:, :40] = True
-    everywhere = unseen(moved, above(), scene, photos())
-    np.testing.assert_array_equal(unseen(moved, above(), scene, photos(), where), everywhere & where)
+    everywhere = unseen_pixels(moved, above(), scene, photos())
+    np.testing.assert_array_equal(unseen_pixels(moved, above(), scene, photos(), where), everywhere & where)
 
 
 def test_ground_seen_through_a_hair_thin_gap_is_unseen() -> None:
@@ -65,7 +65,7 @@ def test_ground_seen_through_a_hair_thin_gap_is_unseen() -> None:
     for gap in (0.004, 0.1):
         hovering = box_on_plate().move("box", translate=(0.0, 0.0, gap))
         gone = hovering.remove("box")
-        shares[gap] = unseen(gone, above(), hovering, (*photos(), *low)).mean()
+        shares[gap] = unseen_pixels(gone, above(), hovering, (*photos(), *low)).mean()
     foot = 0.4**2 / (8 * np.tan(0.25)) ** 2
     # the foot less a rim of the box's rounding and a voxel, 0.02 wide on every side
     assert 0.75 * foot < shares[0.004] < 1.15 * foot

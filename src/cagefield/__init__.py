@@ -9,10 +9,14 @@ import importlib
 import os
 from typing import TYPE_CHECKING
 
+from cagefield import renamed_modules
+
 __version__ = "0.1.0"
 
 # Quadrants prints a line about itself when it is imported, which kernel modules do.
 os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
+
+renamed_modules.install()
 
 if TYPE_CHECKING:
     from cagefield.cages import Cage as Cage
@@ -30,8 +34,8 @@ if TYPE_CHECKING:
     from cagefield.fields.protocol import Field as Field
     from cagefield.fields.splat import SplatField as SplatField
     from cagefield.fields.voxel import VoxelField as VoxelField
-    from cagefield.rendering.frame import Frame as Frame
     from cagefield.rendering.reference_renderer import render_sampled as render_sampled
+    from cagefield.rendering.render_result import RenderResult as RenderResult
     from cagefield.rendering.renderer import Renderer as Renderer
     from cagefield.scene import Scene as Scene
 
@@ -43,8 +47,8 @@ __all__ = [
     "Edit",
     "EditStack",
     "Field",
-    "Frame",
     "NerfField",
+    "RenderResult",
     "Renderer",
     "Scene",
     "SplatField",
@@ -66,7 +70,7 @@ _HOME = {
     "Edit": "cagefield.edits",
     "EditStack": "cagefield.edits",
     "Field": "cagefield.fields.protocol",
-    "Frame": "cagefield.rendering.frame",
+    "RenderResult": "cagefield.rendering.render_result",
     "NerfField": "cagefield.fields.nerf",
     "Renderer": "cagefield.rendering.renderer",
     "Scene": "cagefield.scene",
@@ -83,6 +87,9 @@ _HOME = {
 
 def __getattr__(name: str) -> object:
     """The exported object `name`, imported from its own module the first time it is asked for."""
+    if name == "Frame":
+        renamed_modules.warn_renamed("cagefield.Frame", "cagefield.RenderResult")
+        return __getattr__("RenderResult")
     if name not in _HOME:
         raise AttributeError(f"module 'cagefield' has no attribute {name!r}")
     value = getattr(importlib.import_module(_HOME[name]), name)

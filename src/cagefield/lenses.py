@@ -41,17 +41,19 @@ def project(directions: Array, model: Lens, coefficients: Sequence[float] = ()) 
     """
     x, y, z = directions.T
     if model == "opencv_fisheye":
-        radial = _radial(model, coefficients)
+        radial = radial_coefficients(model, coefficients)
         r = np.hypot(x, y)
         angle = np.arctan2(r, z)
         scale = _curve(angle, radial) / np.where(r > 0, r, 1.0)
-        seen = (angle <= _fold(radial, np.pi)) & ((r > 0) | (z > 0))
+        seen = (angle <= polynomial_fold(radial, np.pi)) & ((r > 0) | (z > 0))
         return np.where(seen[:, None], np.stack([x * scale, y * scale], axis=1), np.nan)
     in_front = z > 0
     plane = np.stack([x, y], axis=1) / np.where(in_front, z, 1.0)[:, None]
     if model == "opencv":
-        in_front &= np.hypot(*plane.T) <= _fold(_radial(model, coefficients), _FLAT_LIMIT)
-        plane = _distort(plane, coefficients)
+        in_front &= np.hypot(*plane.T) <= polynomial_fold(
+            radial_coefficients(model, coefficients), _FLAT_LIMIT
+        )
+        plane = distort(plane, coefficients)
     return np.where(in_front[:, None], plane, np.nan)
 
 
@@ -64,12 +66,12 @@ def unproject(image: Array, model: Lens, coefficients: Sequence[float] = ()) -> 
     radius = np.hypot(*image.T)
     safe = np.where(radius > 0, radius, 1.0)
     if model == "opencv_fisheye":
-        angle, reached = _invert_curve(radius, _radial(model, coefficients), np.pi)
+        angle, reached = _invert_curve(radius, radial_coefficients(model, coefficients), np.pi)
         sine = np.sin(angle) / safe
         return np.stack([image[:, 0] * sine, image[:, 1] * sine, np.cos(angle)], axis=1), reached
     plane, reached = image, np.ones(len(image), dtype=bool)
     if model == "opencv":
-        undistorted, reached = _invert_curve(radius, _radial(model, coefficients), _FLAT_LIMIT)
+        undistorted, reached = _invert_curve(radius, radial_coefficients(model, coefficients), _FLAT_LIMIT)
         plane = image * (undistorted / safe)[:, None]
         if coefficients[2] or coefficients[3]:
             plane, reached = _undistort(image, plane, reached, coefficients)
@@ -77,7 +79,7 @@ def unproject(image: Array, model: Lens, coefficients: Sequence[float] = ()) -> 
     return directions / np.linalg.norm(directions, axis=1, keepdims=True), reached
 
 
-def _radial(model: Lens, coefficients: Sequence[float]) -> Array:
+def radial_coefficients(model: Lens, coefficients: Sequence[float]) -> Array:
     """The four radial coefficients k1..k4 of `model`."""
     if model == "opencv_fisheye":
         return np.array(coefficients, dtype=np.float64)
@@ -102,11 +104,12 @@ def fold_radius(model: Lens, coefficients: Sequence[float] = ()) -> float:
     if model == "pinhole":
         return float("inf")
     if model == "opencv_fisheye":
-        return float(np.tan(min(_fold(_radial(model, coefficients), np.pi), np.arctan(_FLAT_LIMIT))))
-    return _fold(_radial(model, coefficients), _FLAT_LIMIT)
+        fold = polynomial_fold(radial_coefficients(model, coefficients), np.pi)
+        return float(np.tan(min(fold, np.arctan(_FLAT_LIMIT))))
+    return polynomial_fold(radial_coefficients(model, coefficients), _FLAT_LIMIT)
 
 
-def _fold(k: Array, limit: float) -> float:
+def polynomial_fold(k: Array, limit: float) -> float:
     """The radius up to which `_curve` grows: its first stationary point, at most `limit`."""
     slope = np.array([1.0, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]])  # in powers of r^2
     slope[np.abs(slope) * float(limit) ** (2 * np.arange(5)) < 1e-9] = 0.0
@@ -120,7 +123,7 @@ def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
 
     Returns r and whether the target is reached at all; where it is not, r is the fold.
     """
-    fold = _fold(k, limit)
+    fold = polynomial_fold(k, limit)
     top = float(_curve(np.array([fold]), k)[0])
     reached = target <= top
     target = np.minimum(target, top)
@@ -141,24 +144,24 @@ def _invert_curve(target: Array, k: Array, limit: float) -> tuple[Array, Mask]:
     return r, reached
 
 
-def _distort(plane: Array, coefficients: Sequence[float]) -> Array:
+def distort(plane: Array, coefficients: Sequence[float]) -> Array:
     """The opencv model's image points of undistorted points `plane` [N,2]."""
     x, y = plane.T
     p1, p2 = coefficients[2], coefficients[3]
     s = x * x + y * y
-    k = _radial("opencv", coefficients)
+    k = radial_coefficients("opencv", coefficients)
     g = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))
     return np.stack(
         [g * x + 2 * p1 * x * y + p2 * (s + 2 * x * x), g * y + p1 * (s + 2 * y * y) + 2 * p2 * x * y], axis=1
     )
 
 
-def _distort_jacobian(plane: Array, coefficients: Sequence[float]) -> tuple[Array, Array, Array]:
-    """Entries a, b, d [N] each of the symmetric Jacobian [[a, b], [b, d]] of `_distort`."""
+def distort_jacobian(plane: Array, coefficients: Sequence[float]) -> tuple[Array, Array, Array]:
+    """Entries a, b, d [N] each of the symmetric Jacobian [[a, b], [b, d]] of `distort`."""
     x, y = plane.T
     p1, p2 = coefficients[2], coefficients[3]
     s = x * x + y * y
-    k = _radial("opencv", coefficients)
+    k = radial_coefficients("opencv", coefficients)
     g = 1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])))
     g_slope = 2.0 * (k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3])))  # dg/dx = g_slope x
     a = g + g_slope * x * x + 2 * p1 * y + 6 * p2 * x
@@ -171,23 +174,23 @@ def _undistort(
     image: Array, start: Array, start_reached: Mask, coefficients: Sequence[float]
 ) -> tuple[Array, Mask]:
     """The points whose opencv image is `image` [N,2], by damped Newton from `start`, and which were found."""
-    fold = _fold(_radial("opencv", coefficients), _FLAT_LIMIT)
+    fold = polynomial_fold(radial_coefficients("opencv", coefficients), _FLAT_LIMIT)
     plane = start
-    residual = _distort(plane, coefficients) - image
+    residual = distort(plane, coefficients) - image
     size = np.hypot(*residual.T)
     damping = np.ones_like(size)
     tolerance = 1e-14 * (1.0 + np.hypot(*image.T))
     for _ in range(60):
         if np.all((size <= tolerance) | (damping < 1e-6)):
             break
-        a, b, d = _distort_jacobian(plane, coefficients)
+        a, b, d = distort_jacobian(plane, coefficients)
         with np.errstate(
             all="ignore"
         ):  # a singular Jacobian gives a step that is not finite, hence not better
             u, v = residual.T
             step = np.stack([d * u - b * v, a * v - b * u], axis=1) / (a * d - b * b)[:, None]
             trial = plane - damping[:, None] * step
-            trial_residual = _distort(trial, coefficients) - image
+            trial_residual = distort(trial, coefficients) - image
             trial_size = np.hypot(*trial_residual.T)
         better = (trial_size < size) & (np.hypot(*trial.T) <= fold)
         plane = np.where(better[:, None], trial, plane)

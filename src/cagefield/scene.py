@@ -32,12 +32,12 @@ from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import load_edits, save_edits
 from cagefield.errors import SceneError
+from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
-from cagefield.fields.seen import seen_by
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import Background, Frame, background_rgb
+from cagefield.rendering.render_result import Background, RenderResult, background_rgb
 from cagefield.scene_files import (
     CAMERAS,
     EDITS,
@@ -154,7 +154,7 @@ class Scene:
             sh_degree=sh_degree,
             eyes=np.array([camera.origin for camera in every]) if every else None,
             contracted=unbounded,
-            seen=partial(seen_by, every, near=near) if unbounded and every else None,
+            seen=partial(in_frusta, every, near=near) if unbounded and every else None,
             on_progress=on_progress,
         )
         kept = original if isinstance(original, NerfField) else None
@@ -256,7 +256,7 @@ class Scene:
         background: Background = None,
         normals: bool = False,
         exact: bool = False,
-    ) -> Frame:
+    ) -> RenderResult:
         """The edited scene seen by `camera`, over the scene's own background unless another is given.
 
         "none" puts nothing behind it. The renderer is kept between calls. `exact` evaluates every edit in
@@ -273,10 +273,10 @@ class Scene:
             )
         colour = self.background if background is None else background_rgb(background)
         if not exact:
-            return cast(Frame, self.renderer.render(camera, background=colour, normals=normals))
+            return cast(RenderResult, self.renderer.render(camera, background=colour, normals=normals))
         return self._render_exact(camera, colour, normals)
 
-    def _render_exact(self, camera: Camera, background: Background, normals: bool) -> Frame:
+    def _render_exact(self, camera: Camera, background: Background, normals: bool) -> RenderResult:
         from cagefield.fields.protocol import Field
         from cagefield.rendering.reference_renderer import render_sampled
 
@@ -284,7 +284,9 @@ class Scene:
             return self._render_original(self.original, camera, background, normals)
         field = self.field
         if isinstance(field, SplatField):
-            return cast(Frame, self._exact_splats.render(camera, background=background, normals=normals))
+            return cast(
+                RenderResult, self._exact_splats.render(camera, background=background, normals=normals)
+            )
         near, far = _sampling_range(field, camera)
         samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
         return render_sampled(
@@ -302,7 +304,7 @@ class Scene:
 
     def _render_original(
         self, original: NerfField, camera: Camera, background: Background, normals: bool
-    ) -> Frame:
+    ) -> RenderResult:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
         from cagefield.rendering.nerf import render_nerf
 

@@ -12,7 +12,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import background_rgb
+from cagefield.rendering.render_result import background_rgb
 
 FORMAT = "cagefield-scene"
 VERSION = 1

@@ -106,20 +106,20 @@ export class Actions {
     const edit = selected(this.app.store.now);
     if (edit !== null) {
       const { corners } = leading(this.app.shown(edit), target(this.app.store.now));
-      this.app.stage.focus(middle(corners), 2 * extent(corners));
+      this.app.viewport.focus(middle(corners), 2 * extent(corners));
       return;
     }
-    const { width, height } = this.app.stage.points;
+    const { width, height } = this.app.viewport.points;
     void this.app.ask({ what: "surface", x: x / width, y: y / height }).then((answer) => {
       if (!answer?.point) return;
       const { point } = answer;
-      const eye = this.app.stage.camera.position.toArray();
-      this.app.stage.focus(point, 0.2 * Math.hypot(...point.map((c, i) => c - eye[i])));
+      const eye = this.app.viewport.camera.position.toArray();
+      this.app.viewport.focus(point, 0.2 * Math.hypot(...point.map((c, i) => c - eye[i])));
     });
   }
 
   /** Looks from where the scene is seen at first, or from one of its cameras. */
-  look(step: number | null): void {
+  lookFrom(step: number | null): void {
     const { hello } = this.app.store.now;
     if (hello === null) return;
     const around = hello.bounds[0].map((low, i) => 0.5 * (low + hello.bounds[1][i])) as Vec3;
@@ -129,7 +129,7 @@ export class Actions {
       pose = hello.cameras[this.camera];
       this.app.say(`camera ${this.camera + 1} of ${hello.cameras.length}`);
     }
-    this.app.stage.look(pose, hello.start.fov_y_deg, hello.up, around);
+    this.app.viewport.lookFrom(pose, hello.start.fov_y_deg, hello.up, around);
   }
 
   copy(): void {
@@ -162,7 +162,7 @@ export class Actions {
     const { state } = this.app.store.now;
     if (state === null) return;
     const parts = state.keys.at(-1)?.parts ?? {};
-    const key = { c2w: this.app.stage.c2w, fov_y_deg: this.app.stage.camera.fov, seconds: 2, parts };
+    const key = { c2w: this.app.viewport.c2w, fov_y_deg: this.app.viewport.camera.fov, seconds: 2, parts };
     this.app.send({ type: "set_path", keys: [...state.keys, key], loop: state.loop });
   }
 

@@ -11,11 +11,11 @@ import { Latency } from "./latency";
 import { Lines } from "./lines";
 import { Pictures } from "./pictures";
 import { Player } from "./player";
-import { recallCamera, recallTools } from "./remembered";
-import { scenery, shownCages } from "./scenery";
-import { Stage } from "./stage";
+import { recallCamera, recallTools } from "./session_storage";
+import { cageOverlay, shownCages } from "./cage_overlay";
+import { Viewport } from "./viewport";
 import { Store, obstacle, selected, showsCages, target } from "./store";
-import { decode, unpack } from "./wire";
+import { decode, unpack } from "./picture_message";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
 
@@ -40,7 +40,7 @@ interface Arrived {
 
 export class App {
   readonly store = new Store(recallTools());
-  readonly stage: Stage;
+  readonly viewport: Viewport;
   readonly pictures: Pictures;
   readonly gizmo: Gizmo;
   readonly camera: CameraFeed;
@@ -70,21 +70,21 @@ export class App {
   private figured = -Infinity;
 
   constructor(host: HTMLElement) {
-    this.stage = new Stage(host);
-    this.pictures = new Pictures(this.stage);
-    this.lines = new Lines(this.stage, this.pictures);
-    this.handles = new Handles(this.stage);
-    this.gizmo = new Gizmo(this.stage.scene, this.stage.camera);
-    this.camera = new CameraFeed(this.stage, (message) => this.send(message));
-    this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.stage.invalidate());
+    this.viewport = new Viewport(host);
+    this.pictures = new Pictures(this.viewport);
+    this.lines = new Lines(this.viewport, this.pictures);
+    this.handles = new Handles(this.viewport);
+    this.gizmo = new Gizmo(this.viewport.scene, this.viewport.camera);
+    this.camera = new CameraFeed(this.viewport, (message) => this.send(message));
+    this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.viewport.invalidate());
     this.player = new Player(this);
-    this.stage.guessed.push(() => this.orbitGuessed());
-    this.stage.beforeFrame.push(() => this.arrange());
-    this.stage.beforeFrame.push(() => this.acknowledge());
-    this.stage.afterFrame.push((time) => this.framed(time));
+    this.viewport.guessed.push(() => this.orbitGuessed());
+    this.viewport.beforeFrame.push(() => this.arrange());
+    this.viewport.beforeFrame.push(() => this.acknowledge());
+    this.viewport.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
-      if (DRAWN.some((key) => now[key] !== before[key])) this.stage.invalidate();
+      if (DRAWN.some((key) => now[key] !== before[key])) this.viewport.invalidate();
     });
     this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
       opened: () => this.store.set({ connection: "open" }),
@@ -133,19 +133,19 @@ export class App {
     this.drag.move(operation);
     this.latency.moved(this.drag.id, this.drag.seq, time);
     this.store.set({ limit: this.drag.why });
-    this.stage.invalidate();
+    this.viewport.invalidate();
   }
 
   endDrag(): void {
     this.drag?.end();
-    this.stage.invalidate();
+    this.viewport.invalidate();
   }
 
   cancelDrag(): void {
     this.drag?.cancel();
     this.drag = null;
     this.store.set({ limit: null });
-    this.stage.invalidate();
+    this.viewport.invalidate();
   }
 
   /** After a new edit was asked for: Set mode, as soon as it is there. */
@@ -165,9 +165,9 @@ export class App {
   arrange(): void {
     const { now } = this.store;
     const edit = selected(now);
-    const eye = this.stage.camera.position.toArray();
+    const eye = this.viewport.camera.position.toArray();
     const grid = now.grid && edit !== null ? this.grid.of(edit, shownCages(edit, this.drag)) : [];
-    const { segments, dots } = scenery(now, this.drag, grid, eye);
+    const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
     if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null || (now.tool === "select" && now.corners.length === 0)) {
@@ -188,7 +188,7 @@ export class App {
         this.takeState(message);
         break;
       case "dragged":
-        if (this.drag?.answered(message)) this.stage.invalidate();
+        if (this.drag?.answered(message)) this.viewport.invalidate();
         if (this.drag && !this.drag.ended) this.store.set({ limit: this.drag.why });
         break;
       case "answer":
@@ -217,7 +217,7 @@ export class App {
     if (first) {
       const [low, high] = hello.bounds;
       const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
-      this.stage.look(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
+      this.viewport.lookFrom(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
     }
     this.camera.restate();
     this.sendLook();
@@ -253,12 +253,12 @@ export class App {
     this.grid.forget();
     this.store.set({ connection: "lost", limit: null, preview: null });
     if (dragging) this.say("the server went away in the middle of a drag, which is lost", "warning");
-    this.stage.invalidate();
+    this.viewport.invalidate();
   }
 
   private sendLook(): void {
     const { view, before, split } = this.store.now;
-    this.send({ type: "look", view, before, split });
+    this.send({ type: "display", view, before, split });
   }
 
   /** Decodes a picture away from the main thread, and shows pictures in the order in which they came. */
@@ -287,7 +287,7 @@ export class App {
     const { hello } = this.store.now;
     if (hello === null) return;
     const [low, high] = hello.bounds;
-    const amid = this.stage.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
+    const amid = this.viewport.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
     this.orbitFrom = amid ? this.camera.seq + 1 : null;
   }
 
@@ -296,7 +296,7 @@ export class App {
     if (this.orbitFrom === null || camera < this.orbitFrom || camera !== this.camera.seq) return;
     const distance = this.pictures.depth.at(0.5, 0.5);
     if (distance === null) return;
-    this.stage.orbitAt(distance);
+    this.viewport.orbitAt(distance);
     this.orbitFrom = null;
   }
 
@@ -314,7 +314,7 @@ export class App {
       setTimeout(() => {
         for (const action of this.beforeAsking) action();
         for (const picture of pictures) this.send({ type: "presented", picture });
-      }, this.drag === null ? 0 : ASKED_AFTER * this.stage.frameTime);
+      }, this.drag === null ? 0 : ASKED_AFTER * this.viewport.frameTime);
     }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];

@@ -1,7 +1,7 @@
 /** Tells the server where the page looks from, once a frame, and remembers it for the pictures that answer. */
 import type { PageMessage } from "./protocol";
 import type { Viewpoint } from "./pictures";
-import type { Stage } from "./stage";
+import type { Viewport } from "./viewport";
 
 const REST_AFTER = 140;
 const REMEMBERED = 200;
@@ -16,15 +16,15 @@ export class CameraFeed {
   held = false;
 
   constructor(
-    private readonly stage: Stage,
+    private readonly viewport: Viewport,
     private readonly send: (message: PageMessage) => boolean,
   ) {
-    stage.cameraChanged.push(() => {
+    viewport.cameraChanged.push(() => {
       this.changed = true;
       this.moving = true;
       this.waitForRest();
     });
-    stage.beforeFrame.push(() => {
+    viewport.beforeFrame.push(() => {
       if (this.changed) this.tell();
     });
   }
@@ -55,18 +55,18 @@ export class CameraFeed {
 
   private tell(): void {
     this.changed = false;
-    const { stage } = this;
+    const { viewport } = this;
     const seq = ++this.seq;
-    this.viewpoints.set(seq, { viewProjection: stage.viewProjection, eye: stage.camera.position.clone() });
+    this.viewpoints.set(seq, { viewProjection: viewport.viewProjection, eye: viewport.camera.position.clone() });
     this.viewpoints.delete(seq - REMEMBERED);
-    const { width, height } = stage.pixels;
+    const { width, height } = viewport.pixels;
     this.send({
       type: "camera",
       seq,
-      c2w: stage.c2w,
+      c2w: viewport.c2w,
       width: Math.min(4096, Math.max(16, width)),
       height: Math.min(4096, Math.max(16, height)),
-      fov_y_deg: stage.camera.fov,
+      fov_y_deg: viewport.camera.fov,
       moving: this.moving,
     });
   }

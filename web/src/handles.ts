@@ -1,7 +1,7 @@
 /** Dots on corners, squares on faces: what can be grabbed, always on top. */
 import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, GLSL3, Points, ShaderMaterial } from "three";
 import type { Vec3 } from "./protocol";
-import type { Stage } from "./stage";
+import type { Viewport } from "./viewport";
 
 export interface Dot {
   at: Vec3;
@@ -53,7 +53,7 @@ export class Handles {
   private readonly paint = new BufferAttribute(new Float32Array(MOST * 4), 4);
   private readonly form = new BufferAttribute(new Float32Array(MOST), 1);
 
-  constructor(stage: Stage) {
+  constructor(viewport: Viewport) {
     for (const attribute of [this.position, this.paint, this.form]) attribute.setUsage(DynamicDrawUsage);
     this.geometry.setAttribute("position", this.position);
     this.geometry.setAttribute("paint", this.paint);
@@ -70,9 +70,9 @@ export class Handles {
     const points = new Points(this.geometry, material);
     points.frustumCulled = false;
     points.renderOrder = 4;
-    stage.scene.add(points);
-    stage.beforeFrame.push(() => {
-      material.uniforms.scale.value = stage.renderer.getPixelRatio();
+    viewport.scene.add(points);
+    viewport.beforeFrame.push(() => {
+      material.uniforms.scale.value = viewport.renderer.getPixelRatio();
     });
   }
 

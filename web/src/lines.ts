@@ -20,7 +20,7 @@ import {
 import { NOTHING } from "./depth_image";
 import type { Pictures } from "./pictures";
 import type { Vec3 } from "./protocol";
-import type { Stage } from "./stage";
+import type { Viewport } from "./viewport";
 
 export interface Segment {
   from: Vec3;
@@ -121,7 +121,7 @@ export class Lines {
   private readonly shared: Record<string, IUniform>;
 
   constructor(
-    private readonly stage: Stage,
+    private readonly viewport: Viewport,
     private readonly pictures: Pictures,
   ) {
     this.shared = {
@@ -145,8 +145,8 @@ export class Lines {
     this.mesh = new Mesh(this.geometry, material);
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = 1;
-    stage.scene.add(this.mesh);
-    stage.beforeFrame.push(() => this.follow());
+    viewport.scene.add(this.mesh);
+    viewport.beforeFrame.push(() => this.follow());
   }
 
   /** How much nearer than a line the field must be to hide it, world units. */
@@ -158,7 +158,7 @@ export class Lines {
   set(segments: readonly Segment[]): void {
     if (segments.length > this.capacity) this.buffers = this.grow(2 * segments.length);
     const { from, to, paint, stroke } = this.buffers;
-    const scale = this.stage.renderer.getPixelRatio();
+    const scale = this.viewport.renderer.getPixelRatio();
     segments.forEach((segment, n) => {
       const { r, g, b } = segment.colour;
       for (let i = 4 * n; i < 4 * n + 4; i++) {
@@ -190,9 +190,9 @@ export class Lines {
   }
 
   private follow(): void {
-    const { width, height } = this.stage.pixels;
+    const { width, height } = this.viewport.pixels;
     (this.shared.viewport.value as Vector2).set(width, height);
-    this.shared.scale.value = this.stage.renderer.getPixelRatio();
+    this.shared.scale.value = this.viewport.renderer.getPixelRatio();
     const { viewpoint } = this.pictures;
     if (viewpoint === null) return;
     (this.shared.pictureProjection.value as Matrix4).copy(viewpoint.viewProjection);

@@ -1,10 +1,10 @@
 import "./editor.css";
 import { Actions } from "./actions";
 import { App } from "./app";
-import { inspector } from "./inspect";
+import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "./keys";
 import { Pointer } from "./pointer";
-import { remember } from "./remembered";
+import { remember } from "./session_storage";
 import { dialogs } from "./ui/dialogs";
 import { h } from "./ui/dom";
 import { editsList } from "./ui/edits_list";
@@ -45,10 +45,10 @@ app.store.watch(["state", "hello"], ({ hello, state }) => {
   document.title = `${state?.saved === false ? "● " : ""}${hello?.name ?? "cagefield"}`;
 });
 addEventListener("beforeunload", (event) => {
-  if (app.store.now.hello !== null) remember(app.store.now, app.stage.c2w);
+  if (app.store.now.hello !== null) remember(app.store.now, app.viewport.c2w);
   if (app.store.now.state?.saved === false) event.preventDefault();
 });
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) app.player.stop();
 });
-window.cagefield = inspector(app);
+window.cagefield = testApi(app);

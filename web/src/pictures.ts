@@ -24,7 +24,7 @@ import {
 } from "three";
 import { DepthImage, NOTHING } from "./depth_image";
 import type { PictureHeader } from "./protocol";
-import type { Stage } from "./stage";
+import type { Viewport } from "./viewport";
 
 /** A camera that a picture was taken from. */
 export interface Viewpoint {
@@ -85,7 +85,7 @@ export class Pictures {
   private readonly quad = new PlaneGeometry(2, 2);
   private readonly grid = new PlaneGeometry(2, 2, CELLS, CELLS);
 
-  constructor(private readonly stage: Stage) {
+  constructor(private readonly viewport: Viewport) {
     this.depthTexture.magFilter = this.depthTexture.minFilter = NearestFilter;
     this.depthTexture.needsUpdate = true;
     const part = new ShaderMaterial({
@@ -118,8 +118,8 @@ export class Pictures {
     this.surface.frustumCulled = false;
     this.surface.renderOrder = -10;
     this.surface.visible = false;
-    stage.scene.add(this.surface);
-    stage.beforeFrame.push(() => this.follow());
+    viewport.scene.add(this.surface);
+    viewport.beforeFrame.push(() => this.follow());
   }
 
   /** Shows a part of a picture: all of it, or a tile. */
@@ -137,7 +137,7 @@ export class Pictures {
     this.uploadDepth();
     this.viewpoint = viewpoint ?? this.viewpoint;
     this.surface.visible = true;
-    this.stage.invalidate();
+    this.viewport.invalidate();
   }
 
   private uploadDepth(): void {
@@ -150,7 +150,7 @@ export class Pictures {
 
   /** Makes the texture as large as the canvas; what it shows is kept. */
   private fit(): void {
-    const { width, height } = this.stage.pixels;
+    const { width, height } = this.viewport.pixels;
     const old = this.target;
     if (old?.width === width && old.height === height) return;
     this.target = new WebGLRenderTarget(width, height, {
@@ -172,7 +172,7 @@ export class Pictures {
     at: Pick<PictureHeader, "x" | "y" | "width" | "height" | "full_width" | "full_height">,
     upright: boolean,
   ): void {
-    const { renderer } = this.stage;
+    const { renderer } = this.viewport;
     const { uniforms } = this.partMesh.material;
     uniforms.picture.value = texture;
     uniforms.upright.value = upright;
@@ -190,7 +190,7 @@ export class Pictures {
   /** Chooses between the picture as it is and the picture as a surface seen from elsewhere. */
   private follow(): void {
     const { uniforms } = this.surface.material;
-    const now = this.stage.viewProjection;
+    const now = this.viewport.viewProjection;
     const moved = this.viewpoint !== null && !alike(now, this.viewpoint.viewProjection);
     this.surface.geometry = moved ? this.grid : this.quad;
     this.surface.material.depthTest = this.surface.material.depthWrite = moved;

@@ -8,7 +8,7 @@ export interface Playable {
   readonly store: Store;
   send(message: PageMessage): boolean;
   ask(question: Omit<Ask, "type" | "request">): Promise<Answer | null>;
-  readonly stage: {
+  readonly viewport: {
     beforeFrame: (() => void)[];
     /** Called when the user takes hold of the view. */
     taken: (() => void)[];
@@ -42,8 +42,8 @@ export class Player {
     private readonly now: () => number = () => performance.now(),
   ) {
     // First of all: the camera is told, and drawn, as it is set here.
-    app.stage.beforeFrame.unshift(() => this.frame());
-    app.stage.taken.push(() => this.stop());
+    app.viewport.beforeFrame.unshift(() => this.frame());
+    app.viewport.taken.push(() => this.stop());
     app.store.watch(["connection"], ({ connection }) => {
       if (connection === "lost") this.stop();
     });
@@ -64,7 +64,7 @@ export class Player {
     this.run = this.expected = null;
     if (run !== null) {
       this.app.send({ type: "play_end", play: run.play });
-      this.app.stage.settle();
+      this.app.viewport.settle();
     }
     this.changed(false);
   }
@@ -88,7 +88,7 @@ export class Player {
     this.expected = null;
     const whole = duration(state.keys, state.loop);
     this.run = { play, stills: answer.stills, whole, loop: state.loop, started: null };
-    this.app.stage.invalidate();
+    this.app.viewport.invalidate();
   }
 
   private frame(): void {
@@ -99,8 +99,8 @@ export class Player {
     const seconds = run.loop ? since % run.whole : Math.min(since, run.whole);
     const { c2w, fov_y_deg } = stillAt(run.stills, seconds / run.whole);
     this.app.send({ type: "play", play: run.play, seconds });
-    this.app.stage.pose(c2w, fov_y_deg);
+    this.app.viewport.pose(c2w, fov_y_deg);
     if (!run.loop && since >= run.whole) this.stop();
-    else this.app.stage.invalidate();
+    else this.app.viewport.invalidate();
   }
 }

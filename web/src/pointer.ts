@@ -6,7 +6,7 @@ import { leading } from "./drag";
 import { cornersMove, onLine, onPlane } from "./gestures";
 import { lengthStep, snapped, type Operation } from "./operations";
 import { distanceToEdges, pick, pickCorner } from "./picking";
-import { draggable, shownCages } from "./scenery";
+import { draggable, shownCages } from "./cage_overlay";
 import { obstacle, selected, showsCages, target, type Hover } from "./store";
 
 const SNAP_ANGLE = 15;
@@ -40,7 +40,7 @@ export class Pointer {
   private first = { time: -Infinity, free: true };
 
   constructor(private readonly app: App) {
-    const { canvas } = app.stage;
+    const { canvas } = app.viewport;
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event));
     // Where the mouse is between two frames; not all browsers and addresses tell.
@@ -62,7 +62,7 @@ export class Pointer {
   /** Gives the drag up that goes on; false where none does. */
   cancel(): boolean {
     if (this.hold === null) return false;
-    if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.stage.device(this.at.x, this.at.y));
+    if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.viewport.device(this.at.x, this.at.y));
     this.hold = null;
     this.app.cancelDrag();
     this.free();
@@ -103,8 +103,8 @@ export class Pointer {
       return;
     }
     event.stopImmediatePropagation();
-    if (this.app.stage.orbit) this.app.stage.orbit.enabled = false;
-    this.app.stage.canvas.setPointerCapture(event.pointerId);
+    if (this.app.viewport.orbit) this.app.viewport.orbit.enabled = false;
+    this.app.viewport.canvas.setPointerCapture(event.pointerId);
     if (hover !== null && event.shiftKey) this.choose(hover.part);
     else if (hover !== null) this.grab(hover);
     else this.grabGizmo();
@@ -114,46 +114,46 @@ export class Pointer {
   private move(event: PointerEvent): void {
     this.locate(event);
     if (this.hold !== null) this.catchUp();
-    else if (event.buttons === 0) this.look();
+    else if (event.buttons === 0) this.updateHover();
   }
 
   private up(event: PointerEvent): void {
     this.locate(event);
     this.app.camera.held = false;
     if (this.hold !== null) {
-      if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.stage.device(this.at.x, this.at.y));
+      if (this.hold.kind === "gizmo") this.app.gizmo.end(this.app.viewport.device(this.at.x, this.at.y));
       this.hold = null;
       this.app.endDrag();
     } else if (this.pressed && event.button === 0 && this.travelled() < CLICK_REACH) {
       this.select();
     }
     this.free();
-    this.look();
+    this.updateHover();
   }
 
   private leave(): void {
     if (this.hold !== null) return;
     this.app.gizmo.leave();
     this.app.store.set({ hover: null });
-    this.app.stage.invalidate();
+    this.app.viewport.invalidate();
   }
 
   private free(): void {
     this.constraint = null;
     this.pressed = null;
-    if (this.app.stage.orbit) this.app.stage.orbit.enabled = true;
+    if (this.app.viewport.orbit) this.app.viewport.orbit.enabled = true;
   }
 
   /** Shows what a click would take hold of. */
-  private look(): void {
+  private updateHover(): void {
     const axis = this.app.gizmo.axis;
     const hover = this.under();
-    if (this.app.gizmo.axis !== axis) this.app.stage.invalidate();
+    if (this.app.gizmo.axis !== axis) this.app.viewport.invalidate();
     const before = this.app.store.now.hover;
     if (!(hover?.cage === before?.cage && hover?.part.kind === before?.part.kind && hover?.part.index === before?.part.index)) {
       this.app.store.set({ hover });
     }
-    this.app.stage.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
+    this.app.viewport.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
   }
 
   /** The part of a cage that a click would take hold of; where it is the gizmo's handle instead, that is lit. */
@@ -162,16 +162,16 @@ export class Pointer {
     const edit = selected(now);
     this.app.gizmo.leave();
     if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null) return null;
-    const { project } = this.app.stage;
+    const { project } = this.app.viewport;
     const { x, y } = this.at;
     const cages = draggable(now, shownCages(edit, this.app.drag));
     for (const { cage, corners } of cages) {
       const corner = pickCorner(x, y, corners, project);
       if (corner !== null) return { part: corner, cage };
     }
-    const axis = this.app.gizmo.hover(this.app.stage.device(x, y));
+    const axis = this.app.gizmo.hover(this.app.viewport.device(x, y));
     if (axis !== null && axis !== WHOLE_BALL) return null;
-    const eye = this.app.stage.camera.position.toArray();
+    const eye = this.app.viewport.camera.position.toArray();
     for (const { cage, corners } of cages) {
       const part = pick(x, y, { corners, eye }, project);
       if (part === null) continue;
@@ -202,7 +202,7 @@ export class Pointer {
     const cage = leading(drag.start, drag.target).corners;
     const at = new Vector3(...middle(cage, own));
     const line = hover.part.kind === "face" && !together ? new Vector3(...faceNormal(cage, hover.part.index)) : null;
-    const plane = new Plane().setFromNormalAndCoplanarPoint(this.app.stage.forward, at);
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.app.viewport.forward, at);
     this.hold = { kind: "part", corners, at, grabbed: at, plane, line };
     this.hold.grabbed = this.reached(this.hold) ?? at;
   }
@@ -210,13 +210,13 @@ export class Pointer {
   private grabGizmo(): void {
     const { corners } = this.app.store.now;
     if (this.app.beginDrag() === null) return;
-    this.app.gizmo.begin(this.app.stage.device(this.at.x, this.at.y));
+    this.app.gizmo.begin(this.app.viewport.device(this.at.x, this.at.y));
     this.hold = { kind: "gizmo", corners: [...corners] };
   }
 
   private operation(hold: Hold): Operation | null {
     if (hold.kind === "gizmo") {
-      return this.app.gizmo.move(this.app.stage.device(this.at.x, this.at.y), hold.corners);
+      return this.app.gizmo.move(this.app.viewport.device(this.at.x, this.at.y), hold.corners);
     }
     const to = this.reached(hold);
     if (to === null) return null;
@@ -225,7 +225,7 @@ export class Pointer {
 
   /** Where the mouse has taken what it holds. */
   private reached(hold: Hold & { kind: "part" }): Vector3 | null {
-    const ray = this.app.stage.ray(this.at.x, this.at.y);
+    const ray = this.app.viewport.ray(this.at.x, this.at.y);
     const axes = { X: new Vector3(1, 0, 0), Y: new Vector3(0, 1, 0), Z: new Vector3(0, 0, 1) };
     if (this.constraint !== null) return onLine(ray, hold.at, axes[this.constraint]);
     if (hold.line !== null) return onLine(ray, hold.at, hold.line);
@@ -248,7 +248,7 @@ export class Pointer {
       .map((edit) => {
         const cages = shownCages(edit, this.app.drag);
         const corners = leading(cages, target(now)).corners;
-        return { id: edit.id, distance: distanceToEdges(this.at.x, this.at.y, corners, this.app.stage.project) };
+        return { id: edit.id, distance: distanceToEdges(this.at.x, this.at.y, corners, this.app.viewport.project) };
       })
       .filter(({ distance }) => distance < LINE_REACH)
       .sort((a, b) => a.distance - b.distance);
@@ -260,7 +260,7 @@ export class Pointer {
   private place(event: MouseEvent): void {
     this.locate(event);
     if (!this.first.free) return;
-    const { width, height } = this.app.stage.points;
+    const { width, height } = this.app.viewport.points;
     this.app.expectEdit();
     this.app.send({ type: "place", x: clamp(this.at.x / width), y: clamp(this.at.y / height) });
   }
@@ -270,7 +270,7 @@ export class Pointer {
   }
 
   private locate(event: MouseEvent): void {
-    const box = this.app.stage.canvas.getBoundingClientRect();
+    const box = this.app.viewport.canvas.getBoundingClientRect();
     this.at = { x: event.clientX - box.left, y: event.clientY - box.top };
     this.snapKey = event.ctrlKey;
     this.latest = { ...this.at, time: event.timeStamp };

@@ -12,7 +12,7 @@ export type Vec3 = [number, number, number];
 export type Corners = [Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3];
 export type PageMessage =
   | CameraMessage
-  | LookMessage
+  | DisplayMessage
   | PresentedMessage
   | DragBegin
   | DragMove
@@ -229,8 +229,8 @@ export interface LoadEdits {
 /**
  * What is shown: a view; `before` leaves the edits out, `split` left of a share of the width.
  */
-export interface LookMessage {
-  type: "look";
+export interface DisplayMessage {
+  type: "display";
   view?: "colour" | "depth" | "opacity" | "normals";
   before?: boolean;
   split?: number | null;

@@ -1,10 +1,10 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "./cage";
 import type { Axes } from "./operations";
-import type { EditState, Hello, Job, LookMessage, Notice, Preparing, Preview, State } from "./protocol";
+import type { EditState, Hello, Job, DisplayMessage, Notice, Preparing, Preview, State } from "./protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
-export type View = NonNullable<LookMessage["view"]>;
+export type View = NonNullable<DisplayMessage["view"]>;
 export type CageName = "inner" | "outer" | "both";
 export type Target = "field" | CageName;
 

@@ -2,7 +2,7 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import { Connection, socketAddress, type Handlers, type Socket } from "../src/connection";
 import { HELD, bindings, named } from "../src/keys";
 import { Latency } from "../src/latency";
-import { scenery } from "../src/scenery";
+import { cageOverlay } from "../src/cage_overlay";
 import { START, Store, obstacle, selected, target } from "../src/store";
 import type { Actions } from "../src/actions";
 import type { App } from "../src/app";
@@ -79,7 +79,7 @@ describe("the store", () => {
 describe("what is drawn", () => {
   const eye: [number, number, number] = [0, -5, 0];
   it("is both cages of the selected edit, with a dot on each corner and on faces that look this way", () => {
-    const { segments, dots } = scenery({ ...START, state: state() }, null, [], eye);
+    const { segments, dots } = cageOverlay({ ...START, state: state() }, null, [], eye);
     expect(segments).toHaveLength(24);
     expect(dots.filter((dot) => dot.shape === "round")).toHaveLength(8);
     expect(dots.filter((dot) => dot.shape === "square")).toHaveLength(1);
@@ -87,22 +87,22 @@ describe("what is drawn", () => {
 
   it("is where the inner cage was, too, once it has moved; and both cages' handles in Set mode", () => {
     const moved = edit({ deformed: edit().inner.map(([x, y, z]) => [x + 0.1, y, z]) as never });
-    expect(scenery({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(36);
-    expect(scenery({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
+    expect(cageOverlay({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(36);
+    expect(cageOverlay({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
   });
 
   it("has the other edits in their colours, hidden ones not, and nothing where cages are off or a page plays", () => {
     const edits = [edit(), edit({ id: 2, colour: "#ff0000" }), edit({ id: 3, enabled: false })];
-    const { segments } = scenery({ ...START, state: state({ edits }) }, null, [], eye);
+    const { segments } = cageOverlay({ ...START, state: state({ edits }) }, null, [], eye);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
-    expect(scenery({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments).toHaveLength(0);
+    expect(cageOverlay({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments).toHaveLength(0);
     const preview: Preview = { type: "preview", page: 1, play: 1, on: true };
-    expect(scenery({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(0);
+    expect(cageOverlay({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(0);
   });
 
   it("has no handles where the edit is locked", () => {
-    expect(scenery({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots).toHaveLength(0);
+    expect(cageOverlay({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots).toHaveLength(0);
   });
 });
 

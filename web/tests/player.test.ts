@@ -48,7 +48,7 @@ class FakePage implements Playable {
   settled = 0;
   time = 1000;
   answer: Partial<Answer> | null = { stills: STILLS };
-  readonly stage = {
+  readonly viewport = {
     beforeFrame: [] as (() => void)[],
     taken: [] as (() => void)[],
     invalidate: (): void => undefined,
@@ -80,7 +80,7 @@ class FakePage implements Playable {
 
   frame(after: number): void {
     this.time += 1000 * after;
-    for (const action of this.stage.beforeFrame) action();
+    for (const action of this.viewport.beforeFrame) action();
   }
 }
 
@@ -130,7 +130,7 @@ describe("the player", () => {
   });
 
   it("stops when the user takes the view, and when the server is gone", async () => {
-    for (const leave of [(page: FakePage) => page.stage.taken[0](), (page: FakePage) => page.store.set({ connection: "lost" })]) {
+    for (const leave of [(page: FakePage) => page.viewport.taken[0](), (page: FakePage) => page.store.set({ connection: "lost" })]) {
       const page = new FakePage();
       await page.begin();
       page.frame(0);

@@ -23,9 +23,9 @@ from cagefield.benchmarking.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import CagefieldError
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.rendering.metrics import psnr, ssim
+from cagefield.rendering.render_result import RenderResult
 from cagefield.typing import Array, Float32
 
 NEARER, FOGGY = 0.8, 0.1
@@ -180,7 +180,7 @@ def exposed(picture: NDArray[Any], photo: Float32) -> Float32:
     return np.clip(picture * gains_to(picture, photo), 0, 1).astype(np.float32)
 
 
-def _likeness(view: View, frame: Frame) -> tuple[float, float, float]:
+def _likeness(view: View, frame: RenderResult) -> tuple[float, float, float]:
     """(PSNR, PSNR with the exposure fitted, SSIM) of a picture of a photo's view."""
     photo, picture = _photo(view), np.clip(frame.rgb, 0, 1)
     return psnr(picture, photo), psnr(exposed(picture, photo), photo), ssim(picture, photo)
@@ -210,7 +210,7 @@ def _spread_rays(depth: Float32) -> tuple[NDArray[np.int64], Array]:
 
 
 def _depths(
-    view: View, frame: Frame, learnt: Learnt, pixels: NDArray[np.int64], distances: Array
+    view: View, frame: RenderResult, learnt: Learnt, pixels: NDArray[np.int64], distances: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """(relative depth errors [K], whether the rays [K] are in fog)."""
     if not len(pixels):

@@ -22,7 +22,7 @@ from cagefield.benchmarking.workbench import Workbench
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.frame import Frame
+from cagefield.rendering.render_result import RenderResult
 from cagefield.scene import Scene
 from cagefield.typing import AnyArray
 from cagefield.warps.device_stack import DeviceStack
@@ -108,7 +108,7 @@ def seen(scene: Scene, cameras: Sequence[Camera]) -> AnyArray:
     return stacked([np.clip(shown(scene, camera).rgb, 0.0, 1.0) for camera in cameras])
 
 
-def shown(scene: Scene, camera: Camera) -> Frame:
+def shown(scene: Scene, camera: Camera) -> RenderResult:
     """A scene's picture over white, of the original field, exactly, where it holds one."""
     return scene.render(camera, background="white", exact=scene.original is not None)
 

@@ -46,12 +46,12 @@ def distortion(warp: BackwardMap, edit: Edit, *, samples: int = SAMPLES, seed: i
     its least determinant is a bound over all of it.
     """
     outer = _outer(edit)
-    J = warp.to_canonical(between(edit.deformed, outer, samples, seed)).jacobian
+    J = warp.to_canonical(shell_samples(edit.deformed, outer, samples, seed)).jacobian
     det = np.linalg.det(J)
     folded = float((det <= 0.0).mean())
     bound = np.inf
     if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, TrilinearShell):
-        forward = np.linalg.det(warp.to_deformed(between(edit.inner, outer, samples, seed)).jacobian)
+        forward = np.linalg.det(warp.to_deformed(shell_samples(edit.inner, outer, samples, seed)).jacobian)
         folded = max(folded, float((forward <= 0.0).mean()))
         bound = warp.shell.least_ratio()
     with np.errstate(divide="ignore"):
@@ -70,10 +70,10 @@ def shell_points(edit: Edit, count: int, seed: int = 0) -> Array:
     Raises:
         CagefieldError: an edit without an outer cage, or cages that leave no shell between them.
     """
-    return between(edit.deformed, _outer(edit), count, seed)
+    return shell_samples(edit.deformed, _outer(edit), count, seed)
 
 
-def between(inner: Cage, outer: Cage, count: int, seed: int = 0) -> Array:
+def shell_samples(inner: Cage, outer: Cage, count: int, seed: int = 0) -> Array:
     """Random points [count,3], evenly spread over the outer cage without the inner one.
 
     Raises:

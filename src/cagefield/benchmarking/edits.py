@@ -110,7 +110,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             there = changed(before, after)
             if relit(case.moved(procedural_scene(name))):
                 carried = pooled_psnr(pictures, bench.moved(case, cameras, carried=True), there)
-            known = ~bench.unseen(case, cameras, there)
+            known = ~bench.unseen_pixels(case, cameras, there)
             hidden = 1.0 - float(known.mean())
             lost_seen = mean_psnr(unedited[truth], before, known) - mean_psnr(pictures, after, known)
         figures = compare(unedited[truth], pictures, before, after)

@@ -13,11 +13,11 @@ from cagefield.cameras import Camera
 from cagefield.datasets import Dataset
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.training.splat_config import SplatConfig
 from cagefield.typing import Float32
 
-Show = Callable[[Camera], Frame]
+Show = Callable[[Camera], RenderResult]
 CaptureField = Literal["splat", "voxel"]
 
 SAMPLES = 256
@@ -89,8 +89,8 @@ def _splats(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
 def _show(renderer: Any, background: Background) -> Show:
     """Pictures of a renderer over a background."""
 
-    def show(camera: Camera) -> Frame:
-        frame: Frame = renderer.render(camera, background=background)
+    def show(camera: Camera) -> RenderResult:
+        frame: RenderResult = renderer.render(camera, background=background)
         return frame
 
     return show

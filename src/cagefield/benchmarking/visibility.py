@@ -17,7 +17,7 @@ REACH = 0.008
 so far above it: what is seen through a gap narrower than that, a pixel or less, no photo resolves."""
 
 
-def unseen(
+def unseen_pixels(
     moved: ProceduralScene,
     camera: Camera,
     photographed: ProceduralScene,

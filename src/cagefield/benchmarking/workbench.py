@@ -25,7 +25,7 @@ import cagefield
 from cagefield.atomic_files import replaced_file
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
-from cagefield.benchmarking.visibility import unseen
+from cagefield.benchmarking.visibility import unseen_pixels
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
@@ -176,7 +176,7 @@ class Workbench:
         what = f"{case.scene}, {case.name}: photos of the truth"
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
 
-    def unseen(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
+    def unseen_pixels(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
         """Pixels [V,H,W] in `where`, of `moved`, that show what none of the photos of the scene showed."""
         if case.moved is None:
             raise CagefieldError(f"no part of {case.scene} is moved by {case.name}")
@@ -187,7 +187,7 @@ class Workbench:
             (*_MODELLED, "benchmarking/cases.py", "benchmarking/visibility.py"),
         )
         masks = (
-            unseen(moved, camera, scene, photos, mask).astype(np.uint8)
+            unseen_pixels(moved, camera, scene, photos, mask).astype(np.uint8)
             for camera, mask in zip(cameras, where, strict=True)
         )
         what = f"{case.scene}, {case.name}: what no photo showed"

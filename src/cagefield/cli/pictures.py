@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from cagefield.atomic_files import replaced_file
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import side_by_side, write_png
+from cagefield.rendering.render_result import RenderResult
 from cagefield.typing import AnyArray
 
 Pictures = dict[str, AnyArray]
@@ -40,7 +40,7 @@ class DepthScale:
         return np.repeat(np.clip(grey, 0.0, 1.0)[..., None], 3, axis=-1)
 
 
-def pictures_of(frames: Sequence[Frame], depth_scale: DepthScale | None = None) -> Pictures:
+def pictures_of(frames: Sequence[RenderResult], depth_scale: DepthScale | None = None) -> Pictures:
     """End of the file name -> picture: the frames side by side, and their depth and normals if any.
 
     A single frame over nothing becomes an RGBA picture.

@@ -27,7 +27,7 @@ _KEPT = 0.9  # share of the photos that must find their place anew
 class Poses:
     """Find out where photos were taken: a data set of a folder of photos or a video, ready for training.
 
-    Ctrl-C keeps what is done so far; the same command goes on.
+    Ctrl-C keeps what is done so far; the same command continues.
     """
 
     photos: tyro.conf.Positional[Path]
@@ -77,7 +77,7 @@ def make(photos: Path, target: Path, frames: int = 80) -> str:
             )
     except KeyboardInterrupt:
         if work_folder(target).is_dir():
-            print(f"stopped; what is done is kept in {work_folder(target)}, the same command goes on")
+            print(f"stopped; what is done is kept in {work_folder(target)}, the same command continues")
         raise
     return summary(report, time.monotonic() - start)
 
@@ -162,7 +162,7 @@ def check(dataset: Dataset) -> Fold | None:
 def describe(fold: Fold) -> str:
     """What is wrong, in words."""
     return (
-        f"the poses are folded: {fold.photos} of {fold.looked_at} photos stand beside others that show "
+        f"the poses are folded: {fold.photos} of {fold.compared} photos stand beside others that show "
         f"something else ({fold.pair[0]} and {fold.pair[1]}), as where two sides of a thing look alike"
     )
 

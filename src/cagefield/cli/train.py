@@ -102,7 +102,7 @@ class Train:
             scene.save(self.out, overwrite=self.overwrite or self.resume)
         print(f"{figures}\nscene written to {self.out}")
         if not finished:
-            print("stopped early; the same command with --resume goes on")
+            print("stopped early; the same command with --resume continues")
             raise KeyboardInterrupt
         checkpoint.unlink(missing_ok=True)
 
@@ -180,7 +180,7 @@ class Train:
             CagefieldError: the one that was raised within, with that added.
         """
         rest = "goes straight to " + ("baking" if self.field == "nerf" else "writing the scene")
-        note = f"the training is kept: the same command with --resume {rest if finished else 'goes on'}"
+        note = f"the training is kept: the same command with --resume {rest if finished else 'continues'}"
         try:
             yield
         except CagefieldError as error:

@@ -64,12 +64,12 @@ class Fold:
 
     Attributes:
         photos: number of photos that contradict a neighbour and agree with another.
-        looked_at: number of photos compared.
+        compared: number of photos compared.
         pair: names of the two that contradict each other most.
     """
 
     photos: int
-    looked_at: int
+    compared: int
     pair: tuple[str, str]
 
 

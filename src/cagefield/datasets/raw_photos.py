@@ -121,7 +121,7 @@ def video_frames(
     for values_so_far, frame in enumerate(_small_frames(video), start=1):
         values.append(_sharpness(frame.astype(np.float32)))
         if on_progress is not None and values_so_far % 30 == 0:
-            on_progress(0.0, f"{values_so_far} frames of the video looked at")
+            on_progress(0.0, f"{values_so_far} frames of the video read")
     if len(values) < 3:
         raise DatasetError(f"{video}: holds {len(values)} frames that can be read; give a longer video")
     chosen = sharpest_frames(np.array(values), count)

@@ -4,7 +4,7 @@ The result is a folder in COLMAP's layout, which `load_dataset` reads: `images`,
 place, turned upright; `sparse/0`, the model; `poses.json`, what it was made of, and why photos were left out.
 
 Everything on the way is in a work folder beside it (`NAME.work`: photos, and the database of features and
-matches), from which an interrupted run goes on; it is removed at the end.
+matches), from which an interrupted run continues; it is removed at the end.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def make_poses(
 ) -> PosesReport:
     """Writes the data set `target` of a folder of photos or a video; replaces what is there.
 
-    An interrupted run of the same photos goes on from its work folder. `frames` are taken of a video.
+    An interrupted run of the same photos continues from its work folder. `frames` are taken of a video.
 
     Raises DatasetError where pycolmap is missing, and where fewer than three photos find their place.
     """
@@ -95,7 +95,7 @@ def make_poses(
     database = work / "database.db"
     if not database.is_file():
         draft = work / "database.new"
-        cameras, shared = _cameras(photos)
+        cameras, shared = camera_guesses(photos)
         features.create_database(draft, cameras, [Photo(n, c) for n, c in zip(names, shared, strict=True)])
         draft.rename(database)
     masks = work / "masks"
@@ -114,12 +114,12 @@ def make_poses(
         database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7)
     )
     shared_matches = _matches(database, len(photos))
-    models = _unfolded(work, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    models = unfolded_models(work, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
     if not models:
         raise DatasetError(f"{source}: {_why_none(photos, shared_matches)}")
     model = models[0]
     placed = {image_id - 1 for image_id in model.reg_image_ids()}
-    left_out = unreadable | _reasons(photos, placed, models[1:], shared_matches)
+    left_out = unreadable | reasons_left_out(photos, placed, models[1:], shared_matches)
     if len(placed) < 3:
         raise DatasetError(f"{source}: {_why_none(photos, shared_matches)}")
     report = PosesReport(
@@ -247,7 +247,7 @@ def _linked(photos: Sequence[RawPhoto], work: Path) -> list[str]:
     return names
 
 
-def _cameras(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
+def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     """COLMAP's first guesses of the cameras, and each photo's: one for all of one size and focal length."""
     pycolmap = features.engine()
     groups, numbers = features.consecutive((p.width, p.height, p.focal) for p in photos)
@@ -261,7 +261,7 @@ def _cameras(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     return cameras, numbers
 
 
-def _unfolded(work: Path, matches: _Matches, seed: int, on_progress: OnProgress) -> list[Any]:
+def unfolded_models(work: Path, matches: _Matches, seed: int, on_progress: OnProgress) -> list[Any]:
     """The reconstructions, the one with the most photos first, without pairs that only look alike.
 
     Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
@@ -271,7 +271,7 @@ def _unfolded(work: Path, matches: _Matches, seed: int, on_progress: OnProgress)
     if not repeated_views.are_in_order(matches.counts):
         return _map(work, database, count, seed, on_progress)
     far = repeated_views.far_pairs(matches.counts)
-    chain = _map(work, _without(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
+    chain = _map(work, without_pairs(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
     false: set[tuple[int, int]] = set()
     if chain:
         relative = repeated_views.relative_rotations(database, chain[0], far)
@@ -279,7 +279,7 @@ def _unfolded(work: Path, matches: _Matches, seed: int, on_progress: OnProgress)
     plain = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
     if not false:
         return plain
-    pruned = _map(work, _without(database, false), count, seed, features.share(on_progress, 0.66, 1.0))
+    pruned = _map(work, without_pairs(database, false), count, seed, features.share(on_progress, 0.66, 1.0))
     return pruned if _size(pruned) >= _size(plain) else plain
 
 
@@ -288,7 +288,7 @@ def _size(models: Sequence[Any]) -> tuple[int, int]:
     return (models[0].num_reg_images(), models[0].num_points3D()) if models else (0, 0)
 
 
-def _without(database: Path, pairs: set[tuple[int, int]]) -> Path:
+def without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
     """A copy of the database without the verified matches of these pairs."""
     copy = database.with_name("fewer_pairs.db")
     shutil.copyfile(database, copy)
@@ -351,7 +351,7 @@ def _matches(database: Path, count: int) -> _Matches:
     return _Matches(counts, flat)
 
 
-def _reasons(
+def reasons_left_out(
     photos: Sequence[RawPhoto], placed: set[int], others: Sequence[Any], matches: _Matches
 ) -> dict[str, str]:
     """What was wrong with each photo that is not in `placed`."""

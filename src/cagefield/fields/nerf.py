@@ -82,7 +82,7 @@ class NerfField:
         if self.ndc is not None and not min(self.ndc) > 0:
             raise FieldError(f"ndc must be two ratios width/2f, height/2f above 0, got {self.ndc}")
         if self.ndc is not None and self.bounded:
-            raise FieldError("a field in NDC goes on to infinity; leave out bounded")
+            raise FieldError("a field in NDC reaches to infinity; leave out bounded")
 
     @cached_property
     def torch(self) -> TorchNerf:

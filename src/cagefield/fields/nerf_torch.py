@@ -46,7 +46,7 @@ class TorchMlp:
     def __init__(self, mlp: Mlp, device: torch.device, trainable: bool = False) -> None:
         self.mlp = mlp
         self.parameters: list[Tensor] = []
-        self._layers = {name: self._tensors(layer, device, trainable) for name, layer in mlp.layers()}
+        self.layers = {name: self._tensors(layer, device, trainable) for name, layer in mlp.layers()}
         self._skips = mlp.skips
 
     def _tensors(self, layer: Linear, device: torch.device, trainable: bool) -> tuple[Tensor, Tensor]:
@@ -62,8 +62,8 @@ class TorchMlp:
         hidden = encoded
         for index, skip in enumerate(self._skips):
             joined = torch.cat([encoded, hidden], dim=1) if skip else hidden
-            hidden = torch.relu(linear(joined, *self._layers[f"trunk.{index}"]))
-        return linear(hidden, *self._layers["density"])[:, 0], hidden
+            hidden = torch.relu(linear(joined, *self.layers[f"trunk.{index}"]))
+        return linear(hidden, *self.layers["density"])[:, 0], hidden
 
     def color(self, hidden: Tensor, viewdirs: Tensor) -> Tensor:
         """rgb [N,3] in [0,1] of hidden [N,W] seen along unit viewdirs [N,3]."""
@@ -71,8 +71,8 @@ class TorchMlp:
             feature = self._feature(hidden)
             hidden = torch.cat([feature, encode(viewdirs, *self.mlp.view_encoding)], dim=1)
             for index in range(len(self.mlp.view)):
-                hidden = torch.relu(linear(hidden, *self._layers[f"view.{index}"]))
-        return torch.sigmoid(linear(hidden, *self._layers["rgb"]))
+                hidden = torch.relu(linear(hidden, *self.layers[f"view.{index}"]))
+        return torch.sigmoid(linear(hidden, *self.layers["rgb"]))
 
     def colors(self, hidden: Tensor, viewdirs: Tensor) -> Tensor:
         """rgb [N,K,3] of hidden [N,W] seen along K directions each, viewdirs [N,K,3]."""
@@ -81,24 +81,24 @@ class TorchMlp:
         encoding = self.mlp.view_encoding
         if self.mlp.feature is None or encoding is None:
             return self.color(hidden, flat)[:, None].expand(n, k, 3)
-        weight, bias = self._layers["view.0"]
+        weight, bias = self.layers["view.0"]
         width = self.mlp.feature.outputs
         shared = linear(self._feature(hidden), weight[:, :width], bias)
         own = linear(encode(flat, *encoding), weight[:, width:])
         out = torch.relu(shared[:, None] + own.reshape(n, k, -1)).reshape(n * k, -1)
         for index in range(1, len(self.mlp.view)):
-            out = torch.relu(linear(out, *self._layers[f"view.{index}"]))
-        return torch.sigmoid(linear(out, *self._layers["rgb"])).reshape(n, k, 3)
+            out = torch.relu(linear(out, *self.layers[f"view.{index}"]))
+        return torch.sigmoid(linear(out, *self.layers["rgb"])).reshape(n, k, 3)
 
     def _feature(self, hidden: Tensor) -> Tensor:
-        feature = linear(hidden, *self._layers["feature"])
+        feature = linear(hidden, *self.layers["feature"])
         return torch.relu(feature) if self.mlp.rectified_feature else feature
 
     def arrays(self) -> dict[str, tuple[Any, Any]]:
         """Layer name -> (weight, bias) as numpy arrays."""
         return {
             name: (weight.detach().float().cpu().numpy(), bias.detach().float().cpu().numpy())
-            for name, (weight, bias) in self._layers.items()
+            for name, (weight, bias) in self.layers.items()
         }
 
 

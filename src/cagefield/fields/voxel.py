@@ -119,7 +119,7 @@ class VoxelField:
 
     @property
     def unbounded(self) -> bool:
-        """True where the field goes on beyond `bounds`, which then is the box of interest."""
+        """True where the field extends beyond `bounds`, which then is the box of interest."""
         return self.contracted
 
     @property

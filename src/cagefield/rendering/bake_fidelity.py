@@ -11,8 +11,8 @@ from cagefield.cameras import Camera
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import Background, background_rgb
 from cagefield.rendering.metrics import psnr
+from cagefield.rendering.render_result import Background, background_rgb
 
 if TYPE_CHECKING:
     from cagefield.rendering.renderer import Renderer

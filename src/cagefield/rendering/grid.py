@@ -20,10 +20,8 @@ from cagefield.devices import floats, ints
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.kernels.grid import GridArgs
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
-from cagefield.rendering.occupancy import Occupancy
+from cagefield.rendering.occupancy import BRICK, Occupancy
 from cagefield.typing import Array
-
-BRICK = 4
 
 
 def to_device(values: NDArray[np.generic]) -> qd.ndarray:

@@ -14,7 +14,7 @@ from PIL import Image, UnidentifiedImageError
 
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
-from cagefield.rendering.frame import to_uint8
+from cagefield.rendering.render_result import to_uint8
 from cagefield.typing import UInt8
 
 

@@ -104,7 +104,7 @@ class MovedSplats:
 
 
 @dataclass(frozen=True)
-class _Known:
+class _KnownStack:
     """What a stack's active edits made of a field."""
 
     edits: tuple[Edit, ...]
@@ -112,7 +112,7 @@ class _Known:
     moved: MovedSplats
 
 
-_known: WeakKeyDictionary[SplatField, list[_Known]] = WeakKeyDictionary()
+known_stacks: WeakKeyDictionary[SplatField, list[_KnownStack]] = WeakKeyDictionary()
 
 
 def moved_splats(
@@ -127,14 +127,14 @@ def moved_splats(
     What the first of the edits made is kept between calls. `coarse` and `proceed` as for `to_deformed`.
     """
     active = edits.active
-    known = _known.setdefault(field, [])
+    known = known_stacks.setdefault(field, [])
     usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
     start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)
     moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(len(field)), 0)
     found = [start] if start else []
     for number, edit in enumerate(active[count:], start=count + 1):
         moved = moved.then(edit, field.means, coarse, proceed)
-        found.append(_Known(active[:number], coarse, moved))
+        found.append(_KnownStack(active[:number], coarse, moved))
     kept = [*reversed(found), *(k for k in known if k is not start)][:KEPT_STACKS]
     sizes = np.cumsum([len(k.moved.source) for k in kept])
     known[:] = [k for n, k in enumerate(kept) if n == 0 or sizes[n] <= KEPT_SPLATS]

@@ -26,7 +26,7 @@ from cagefield.cameras import Camera
 from cagefield.fields.mlp import NerfParameters
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.rendering.tensor_maps import TensorMap
 
 ENDLESS = 1e10
@@ -92,7 +92,7 @@ def render_nerf(
     chunk: int = 2048,
     preserve_opacity: bool = True,
     normals: bool = False,
-) -> Frame:
+) -> RenderResult:
     """Frame of a NerfField seen by a camera through an edit stack, `chunk` rays at a time.
 
     `preserve_opacity` multiplies sigma by |J d|, which keeps optical depth under the edits' stretch.
@@ -103,7 +103,7 @@ def render_nerf(
     premultiplied, opacity, depth, normal = (
         values.cpu().numpy().reshape(*shape, *values.shape[1:]) for values in parts
     )
-    return Frame.from_premultiplied(
+    return RenderResult.from_premultiplied(
         premultiplied, opacity, depth, normals=normal if normals else None, background=background
     )
 
@@ -157,7 +157,7 @@ def march(
 ) -> tuple[Sums, Sums]:
     """(coarse sums, fine sums) of rays; the same sums twice where the field takes no fine samples."""
     coarse_count, fine_count = field.field.samples
-    s = _stratified(field.field, rays, coarse_count, jitter)
+    s = stratified_samples(field.field, rays, coarse_count, jitter)
     coarse = _integrate(field, field.coarse, rays, s, mapped, jitter)
     if fine_count == 0:
         return coarse, coarse
@@ -188,7 +188,7 @@ def sample_pdf(bins: Tensor, weights: Tensor, count: int, random: bool = False) 
     return start + (u - low) / width * (end - start)
 
 
-def _stratified(field: NerfParameters, rays: Rays, count: int, jitter: Jitter | None) -> Tensor:
+def stratified_samples(field: NerfParameters, rays: Rays, count: int, jitter: Jitter | None) -> Tensor:
     """Parameters s [N,count] of the coarse samples."""
     even = torch.linspace(0.0, 1.0, count, device=rays.origins.device)
     if field.ndc is not None:

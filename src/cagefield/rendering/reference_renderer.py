@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
 from cagefield.rendering.compositing import composite
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import Float32
 
 NORMAL_WEIGHT = 1e-4
@@ -83,7 +83,7 @@ def render_sampled(
     normals: bool = False,
     preserve_opacity: bool = True,
     chunk: int = 1 << 19,
-) -> Frame:
+) -> RenderResult:
     """Frame of a field seen by a camera, from `samples` midpoints on each ray's piece inside the bounds.
 
     The piece is the ray's intersection with field.bounds (united with edits.bounds), cut to [near, far].
@@ -139,7 +139,7 @@ def render_sampled(
             normal[rows] = total / np.where(length > 0, length, 1.0)
 
     shape = (camera.height, camera.width)
-    return Frame.from_premultiplied(
+    return RenderResult.from_premultiplied(
         rgb.reshape(*shape, 3),
         opacity.reshape(shape),
         depth.reshape(shape),

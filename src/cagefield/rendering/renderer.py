@@ -14,7 +14,7 @@ from cagefield.devices import floats, ints
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 
 if TYPE_CHECKING:
     from cagefield.rendering.grid import DeviceGrid
@@ -37,7 +37,7 @@ class Renderer:
     cases, 1.23 dB on average and up to 3.66 dB where things were pressed together.
     """
 
-    _occupancy: Occupancy
+    occupancy: Occupancy
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Renderer:
         self.edits = edits if edits is not None else EditStack([])
         self.step = float(step)
         self.preserve_opacity = preserve_opacity
-        self._grid = grid if grid is not None else DeviceGrid.from_field(field)
+        self.grid = grid if grid is not None else DeviceGrid.from_field(field)
         self._canonical = occupancy.of_field(field)
         self._canonical_bricks = occupancy_args(self._canonical, to_device(self._canonical.codes))
         self._pixels: dict[tuple[int, int], Any] = {}
@@ -103,17 +103,17 @@ class Renderer:
         jumps = _jumps(self.edits)
         known = None
         if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
-            known = Known(before._occupancy, widened(self.edits.changed_boxes(before.edits)))
+            known = Known(before.occupancy, widened(self.edits.changed_boxes(before.edits)))
         link = None
         if before is not None and coarse and not jumps:
             place = replaced(before.edits, self.edits)
             if place is not None:
                 if self._chain is None or not self._chain.fits(self.edits, place):
-                    self._chain = Chain.of(self.edits, place, self._canonical, self._grid)
+                    self._chain = Chain.of(self.edits, place, self._canonical, self.grid)
                 link = self._chain.link(self.edits.active[place])
         self._coarse = coarse
-        self._occupancy = deform(self._canonical, self._grid, stack, jumps, known, coarse, proceed, link)
-        self._bricks = occupancy_args(self._occupancy, for_kernels(self._occupancy.codes))
+        self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)
+        self._bricks = occupancy_args(self.occupancy, for_kernels(self.occupancy.codes))
         self._stack = stack
         self._boxes = for_kernels(stack.boxes.astype(np.float32))
 
@@ -127,7 +127,7 @@ class Renderer:
         region: tuple[int, int, int, int] | None = None,
         should_stop: Callable[[], bool] | None = None,
         step: float | None = None,
-    ) -> Frame | None:
+    ) -> RenderResult | None:
         """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
 
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
@@ -141,7 +141,7 @@ class Renderer:
         directions = self._device_directions(camera)
         out = self._buffer(width, height)
         down = -(-height // march.TILE)
-        grid = self._grid.args
+        grid = self.grid.args
         length = step or self.step
         if not field.contracted:
             length /= float(np.max(grid.scale))
@@ -213,7 +213,7 @@ def _checked_region(region: tuple[int, int, int, int] | None, camera: Camera) ->
     return region
 
 
-def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> Frame:
+def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> RenderResult:
     opacity = marched[..., 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(opacity > 1e-6, marched[..., 4] / opacity, np.inf)
@@ -222,6 +222,6 @@ def _frame(marched: NDArray[np.float32], background: Background, with_normals: b
         normals = marched[..., 5:8]
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), 0.0)
-    return Frame.from_premultiplied(
+    return RenderResult.from_premultiplied(
         marched[..., :3], opacity, depth.astype(np.float32), normals=normals, background=background
     )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cagefield import lenses, sh
 from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import AnyArray
 
 BLUR, SLOPE_BLUR, ALPHA_MIN, ALPHA_MAX = 0.3, 0.02, 1.0 / 255.0, 0.99
@@ -72,17 +72,17 @@ def project(
     return ProjectedSplats(rows, means, conics, opacities, np.maximum(colours, 0.0), distance, slopes)
 
 
-def blend(seen: ProjectedSplats, width: int, height: int) -> tuple[AnyArray, AnyArray, AnyArray]:
+def blend(projected: ProjectedSplats, width: int, height: int) -> tuple[AnyArray, AnyArray, AnyArray]:
     """(colour [H,W,3] without background, T [H,W], depth times weight [H,W])."""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     colour, through, depth = np.zeros((height, width, 3)), np.ones((height, width)), np.zeros((height, width))
-    for n in range(len(seen.rows)):
-        d = np.stack([x - seen.means[n, 0], y - seen.means[n, 1]], axis=-1)
-        alpha = seen.opacities[n] * np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, seen.conics[n], d))
+    for n in range(len(projected.rows)):
+        d = np.stack([x - projected.means[n, 0], y - projected.means[n, 1]], axis=-1)
+        alpha = projected.opacities[n] * np.exp(-0.5 * np.einsum("hwi,ij,hwj->hw", d, projected.conics[n], d))
         alpha = np.where(alpha < ALPHA_MIN, 0.0, np.minimum(alpha, ALPHA_MAX))
         weight = alpha * through
-        colour += weight[..., None] * seen.colours[n]
-        depth += weight * (seen.distances[n] + d @ seen.slopes[n])
+        colour += weight[..., None] * projected.colours[n]
+        depth += weight * (projected.distances[n] + d @ projected.slopes[n])
         through *= 1.0 - alpha
     return colour, through, depth
 
@@ -94,13 +94,13 @@ def render(
     near: float,
     background: Background = "white",
     limits: AnyArray | None = None,
-) -> Frame:
+) -> RenderResult:
     """The frame that the camera sees."""
     colour, through, depth = blend(project(splats, camera, near, limits), camera.width, camera.height)
     opacity = 1.0 - through
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.where(opacity > 1e-6, depth / opacity, np.inf)
-    return Frame.from_premultiplied(colour, opacity, distance, background=background)
+    return RenderResult.from_premultiplied(colour, opacity, distance, background=background)
 
 
 def _jacobians(p: AnyArray, camera: Camera, limits: AnyArray | None) -> AnyArray:

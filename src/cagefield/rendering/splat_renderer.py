@@ -14,7 +14,7 @@ from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import DeformedSplats, deformed_splats
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.rendering.splat_rasterizer import (
     DEPTH,
     NORMALS,
@@ -93,7 +93,7 @@ class SplatRenderer:
         region: Region | None = None,
         should_stop: Callable[[], bool] | None = None,
         step: float | None = None,
-    ) -> Frame | None:
+    ) -> RenderResult | None:
         """The frame seen by `camera`, or None where `should_stop` said so before or after it was projected.
 
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; nothing
@@ -156,7 +156,7 @@ def flattest_axes(covariances: Float32) -> Float32:
     return np.ascontiguousarray(np.linalg.eigh(full)[1][:, :, 0], np.float32)
 
 
-def _frame(picture: Float32, background: Background, with_normals: bool) -> Frame:
+def _frame(picture: Float32, background: Background, with_normals: bool) -> RenderResult:
     opacity = 1.0 - picture[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(opacity > 1e-6, picture[..., 4] / opacity, np.inf)
@@ -165,6 +165,6 @@ def _frame(picture: Float32, background: Background, with_normals: bool) -> Fram
         normals = picture[..., 5:8]
         length = np.linalg.norm(normals, axis=-1, keepdims=True)
         normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), 0.0)
-    return Frame.from_premultiplied(
+    return RenderResult.from_premultiplied(
         picture[..., 1:4], opacity, depth.astype(np.float32), normals=normals, background=background
     )

@@ -2,7 +2,7 @@
 
 Photos say nothing of it, so a trained field holds anything there, and an edit that moves a part away shows
 it. It is filled a few voxels deep, opaque, with colours that go on from the surfaces around, each mostly in
-its own plane: under a part, the ground goes on, not the part's sides.
+its own plane: under a part, the ground continues, not the part's sides.
 
 For each axis a, the surfaces' weight n_a^2 (n their normals) and weight times colour are spread by a screened
 diffusion, (1 - L^2 div K_a grad) u = 0, whose conductivity K_a is 1 in the plane across a and less along a.
@@ -37,11 +37,11 @@ TOLERANCE = 1e-4
 """Relative residual to which the diffusion is solved."""
 
 MOST_STEPS = 200
-"""Steps of an iterative solution, at most; see `_solved`."""
+"""Steps of an iterative solution, at most; see `solve_diffusion`."""
 
 
 def filled(field: VoxelField, unseen: NDArray[np.bool_]) -> VoxelField:
-    """The field with its vertices `visibility` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
+    """The field with its vertices `unseen` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
 
     Other unseen vertices stay as they are. Every colour that is filled is the same in all directions.
     """
@@ -89,8 +89,8 @@ def _spread(
     known = np.full(target.shape, -1, np.int64)
     known[surface] = np.arange(surface.sum())
     count = int(target.sum())
-    links = [_links(number, number, axis) for axis in range(3)]
-    inlets = [_links(number, known, axis) for axis in range(3)]
+    links = [links_of(number, number, axis) for axis in range(3)]
+    inlets = [links_of(number, known, axis) for axis in range(3)]
     total = np.zeros((count, 4))
     for axis in range(3):
         weight = normals[:, axis : axis + 1]
@@ -108,11 +108,13 @@ def _spread(
             for channel in range(4):
                 source[:, channel] += share * np.bincount(a, given[b, channel], minlength=count)
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
-        total += _solved(sparse.csr_matrix((values, (rows, columns)), (count, count)), diagonal, source)
+        total += solve_diffusion(
+            sparse.csr_matrix((values, (rows, columns)), (count, count)), diagonal, source
+        )
     return np.asarray(total[:, 1:] / np.maximum(total[:, :1], 1e-12))
 
 
-def _solved(
+def solve_diffusion(
     pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """u [T,C] with (diag(diagonal) - pull) u = source [T,C]; pull [T,T] >= 0 with row sums <= diagonal - 1.
@@ -132,22 +134,22 @@ def _solved(
     for column in source.T:
         u, unfinished = cg(matrix, column, rtol=TOLERANCE, maxiter=MOST_STEPS, M=guide)
         if unfinished:
-            return _swept(pull, diagonal, source)
+            return jacobi_sweeps(pull, diagonal, source)
         solved.append(u)
     return np.stack(solved, axis=1)
 
 
-def _swept(
+def jacobi_sweeps(
     pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """u [T,C] of `_solved` after MOST_STEPS sweeps of Jacobi's from u = 0."""
+    """u [T,C] of `solve_diffusion` after MOST_STEPS sweeps of Jacobi's from u = 0."""
     u = np.zeros_like(source)
     for _ in range(MOST_STEPS):
         u = (source + pull @ u) / diagonal[:, None]
     return u
 
 
-def _links(
+def links_of(
     number: NDArray[np.int64], other: NDArray[np.int64], axis: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs (a, b) of neighbours along an axis: a numbered by `number`, b by `other`, both not -1."""

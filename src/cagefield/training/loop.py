@@ -48,7 +48,7 @@ def run_to_end(
 ) -> bool:
     """True when the run was finished, False when Ctrl-C ended it early.
 
-    Its state is written to `checkpoint` every minute and at its end, early or not; `resume` goes on from
+    Its state is written to `checkpoint` every minute and at its end, early or not; `resume` continues from
     there: a run that was finished is so at once.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 

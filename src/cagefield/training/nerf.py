@@ -55,7 +55,7 @@ def train_nerf(
     """The NerfField trained on a data set's photos.
 
     With `checkpoint` the state is written there every minute and at the end of the run, which may be early
-    (Ctrl-C; `finished` is then False); `resume` goes on from it, and takes no step where it was finished.
+    (Ctrl-C; `finished` is then False); `resume` continues it, and takes no step where it was finished.
 
     Raises:
         CagefieldError: NDC that do not suit the capture, or a checkpoint that has no folder, cannot be read

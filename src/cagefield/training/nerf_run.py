@@ -100,7 +100,7 @@ class NerfRun:
         passed = self.done if config.decay is None else self.step / config.decay
         for group in self.optimizer.param_groups:
             group["lr"] = config.rate * GAIN**passed
-        rays, target = self._batch()
+        rays, target = self.next_batch()
         with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.half):
             coarse, fine = march(self.torch, rays, jitter=self.jitter)
         behind = 1.0 if self.white else 0.0
@@ -117,7 +117,7 @@ class NerfRun:
             self.loss = now if self.loss != self.loss else 0.8 * self.loss + 0.2 * now
         self.seconds += time.perf_counter() - began
 
-    def _batch(self) -> tuple[Rays, Tensor]:
+    def next_batch(self) -> tuple[Rays, Tensor]:
         """Random rays of one photo or a few, and the photos' colours [N,3] there."""
         chance = np.random.default_rng((self.config.seed, self.step))
         count, unbounded = self.config.batch_rays, self.dataset.unbounded
@@ -164,11 +164,11 @@ class NerfRun:
             "parameters": [values.detach().cpu() for values in self.torch.parameters],
             "optimizer": self.optimizer.state_dict(),
         }
-        with replaced_file(path) as draft:
-            torch.save(state, draft)
+        with replaced_file(path) as draft, draft.open("wb") as out:
+            torch.save(state, out)
 
     def restore(self, path: Path) -> None:
-        """Goes on from the state in `path`."""
+        """Continues from the state in `path`."""
         try:
             state = torch.load(path, map_location=self.device, weights_only=True)
             if state["config"] != repr(self._options()):
@@ -190,7 +190,7 @@ class NerfRun:
         torch.manual_seed(self.config.seed + self.step)
 
     def _options(self) -> dict[str, Any]:
-        """What a resumed run must have in common with the one it goes on from."""
+        """What a resumed run must have in common with the one it continues."""
         options = dataclasses.asdict(self.config)
         for name in ("steps", "minutes", "decay", "shown_samples"):
             del options[name]

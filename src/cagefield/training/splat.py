@@ -62,7 +62,7 @@ def train_splat(
     A capture without points gets them from its poses first (`points_of`), and keeps them in the user's cache;
     then the photos' surfaces are found. `on_stage` is told what is being found, how far that is, and a note.
     With `checkpoint`, the state of the run is written there every minute and at its end, which may be early
-    (Ctrl-C; `finished` is then False); `resume` goes on from it. On a CPU a resumed run of given `steps` ends
+    (Ctrl-C; `finished` is then False); `resume` continues it. On a CPU a resumed run of given `steps` ends
     in the same field as an uninterrupted one.
 
     Raises:

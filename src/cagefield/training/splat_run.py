@@ -75,7 +75,7 @@ class SplatRun:
         self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
         self._most = self._most_splats()
-        self.state, self._empty = first_splats(dataset, self.views, config, self._most)
+        self.state, self.empty = first_splats(dataset, self.views, config, self._most)
         self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
@@ -113,12 +113,12 @@ class SplatRun:
         if not self._queue:
             self.poses.centre()
             self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
-        self._photo(self._queue.pop(), done)
+        self.step_photo(self._queue.pop(), done)
         self.step += 1
         self.seconds += 0.0 if self._cold else time.perf_counter() - began
         self._cold = False
 
-    def _photo(self, index: int, done: float) -> None:
+    def step_photo(self, index: int, done: float) -> None:
         config, state = self._config, self.state
         level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
         camera, target = self.views[index].level(level)
@@ -132,47 +132,48 @@ class SplatRun:
         if config.dropout > 0.0:
             opacities *= self._rng.random(count, np.float32) >= config.dropout * done
         splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
-        seen = project(splats, camera, near=self._near, buffers=self._buffers)
-        out, stops = seen.blend(COLOUR)
-        colour = self._buffers.take("colour", (seen.tiles, 3, AREA), np.float32)
-        slopes = self._buffers.take("slopes", (seen.tiles, 3, AREA), np.float32)
-        tile_sums = np.empty((seen.tiles, 7), np.float32)
+        projected = project(splats, camera, near=self._near, buffers=self._buffers)
+        out, stops = projected.blend(COLOUR)
+        colour = self._buffers.take("colour", (projected.tiles, 3, AREA), np.float32)
+        slopes = self._buffers.take("slopes", (projected.tiles, 3, AREA), np.float32)
+        tile_sums = np.empty((projected.tiles, 7), np.float32)
         background = self._behind()
         gain = self.gains[index]
         lens = intrinsics(camera)
         rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
         with kernels():
-            residuals(out, target, seen.width, seen.height, gain, background, colour, slopes, tile_sums)
+            size = projected.width, projected.height
+            residuals(out, target, *size, gain, background, colour, slopes, tile_sums)
             structured = config.structure > 0.0 and done >= STRUCTURE_FROM
-            if structured and min(seen.width, seen.height) >= WINDOW:
-                self._structure(seen, colour, target, gain, background, slopes)
-            sums = self._buffers.take("sums", (max(seen.pairs, 1), SUMS), np.float32)
-            seen.gradients(colour, slopes, stops, sums, self._empty[index], config.veil)
+            if structured and min(size) >= WINDOW:
+                self._structure(projected, colour, target, gain, background, slopes)
+            sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
+            projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil)
             chain(
-                seen.order, seen.firsts, seen.slots, sums, seen.packed, state.means, state.log_scales,
-                state.quaternions, opacities, state.sh, world_to_camera(camera), camera.origin, lens.focal,
-                lens.limits, lens.model, lens.coefficients, config.antialiased, False,
-                state.gradients, state.curvatures,
+                projected.order, projected.firsts, projected.slots, sums, projected.packed, state.means,
+                state.log_scales, state.quaternions, opacities, state.sh, world_to_camera(camera),
+                camera.origin, lens.focal, lens.limits, lens.model, lens.coefficients, config.antialiased,
+                False, state.gradients, state.curvatures,
             )  # fmt: skip
             if config.refine_poses and done >= FROM:
-                self.poses.step(index, camera.origin, state, seen.order, min(rate, 1.0))
+                self.poses.step(index, camera.origin, state, projected.order, min(rate, 1.0))
             gauss_newton(
-                seen.order, state.gradients, state.curvatures, state.means, state.log_scales,
+                projected.order, state.gradients, state.curvatures, state.means, state.log_scales,
                 state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
                 state.ticks, np.array(config.memory), np.array([rate, rate, rate, rate, 0.5 * rate]),
                 np.array(config.damping), np.array([config.cap, config.cap]), (degree + 1) ** 2,
                 np.array([1e-5, 1e3]) * self._scale, -config.opaque,
             )  # fmt: skip
-        state.error[seen.order] += state.gradients[seen.order, 15]
-        state.hits[seen.order] += 1
+        state.error[projected.order] += state.gradients[projected.order, 15]
+        state.hits[projected.order] += 1
         self._expose(index, tile_sums)
-        loss = float(tile_sums[:, 0].sum()) / (3 * seen.width * seen.height)
+        loss = float(tile_sums[:, 0].sum()) / (3 * size[0] * size[1])
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
 
     def _structure(
         self,
-        seen: Projection,
+        projected: Projection,
         colour: NDArray[np.float32],
         target: NDArray[np.uint8],
         gain: NDArray[np.float32],
@@ -180,9 +181,9 @@ class SplatRun:
         slopes: NDArray[np.float32],
     ) -> None:
         """Adds what structural similarity says of the picture's pixels to the slopes of their error."""
-        size = (seen.height, seen.width)
+        size = (projected.height, projected.width)
         structure(
-            colour, target, seen.width, seen.height, gain, background, self._config.structure,
+            colour, target, projected.width, projected.height, gain, background, self._config.structure,
             self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
             self._buffers.take("slopes_of", (3, 3, *size), np.float32),
             self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,

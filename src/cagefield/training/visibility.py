@@ -31,7 +31,7 @@ MOST_RAYS = 4_000_000
 """Rays that are followed, about: of larger photos every second or third pixel each way."""
 
 
-def unseen(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
+def unseen_vertices(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
     """Vertices [nx,ny,nz] of a bounded field around which no ray of the cameras shows anything.
 
     Every cell that a ray crosses with at least LEAST_TRANSMITTANCE left is seen, and so are its 8 vertices:

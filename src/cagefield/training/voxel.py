@@ -56,7 +56,7 @@ def train_voxel(
     """The field trained on the data set's photos, with PSNR and SSIM on its test views.
 
     With `checkpoint`, the state of the run is written there every minute and at its end, which may be early
-    (Ctrl-C; `finished` is then False); `resume` goes on from it, and takes no step where it was finished. On
+    (Ctrl-C; `finished` is then False); `resume` continues it, and takes no step where it was finished. On
     a CPU a resumed run of given `steps` ends in the same field as an uninterrupted one. `snapshots` are
     handed out on the way.
 
@@ -66,7 +66,7 @@ def train_voxel(
     """
     devices.start()
     # Modules with kernels: without a device, importing them prints a line.
-    from cagefield.training.visibility import unseen
+    from cagefield.training.visibility import unseen_vertices
     from cagefield.training.voxel_run import VoxelRun
 
     run = VoxelRun(dataset, config or VoxelConfig())
@@ -80,7 +80,7 @@ def train_voxel(
     )
     field = run.field()
     if not field.contracted:
-        field = filled(field, unseen(field, [view.camera for view in dataset.train]))
+        field = filled(field, unseen_vertices(field, [view.camera for view in dataset.train]))
     train_psnr = test_psnr = test_ssim = float("nan")
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]

@@ -95,14 +95,14 @@ class VoxelRun:
             self._grid = self._pruned()
             self._patches.choose(self._space, self._grid)
         prepared = time.perf_counter()
-        self._batch(done)
+        self.next_batch(done)
         self.step += 1
         # A process's first batch of each SH degree compiles the kernels, which is no training.
         compiles = self._grid.degree not in self._compiled
         self._compiled.add(self._grid.degree)
         self.seconds += (prepared if compiles else time.perf_counter()) - began
 
-    def _batch(self, done: float) -> None:
+    def next_batch(self, done: float) -> None:
         config = self._config
         patches = self._patches.take((1 + self._schedule.last) * config.batch_rays // config.patch**2)
         loss = self._batches.train(self._grid, patches, self.exposure, self.step, done)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cagefield.datasets.views import Dataset, View
 from cagefield.fields.contraction import uncontract
-from cagefield.fields.seen import seen_by
+from cagefield.fields.frusta import in_frusta
 from cagefield.training.grid_state import GridState
 
 FIRST_DEPTH = 0.5
@@ -97,4 +97,4 @@ def _seen_vertices(
     axis = np.linspace(-2.0, 2.0, resolution)
     c = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     points = uncontract(c) * ((bounds[1] - bounds[0]) / 2) + bounds.mean(axis=0)
-    return seen_by([view.camera for view in views], points, near, least=min(2, len(views)))
+    return in_frusta([view.camera for view in views], points, near, least=min(2, len(views)))

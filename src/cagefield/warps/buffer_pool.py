@@ -12,7 +12,7 @@ import numpy as np
 from cagefield.typing import Float32
 
 
-class Joined:
+class BufferPool:
     """Joins arrays [N,3], and keeps what it made to write into again once nobody holds it any more.
 
     A drag asks again and again for the same arrays but one: only that one is copied, and no memory is
@@ -21,19 +21,19 @@ class Joined:
 
     def __init__(self, most: int = 3) -> None:
         self._most = most
-        self._made: list[_Made] = []
+        self.made: list[_Made] = []
         self._lock = Lock()
 
     def join(self, parts: Sequence[Float32]) -> Float32:
         """The parts [N,3] one after the other, read-only. Views of it do not outlive it."""
         with self._lock:
             lengths = [len(part) for part in parts]
-            made = next((m for m in self._made if m.lengths == lengths and m.is_free), None)
+            made = next((m for m in self.made if m.lengths == lengths and m.is_free), None)
             if made is None:
                 made = _Made(lengths)
             else:
-                self._made.remove(made)
-            self._made = [made, *self._made[: self._most - 1]]
+                self.made.remove(made)
+            self.made = [made, *self.made[: self._most - 1]]
             return made.filled(parts)
 
 

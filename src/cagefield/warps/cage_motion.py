@@ -74,16 +74,16 @@ class Motion:
         if at_rest.min() >= 0.0:
             return 0.0
         high = -float(np.log(LEAST_SIZE))
-        if (self._gap(TIMES, high) < least).any():
+        if (self.gap(TIMES, high) < least).any():
             return np.inf
         # The least gap grows with k: regula falsi, over the times at which there is too little of it.
         times = TIMES[at_rest < 0.0]
-        low, below, above = 0.0, float(at_rest.min()), float(self._gap(times, high).min()) - least
+        low, below, above = 0.0, float(at_rest.min()), float(self.gap(times, high).min()) - least
         for _ in range(40):
             if high - low <= 1e-3 or above <= 1e-3 * least:
                 break
             middle = low + np.clip(below / (below - above), 0.01, 0.99) * (high - low)
-            value = float(self._gap(times, middle).min()) - least
+            value = float(self.gap(times, middle).min()) - least
             if value >= 0.0:
                 high, above, below = middle, value, 0.5 * below
             else:
@@ -159,7 +159,7 @@ class Motion:
         _, F, dc, dF = self.way
         v = dc[:, None] + self._straightened(TIMES) @ np.transpose(dF, (0, 2, 1))
         if not self.is_affine:
-            v += bend(self.end.bend - self.start.bend, self._looked_at) @ np.transpose(F, (0, 2, 1))
+            v += bend(self.end.bend - self.start.bend, self._cage_grid) @ np.transpose(F, (0, 2, 1))
         z = self._at_rest
         if self.shrink != 0.0:
             z = self._inside(TIMES, self.way, z)
@@ -170,13 +170,13 @@ class Motion:
         return z, along
 
     @property
-    def _looked_at(self) -> Array:
+    def _cage_grid(self) -> Array:
         """The points xi [S,3] of `surface`."""
         return SIGNS if self.confines.is_affine else _SURFACE[:26]
 
     def _straightened(self, t: Array) -> Array:
         """xi + B_t(xi) [T,S,3] of the points of `surface` at times t [T]."""
-        xi = self._looked_at
+        xi = self._cage_grid
         if self.is_affine:
             return np.broadcast_to(xi, (len(t), *xi.shape))
         going = bend(self.end.bend - self.start.bend, xi)
@@ -199,7 +199,7 @@ class Motion:
         near = None if start is None else start.reshape(-1, 3)
         return self.confines.coordinates(x.reshape(-1, 3), near, enough).reshape(x.shape)
 
-    def _gap(self, t: Array, shrink: float) -> Array:
+    def gap(self, t: Array, shrink: float) -> Array:
         """Least distance [T], as a share of the outer cage's half-width, of the cage from the outer cage."""
         return 1.0 - np.abs(self.faces(t, shrink)).max(axis=(1, 2))
 

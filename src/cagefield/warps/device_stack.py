@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.loops import deal_of
 from cagefield.warps import flow_table
-from cagefield.warps.buffer_pool import Joined
+from cagefield.warps.buffer_pool import BufferPool
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.edit_lattice import nodes_of
 from cagefield.warps.flow_shell import FlowShell
@@ -22,7 +22,7 @@ from cagefield.warps.kernels.edit_maps import EditArgs
 from cagefield.warps.packing import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
 from cagefield.warps.weak_memo import kept
 
-_joined = Joined()
+_pool = BufferPool()
 
 
 class PackedStack(Protocol):
@@ -66,7 +66,7 @@ class DeviceStack:
                 lattices.append(nodes)
         nodes = np.zeros((1, 3), dtype=np.float32)
         if lattices:
-            nodes = lattices[0] if len(lattices) == 1 else _joined.join(lattices)
+            nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))

@@ -3,7 +3,7 @@
 The march of `kernels.flow_shell`, written for `LANES` nodes at a time: the innermost loops run over them,
 have no branches, and keep each number of all of them in one array, so that compilers use vector instructions.
 The table is that of `flow_table`. Two things differ from the march of single samples, by less than the error
-of its steps: it goes on in the outer cage's coordinates z, so that only the start of a way is straightened
+of its steps: it continues in the outer cage's coordinates z, so that only the start of a way is straightened
 there, and the inner cage's xi are followed by two of Newton's steps a stage, with one slope, not to rounding.
 Nodes that these do not suffice for are marked, and marched again one by one.
 """

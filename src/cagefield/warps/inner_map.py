@@ -41,10 +41,10 @@ class HexahedronMap:
         if self.affine is not None:
             A, b = self.affine
             return inside, points[inside] @ A.T + b, np.broadcast_to(A, (int(inside.sum()), 3, 3))
-        return inside, *between(self.deformed.corners, self.canonical.corners, u[inside])
+        return inside, *map_hexahedron(self.deformed.corners, self.canonical.corners, u[inside])
 
 
-def between(corners: Array, onto: Array, u: Array) -> tuple[Array, Array]:
+def map_hexahedron(corners: Array, onto: Array, u: Array) -> tuple[Array, Array]:
     """(x_onto(u) [N,3], Jacobian [N,3,3]) of the map that keeps u, from one hexahedron onto another."""
     J = trilinear_hex.jacobian(onto, u) @ trilinear_hex.invert(trilinear_hex.jacobian(corners, u))
     return trilinear_hex.points(onto, u), J

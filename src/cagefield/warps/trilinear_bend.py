@@ -1,11 +1,11 @@
-"""How a cage is bent, and how space goes on around it.
+"""How a cage is bent, and the map of the space around it.
 
 Notation: xi in [-1,1]^3 are the cage's trilinear coordinates, clamp(xi) their clamping to that cube, and
 
     x(xi) = c + F y(xi),    y(xi) = xi + B(clamp(xi)) + sum_a |xi_a - clamp(xi)_a| s_a d_as, s_a = sign xi_a,
     B(xi) = K_0 xi eta + K_1 xi zeta + K_2 eta zeta + K_3 xi eta zeta,
 
-so inside the cage x is the trilinear map of its corners, and beyond its face a, s it goes on along
+so inside the cage x is the trilinear map of its corners, and beyond its face a, s it continues along
 e_as = i_a + d_as, with i_a the unit vector of the axis and d_as, across it, the tilt. Along i_a it would fold
 where the face is bent so far that one of its normals points away from i_a. A face's best direction is the
 middle of the smallest cone that holds its corners' normals; e_as is the first one, on the way from i_a to it,
@@ -76,9 +76,9 @@ def forms(K: Array) -> Array:
 
 def _tilts(n: Array, along: Array, axis: NDArray[np.intp]) -> Array:
     """The tilts [N,3] of faces with unit normals n [N,4,3], whose components along their axis are `along`."""
-    d = _middles(n)
+    d = face_directions(n)
     rows = np.arange(len(d))
-    # No cage that is one to one goes on along a face.
+    # No cage that is one to one continues along a face.
     d /= np.maximum(d[rows, axis], 0.05)[:, None]
     d[rows, axis] = 0.0
     across = (n @ d[:, :, None])[..., 0]
@@ -87,7 +87,7 @@ def _tilts(n: Array, along: Array, axis: NDArray[np.intp]) -> Array:
     return np.asarray(d * share.max(axis=1, keepdims=True, initial=0.0).clip(0.0, 1.0))
 
 
-def _middles(n: Array) -> Array:
+def face_directions(n: Array) -> Array:
     """The directions [...,3] that make the least largest angle with four unit vectors n [...,4,3].
 
     The smallest cone that holds them touches two of them, or three.

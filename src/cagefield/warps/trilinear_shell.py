@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cagefield import hex_determinant, trilinear_hex
 from cagefield.cages import Cage
 from cagefield.typing import Array
-from cagefield.warps.inner_map import between
+from cagefield.warps.inner_map import map_hexahedron
 
 LEAST_RATIO = 1e-3
 """A shell whose determinant falls below this share of the canonical one counts as folded: the map to
@@ -133,7 +133,7 @@ def _through(source: Array, target: Array, points: Array) -> tuple[Array, Array]
     mapped, J = np.empty_like(points), np.empty((len(points), 3, 3))
     for n in range(6):
         rows = np.flatnonzero(side == n)
-        mapped[rows], J[rows] = between(source[n], target[n], coordinates[rows])
+        mapped[rows], J[rows] = map_hexahedron(source[n], target[n], coordinates[rows])
     return mapped, J
 
 

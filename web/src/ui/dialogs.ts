@@ -39,7 +39,7 @@ export function dialogs(app: App): Dialogs {
       const film = what === "camera_path";
       const base = (app.store.now.state?.path ?? "").replace(/\/+$/, "");
       const out = text(film ? `${base}.mp4` : `${base}-views`);
-      const { width, height } = app.stage.points;
+      const { width, height } = app.viewport.points;
       const sizes = [number(even(width), 16, 4096), number(even(height), 16, 4096)];
       const fps = number(24, 1, 120);
       const overwrite = check();

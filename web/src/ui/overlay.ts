@@ -21,7 +21,7 @@ function splitter(app: App): HTMLElement {
   bar.onpointerdown = (event) => bar.setPointerCapture(event.pointerId);
   bar.onpointermove = (event) => {
     if (!bar.hasPointerCapture(event.pointerId)) return;
-    const box = app.stage.canvas.getBoundingClientRect();
+    const box = app.viewport.canvas.getBoundingClientRect();
     app.store.set({ split: Math.min(0.98, Math.max(0.02, (event.clientX - box.left) / box.width)) });
   };
   app.store.watch(["split"], ({ split }) => {
@@ -37,14 +37,14 @@ function readout(app: App, pointer: Pointer): HTMLElement {
   label.hidden = true;
   let written = -Infinity;
   let later: ReturnType<typeof setTimeout> | null = null;
-  app.stage.beforeFrame.push(() => {
+  app.viewport.beforeFrame.push(() => {
     const { drag } = app;
     const followed = drag === null || drag.ended ? null : drag.followed;
     const now = performance.now();
-    if (followed !== null && !label.hidden && app.stage.software && now - written < TEXT_EVERY) {
+    if (followed !== null && !label.hidden && app.viewport.software && now - written < TEXT_EVERY) {
       later ??= setTimeout(() => {
         later = null;
-        app.stage.invalidate();
+        app.viewport.invalidate();
       }, TEXT_EVERY);
       return;
     }
@@ -53,7 +53,7 @@ function readout(app: App, pointer: Pointer): HTMLElement {
     if (drag === null || followed === null) return;
     label.textContent = described(followed);
     label.classList.toggle("limit", drag.why !== null);
-    const { width, height } = app.stage.points;
+    const { width, height } = app.viewport.points;
     const x = Math.min(pointer.at.x + 18, width - label.offsetWidth - 6);
     const y = Math.min(pointer.at.y + 18, height - label.offsetHeight - 6);
     label.style.transform = `translate(${x}px, ${y}px)`;

@@ -42,8 +42,8 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
           h("div", { class: "row" },
             h("span", { class: "number" }, String(index + 1)),
             seconds, h("span", { class: "quiet" }, "s"), h("span", { class: "space" }),
-            iconButton(Crosshair, "Look from here", () => look(app, key.c2w, key.fov_y_deg), "go"),
-            iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.stage.c2w })), "update"),
+            iconButton(Crosshair, "Look from here", () => lookFrom(app, key.c2w, key.fov_y_deg), "go"),
+            iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.viewport.c2w })), "update"),
             iconButton(Trash2, "Remove this keyframe", () => send(keys().filter((_, i) => i !== index)), "drop"),
           ),
           ...parts,
@@ -65,9 +65,9 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   );
 } // prettier-ignore
 
-function look(app: App, c2w: number[], fov_y_deg: number): void {
+function lookFrom(app: App, c2w: number[], fov_y_deg: number): void {
   const { hello } = app.store.now;
   if (hello === null) return;
   const around = hello.bounds[0].map((low, i) => 0.5 * (low + hello.bounds[1][i])) as Vec3;
-  app.stage.look(c2w, fov_y_deg, hello.up, around);
+  app.viewport.lookFrom(c2w, fov_y_deg, hello.up, around);
 }

@@ -100,8 +100,8 @@ def around(
     middle = np.asarray(target, np.float64)
     eyes = middle + np.stack([level * np.cos(angle), level * np.sin(angle), up], 1)
     eyes += sway / 2 * level[:, None] * rng.uniform(-1, 1, (count, 3))
-    looked_at = middle + sway * level[:, None] * rng.uniform(-1, 1, (count, 3))
-    return tuple(phone.camera(*where) for where in zip(eyes, looked_at, rolls(rng, count), strict=True))
+    targets = middle + sway * level[:, None] * rng.uniform(-1, 1, (count, 3))
+    return tuple(phone.camera(*where) for where in zip(eyes, targets, rolls(rng, count), strict=True))
 
 
 def outwards(

@@ -37,7 +37,7 @@ PATCHES = 3
 """The window is cut into PATCHES^2 emitters."""
 
 SHADOW_STEPS = tuple(float(step) for step in np.geomspace(0.05, 3.5, 20))
-"""Distances towards the window at which free space is looked up."""
+"""Distances towards the window at which free space is sampled."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Room:
     window        (x, z) of the window's lower left and upper right corner
     shell         names of the parts that are the room itself, not furniture
     brightness    of the window: the factor of its light
-    detail        spacing of the lattice that shadows and occlusion are looked up in
+    detail        spacing of the lattice of shadows and occlusion
     """
 
     low: Vector

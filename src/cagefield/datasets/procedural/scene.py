@@ -21,7 +21,7 @@ from cagefield.datasets.procedural.shading import Light, shade
 from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
 from cagefield.datasets.procedural.tracing import Hits, trace
 from cagefield.errors import SceneError
-from cagefield.rendering.frame import Background, Frame
+from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import Array
 
 
@@ -121,7 +121,9 @@ class ProceduralScene:
         """This scene with `relit` False: moved parts keep the colours they had as modelled."""
         return replace(self, relit=False)
 
-    def photograph(self, camera: Camera, *, supersample: int = 2, background: Background = "none") -> Frame:
+    def photograph(
+        self, camera: Camera, *, supersample: int = 2, background: Background = "none"
+    ) -> RenderResult:
         """Frame of the surfaces, each pixel the mean of supersample^2 rays.
 
         opacity is the share of rays that meet a surface, depth and normals the means over those.
@@ -146,7 +148,9 @@ class ProceduralScene:
         depth[opacity == 0] = np.inf
         normal = mean(normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-        return Frame.from_premultiplied(mean(rgb), opacity, depth, normals=normal, background=background)
+        return RenderResult.from_premultiplied(
+            mean(rgb), opacity, depth, normals=normal, background=background
+        )
 
     def shoot(
         self, origin: Array, directions: NDArray[np.float32]

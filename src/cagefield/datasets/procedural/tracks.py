@@ -30,7 +30,7 @@ ALIKE = 0.6
 """Least correlation of the patches of two sightings."""
 
 PATCH = 4
-"""Half width in pixels of a patch, which is looked up at every other pixel."""
+"""Half width in pixels of a patch, which is sampled at every other pixel."""
 
 WIDEST_ANGLE_DEG = 50.0
 """Between the rays of two photos that match."""

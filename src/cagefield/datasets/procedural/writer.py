@@ -21,8 +21,8 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import write_png
+from cagefield.rendering.render_result import RenderResult
 
 FOV_X = 0.6911112
 RADIUS = 4.0
@@ -60,7 +60,7 @@ def viewpoints(
 
 def photographs(
     scene: ProceduralScene, cameras: Iterable[Camera], *, supersample: int = 2
-) -> Iterator[Frame]:
+) -> Iterator[RenderResult]:
     """Frames of a scene without background, in order."""
     for camera in cameras:
         yield scene.photograph(camera, supersample=supersample)

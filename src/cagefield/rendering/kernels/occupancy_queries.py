@@ -22,18 +22,18 @@ def is_blocked(image: vec3, r: vec3, bricks: OccupancyArgs):
     found = 0
     x = first.x >> 1
     while x <= last.x >> 1 and found == 0:
-        in_x = between(x, first.x, last.x, 0xF0)
+        in_x = axis_mask(x, first.x, last.x, 0xF0)
         for y in range(first.y >> 1, (last.y >> 1) + 1):
-            in_xy = in_x & between(y, first.y, last.y, 0xCC)
+            in_xy = in_x & axis_mask(y, first.y, last.y, 0xCC)
             for z in range(first.z >> 1, (last.z >> 1) + 1):
                 code = bricks.codes[(x * bricks.dims.y + y) * bricks.dims.z + z]
-                found |= code & in_xy & between(z, first.z, last.z, 0xAA)
+                found |= code & in_xy & axis_mask(z, first.z, last.z, 0xAA)
         x += 1
     return qd.min(found, 1)
 
 
 @qd.func
-def between(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
+def axis_mask(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
     """Bits of a brick's sub-blocks from the block `first` to `last` along an axis.
 
     `upper` are the bits of its second sub-blocks.

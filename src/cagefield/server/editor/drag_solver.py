@@ -22,6 +22,10 @@ _ROUNDING = 1e-3
 """Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
 
 Target: TypeAlias = Literal["field", "inner", "outer", "both"]
+"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode).
+
+"both" turns and scales both cages about the inner cage's pivot.
+"""
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def move(entry: Entry, target: Target, operation: Operation) -> Moved:
     return _cages_alone(edit, target, operation)
 
 
-def joined(operations: tuple[Operation, ...], last: Operation) -> tuple[Operation, ...]:
+def appended(operations: tuple[Operation, ...], last: Operation) -> tuple[Operation, ...]:
     """The operations with one more; moves of the same kind, one after the other, become one."""
     total = _sum(operations[-1], last) if operations else None
     return (*operations, last) if total is None else (*operations[:-1], total)
@@ -83,7 +87,7 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
     if edit.deleted:
         raise EditError(f'edit "{edit.name}" deletes its cage\'s content; choose move or copy to move it')
     try:
-        whole = edit.replace(operations=joined(edit.operations, operation))
+        whole = edit.replace(operations=appended(edit.operations, operation))
     except CagefieldError:
         why = INSIDE_OUT
     else:
@@ -93,7 +97,7 @@ def _with_field(edit: Edit, operation: Operation) -> Moved:
         why = found
     part = edit.safe_fraction(operation)
     while part > 0.0:
-        done = edit.replace(operations=joined(edit.operations, operation.part(part)))
+        done = edit.replace(operations=appended(edit.operations, operation.part(part)))
         if problem(done) is None:
             return Moved(done, part, why)
         part -= _ROUNDING

@@ -12,7 +12,7 @@ from cagefield.server.editor.drag_solver import Moved, Target, move
 
 @dataclass(frozen=True)
 class Drag:
-    """A drag that goes on: its number on its page, the entry as it was, and what it has become."""
+    """A drag in progress: its number on its page, the entry as it was, and what it has become."""
 
     number: int
     target: Target

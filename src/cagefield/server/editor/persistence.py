@@ -111,7 +111,7 @@ class SceneStore:
         self._done(session)
 
     def save_as(self, session: Session, path: str, overwrite: bool) -> None:
-        """Writes the scene with its edits as another folder, and goes on with that one.
+        """Writes the scene with its edits as another folder, which is the open scene from then on.
 
         Raises SceneError where something is there that may not be replaced.
         """

@@ -6,25 +6,29 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, TypeAdapter
 
+from cagefield.edits.options import LATTICE_RANGE
+from cagefield.server.editor.drag_solver import Target
+from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
     MOST_BYTES,
     CameraMessage,
     Corners,
     EditId,
+    FalloffName,
+    JobKind,
     Key,
-    Kind,
     Message,
-    Target,
+    ShellName,
     Text,
     View,
 )
 from cagefield.server.protocol.operation_messages import OperationMessage
 
 
-class LookMessage(Message):
+class DisplayMessage(Message):
     """What is shown: a view; `before` leaves the edits out, `split` left of a share of the width."""
 
-    type: Literal["look"] = "look"
+    type: Literal["display"] = "display"
     view: View = "colour"
     before: bool = False
     split: Annotated[float, Field(ge=0, le=1)] | None = None
@@ -156,10 +160,12 @@ class Change(Message):
     enabled: bool | None = None
     locked: bool | None = None
     kind: Kind | None = None
-    shell: Literal["flow", "trilinear"] | None = None
-    falloff: Literal["smooth", "linear"] | None = None
+    shell: ShellName | None = None
+    falloff: FalloffName | None = None
     width: Annotated[float, Field(gt=0, le=1)] | None = None
-    lattice: Annotated[int, Field(ge=0, le=512)] | None = Field(default=None, description="0: exact")
+    lattice: Annotated[int, Field(ge=0, le=LATTICE_RANGE[1])] | None = Field(
+        default=None, description="0: exact"
+    )
 
 
 class SceneChange(Message):
@@ -244,7 +250,7 @@ class RenderJob(Message):
     """Renders the test views to PNGs in a folder, or the camera path to an MP4; in the background."""
 
     type: Literal["render"] = "render"
-    what: Literal["test_views", "camera_path"]
+    what: JobKind
     out: Annotated[str, Field(min_length=1, max_length=1000)]
     width: Annotated[int, Field(ge=16, le=4096)] = 800
     height: Annotated[int, Field(ge=16, le=4096)] = 800
@@ -260,9 +266,9 @@ class CancelJob(Message):
 
 
 PageMessage: TypeAlias = Annotated[
-    CameraMessage | LookMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel | PlayBegin
-    | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange | Command
-    | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
+    CameraMessage | DisplayMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel
+    | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange
+    | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
     Field(discriminator="type"),
 ]  # fmt: skip
 

@@ -27,12 +27,10 @@ Corners: TypeAlias = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
 Pose: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=16, max_length=16)]
 Axes: TypeAlias = Literal["world", "cage"]
 View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
-Kind: TypeAlias = Literal["continuous", "move", "copy", "delete"]
-Target: TypeAlias = Literal["field", "inner", "outer", "both"]
-"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode).
-
-"both" turns and scales both cages about the inner cage's pivot.
-"""
+ShellName: TypeAlias = Literal["flow", "trilinear"]
+FalloffName: TypeAlias = Literal["smooth", "linear"]
+JobKind: TypeAlias = Literal["test_views", "camera_path"]
+Level: TypeAlias = Literal["info", "warning", "error"]
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]
 Text: TypeAlias = Annotated[str, Field(max_length=200)]

@@ -6,14 +6,18 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
+from cagefield.server.editor.edit_kinds import Kind
 from cagefield.server.protocol.common import (
     CameraMessage,
     Corners,
     EditId,
+    FalloffName,
+    JobKind,
     Key,
-    Kind,
+    Level,
     Message,
     Pose,
+    ShellName,
     Vec3,
     View,
 )
@@ -43,8 +47,8 @@ class EditState(Message):
     enabled: bool
     locked: bool
     kind: Kind
-    shell: Literal["flow", "trilinear"]
-    falloff: Literal["smooth", "linear"]
+    shell: ShellName
+    falloff: FalloffName
     width: float
     lattice: int
     """Nodes along an axis, 0 where it is exact."""
@@ -127,7 +131,7 @@ class Notice(Message):
     """A line for the user."""
 
     type: Literal["notice"] = "notice"
-    level: Literal["info", "warning", "error"]
+    level: Level
     text: str
 
 
@@ -153,7 +157,7 @@ class Job(Message):
 
     type: Literal["job"] = "job"
     job: int
-    what: Literal["test_views", "camera_path"]
+    what: JobKind
     state: Literal["running", "done", "cancelled", "failed"]
     done: int
     total: int
@@ -184,7 +188,7 @@ class PictureHeader(Message):
     """`seq` of the camera that it shows."""
     drag: int
     seq: int
-    """The drag, and its newest `seq`, that it shows; 0, 0 where none goes on."""
+    """The drag, and its newest `seq`, that it shows; 0, 0 where no drag is in progress."""
     revision: int
     view: View
     before: bool

@@ -46,7 +46,7 @@ class BackgroundWork:
         self._session, self._store = session, store
         self._measured, self._tell = measured, tell
         self._warmed = 0
-        self._warming = list(WarmStage)
+        self.warming = list(WarmStage)
         self._errors: IdentityCache[Edit, Errors | None] = IdentityCache(64)
         self._jobs: list[Job] = []
         self._ending: list[EndJobTask] = []
@@ -54,7 +54,7 @@ class BackgroundWork:
 
     def next(self, generation: int) -> BackgroundTask | None:
         """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
-        if self._warming:
+        if self.warming:
             return self._warm()
         edit = self._unmeasured()
         if edit is not None:
@@ -71,7 +71,7 @@ class BackgroundWork:
         return server_messages.Preparing(done=self._warmed, of=len(WarmStage))
 
     def _warm(self) -> BackgroundTask:
-        stage = self._warming.pop(0)
+        stage = self.warming.pop(0)
 
         def done(_: Result) -> None:
             self._warmed += 1

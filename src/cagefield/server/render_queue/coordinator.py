@@ -15,14 +15,15 @@ from cagefield.fields.splat import SplatField
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
+from cagefield.server.protocol.common import Level
 from cagefield.server.protocol.conversion import state_of
 from cagefield.server.protocol.message_queues import SendQueue
 from cagefield.server.render_queue.background import BackgroundWork
-from cagefield.server.render_queue.damage import WHOLE, Rect, seen
-from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Level, Stamp
+from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
+from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.splat_extent import spread
-from cagefield.server.render_worker.pictures import Look
+from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Task, values_of
 
 
@@ -33,7 +34,7 @@ class Page:
     number: int
     send_queue: SendQueue = field(default_factory=SendQueue)
     camera: Camera | None = None
-    look: Look = field(default_factory=Look)
+    display: Display = field(default_factory=Display)
     drag: int = 0
     seq: int = 0
 
@@ -50,9 +51,9 @@ class Coordinator:
         self.store = store
         self.pages: dict[int, Page] = {}
         shown = store.scene.field
-        self._spread = spread(shown) if isinstance(shown, SplatField) else 0.0
+        self.spread = spread(shown) if isinstance(shown, SplatField) else 0.0
         """How far beside where an edit maps points its content shows, world units."""
-        self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self._spread > 0.0)
+        self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self.spread > 0.0)
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
         self.greeting: str | None = None
         """A line for the pages that come."""
@@ -99,10 +100,10 @@ class Coordinator:
         self.dispatcher.scheduler.leave(page.number)
         self.changed()
 
-    def look(self, page: Page, look: Look) -> None:
+    def display(self, page: Page, display: Display) -> None:
         """A page shows another view."""
-        page.look = look
-        self.dispatcher.scheduler.look(page.number, look, time.monotonic())
+        page.display = display
+        self.dispatcher.scheduler.display(page.number, display, time.monotonic())
         self.pump()
 
     def camera(self, page: Page, camera: Camera, seq: int, moving: bool) -> None:
@@ -133,7 +134,7 @@ class Coordinator:
 
     def state(self) -> server_messages.State:
         """Everything that pages show of the edits."""
-        self._look_again()
+        self._refresh_shown()
         return state_of(self.session, str(self.store.path), self._pictured, self.background.errors())
 
     def changed(self, but: Page | None = None) -> None:
@@ -171,7 +172,7 @@ class Coordinator:
     def pump(self) -> None:
         """Has rendered what is new to see."""
         self._tell_preview()
-        self._look_again()
+        self._refresh_shown()
         self.dispatcher.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
         self.dispatcher.pump()
 
@@ -185,7 +186,7 @@ class Coordinator:
             self._shown,
             camera,
             region,
-            request.look,
+            request.display,
             request.moving,
             request.exact,
             generation,
@@ -202,8 +203,8 @@ class Coordinator:
         (before, opacity), (after, other) = (stack for stack in stacks if stack is not None)
         if opacity != other:
             return WHOLE
-        beside = np.array([[-self._spread], [self._spread]])
-        return seen(camera, after.changed_boxes(before) + beside)
+        beside = np.array([[-self.spread], [self.spread]])
+        return screen_bounds(camera, after.changed_boxes(before) + beside)
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""
@@ -225,7 +226,7 @@ class Coordinator:
                 if which is not None:
                     self.broadcast(server_messages.Preview(page=which[0], play=which[1], on=on))
 
-    def _look_again(self) -> None:
+    def _refresh_shown(self) -> None:
         shown = self._what_is_shown()
         self._shown_revision = self.session.revision
         if shown != self._shown:
@@ -262,9 +263,9 @@ def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
         drag=stamp.drag,
         seq=stamp.seq,
         revision=stamp.revision,
-        view=request.look.view,
-        before=request.look.before,
-        split=request.look.split,
+        view=request.display.view,
+        before=request.display.before,
+        split=request.display.split,
         x=region.x,
         y=region.y,
         width=region.width,

@@ -40,14 +40,14 @@ def everywhere(page: int, one: int, another: int) -> Rect | None:
     return WHOLE
 
 
-def joined(a: Rect | None, b: Rect | None) -> Rect | None:
+def union(a: Rect | None, b: Rect | None) -> Rect | None:
     """The rectangle around both."""
     if a is None or b is None:
         return b if a is None else a
     return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
 
 
-def seen(camera: Camera, boxes: Array) -> Rect | None:
+def screen_bounds(camera: Camera, boxes: Array) -> Rect | None:
     """The rectangle in which a camera without distortion sees boxes [B,2,3] (min, max); None for nowhere."""
     found: Rect | None = None
     for box in boxes:
@@ -62,7 +62,7 @@ def seen(camera: Camera, boxes: Array) -> Rect | None:
         y = (camera.cy - camera.fy * inside[:, 1] / depth) / camera.height
         left, top, right, bottom = float(x.min()), float(y.min()), float(x.max()), float(y.max())
         if left < 1.0 and right > 0.0 and top < 1.0 and bottom > 0.0:
-            found = joined(found, (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0)))
+            found = union(found, (max(left, 0.0), max(top, 0.0), min(right, 1.0), min(bottom, 1.0)))
     return found
 
 
@@ -102,7 +102,7 @@ def tiles(part: tuple[int, int, int, int], count: float) -> list[tuple[int, int,
 
 @dataclass
 class Showing:
-    """What a page shows: a view (camera and look), the base's revision, and the later ones.
+    """What a page shows: a view (camera and display), the base's revision, and the later ones.
 
     `coarse` is where it was drawn coarsely since the base.
     """
@@ -126,7 +126,7 @@ class Showing:
         found = self.coarse if exact else None
         for other in (revision, *self.later):
             if other != self.base:
-                found = joined(found, differing(page, self.base, other))
+                found = union(found, differing(page, self.base, other))
         return found
 
     def drawn(
@@ -140,7 +140,7 @@ class Showing:
             self.base = None
             return
         if not exact:
-            self.coarse = joined(self.coarse, area)
+            self.coarse = union(self.coarse, area)
         if all_wanting and exact and self.exact:
             self.base, self.later, self.coarse = revision, set(), None
         elif all_wanting:

@@ -12,9 +12,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from cagefield.errors import CagefieldError
+from cagefield.server.protocol.common import Level
 from cagefield.server.render_queue.damage import Rect
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import Scheduler
@@ -35,7 +36,6 @@ RESTARTS = 3
 
 _GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
 
-Level = Literal["info", "warning", "error"]
 Make = Callable[[int], Task]
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.keyframes import Still, stills
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
+from cagefield.server.protocol.common import JobKind
 from cagefield.server.render_worker.tasks import FrameTask, Shown, values_of
-
-What: TypeAlias = Literal["test_views", "camera_path"]
 
 
 @dataclass
@@ -22,7 +20,7 @@ class Job:
     """A job: what it renders, where to, and how far it is. Its edits are those there were when it began."""
 
     number: int
-    what: What
+    what: JobKind
     out: Path
     fps: float
     stills: tuple[Still, ...]

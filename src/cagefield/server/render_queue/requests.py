@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Request:
     page: int
     camera: int
     revision: int
-    look: Look
+    display: Display
     region: Region
     moving: bool
     exact: bool

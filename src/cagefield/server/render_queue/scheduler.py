@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 from cagefield.server.render_queue.damage import WHOLE, Differing, Rect, Showing, everywhere, pixels, tiles
 from cagefield.server.render_queue.requests import Request
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
 """Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older
@@ -52,7 +52,7 @@ class _Page:
     height: int = 0
     camera: int = -1
     moving: bool = False
-    look: Look = field(default_factory=Look)
+    display: Display = field(default_factory=Display)
     unshown: list[int] = field(default_factory=list)
     changed: float = -math.inf
     """When its view changed last."""
@@ -78,7 +78,7 @@ class Scheduler:
         Where it may miss a little, all of a picture is drawn anew at rest (`whole_at_rest`).
         """
         self._differing = differing
-        self._whole_at_rest = whole_at_rest
+        self.whole_at_rest = whole_at_rest
         self._pages: dict[int, _Page] = {}
         self._numbers = 0
         self._rate = FIRST_RATE
@@ -110,10 +110,10 @@ class Scheduler:
         p.camera, p.width, p.height, p.moving = seq, width, height, moving
         self._changed(page, now)
 
-    def look(self, page: int, look: Look, now: float) -> None:
+    def display(self, page: int, display: Display, now: float) -> None:
         """A page shows another view."""
-        if self._pages[page].look != look:
-            self._pages[page].look = look
+        if self._pages[page].display != display:
+            self._pages[page].display = display
             self._changed(page, now)
 
     def edits(self, revision: int, dragging: bool, now: float) -> None:
@@ -154,7 +154,7 @@ class Scheduler:
         if page is not None:
             page.unshown.append(request.number)
             page.showing.drawn(
-                (request.camera, request.look),
+                (request.camera, request.display),
                 request.revision,
                 (
                     region.x / region.full_width,
@@ -252,7 +252,7 @@ class Scheduler:
     def _request(self, page: int, now: float) -> Request | None:
         p = self._pages[page]
         if self._owes_moving(p):
-            rect = p.showing.wanting(page, (p.camera, p.look), self._revision, self._differing)
+            rect = p.showing.wanting(page, (p.camera, p.display), self._revision, self._differing)
             scale = self._scale(p, rect)
             p.shown_version = p.version
             if scale < 1.0 or p.moving or self._dragging:
@@ -280,7 +280,7 @@ class Scheduler:
         p = self._pages[page]
         self._numbers += 1
         return Request(
-            self._numbers, page, p.camera, self._revision, p.look, region, moving, exact, final, complete
+            self._numbers, page, p.camera, self._revision, p.display, region, moving, exact, final, complete
         )
 
     def _scale(self, p: _Page, rect: Rect | None) -> float:
@@ -293,9 +293,9 @@ class Scheduler:
     def _cut(self, page: int, exact: bool) -> None:
         """Cuts what of the view is not as it should be into tiles of about TILE_SECONDS."""
         p = self._pages[page]
-        view = p.camera, p.look
+        view = p.camera, p.display
         rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
-        if exact and self._whole_at_rest and rect is not None:
+        if exact and self.whole_at_rest and rect is not None:
             rect = WHOLE
         part = pixels(rect, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)

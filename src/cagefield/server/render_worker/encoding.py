@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from cagefield.rendering.frame import Frame, to_uint8
+from cagefield.rendering.render_result import RenderResult, to_uint8
 from cagefield.server.protocol.common import View
 
 NOTHING = 65535
@@ -24,7 +24,7 @@ BEHIND = (0.13, 0.13, 0.15)
 """Colour behind a scene that has none."""
 
 
-def picture_of(frame: Frame, view: View, reach: tuple[float, float]) -> NDArray[np.uint8]:
+def picture_of(frame: RenderResult, view: View, reach: tuple[float, float]) -> NDArray[np.uint8]:
     """RGB pixels [H,W,3] of a view; `reach` (near, far) are the distances shown bright and dark."""
     if view == "colour":
         return frame.rgb8() if frame.background is not None else frame.over(BEHIND).rgb8()
@@ -63,7 +63,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     return stream.getvalue()
 
 
-def depths(frame: Frame, scale: float, stride: int) -> NDArray[np.uint16]:
+def depths(frame: RenderResult, scale: float, stride: int) -> NDArray[np.uint16]:
     """Depths [h,w] in units of `scale`, every `stride`-th pixel; NOTHING where it is half empty."""
     d, opacity = frame.depth[::stride, ::stride], frame.opacity[::stride, ::stride]
     seen = (opacity > 0.5) & np.isfinite(d)

@@ -6,8 +6,8 @@ from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
-from cagefield.rendering.frame import Frame
 from cagefield.rendering.images import video_writer, write_png
+from cagefield.rendering.render_result import RenderResult
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.encoding import BEHIND
 from cagefield.server.render_worker.tasks import FrameTask
@@ -19,7 +19,7 @@ class JobFiles:
     def __init__(self) -> None:
         self._videos: dict[int, tuple[AbstractContextManager[Any], Any]] = {}
 
-    def add(self, task: FrameTask, frame: Frame) -> None:
+    def add(self, task: FrameTask, frame: RenderResult) -> None:
         """One picture of a job more."""
         if task.what == "test_views":
             digits = max(4, len(str(task.total - 1)))

@@ -1,4 +1,4 @@
-"""What a picture shows: a look at the scene, and a region of the picture."""
+"""What a picture shows: a display of the scene, and a region of the picture."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cagefield.server.protocol.common import View
 
 
 @dataclass(frozen=True)
-class Look:
+class Display:
     """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
 
     view: View = "colour"

@@ -88,7 +88,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._context = context
         self._generation: ctypes.c_ulong = context.RawValue(ctypes.c_ulong, 0)
-        self._process: Any = None
+        self.process: Any = None
         self._connection: Connection | None = None
         self._has_scene = False
 
@@ -107,13 +107,13 @@ class Worker:
         try:
             process.start()
         except _LOST:
-            self._process = self._connection = None
+            self.process = self._connection = None
             here.close()
             self._on_lost()
             return
         finally:
             there.close()
-        self._process, self._connection, self._has_scene = process, here, False
+        self.process, self._connection, self._has_scene = process, here, False
         threading.Thread(target=self._listen, args=(here,), daemon=True).start()
 
     def send(self, task: Task) -> None:
@@ -128,7 +128,7 @@ class Worker:
     @property
     def pid(self) -> int | None:
         """The process's number, or None before `start`."""
-        return None if self._process is None else self._process.pid
+        return None if self.process is None else self.process.pid
 
     def close(self) -> None:
         """Ends the process; what it does is abandoned."""
@@ -136,12 +136,12 @@ class Worker:
         if connection is not None:
             self._generation.value = ctypes.c_ulong(-1).value
             _sent(connection, None)
-            if self._process is not None and self._has_scene:
-                self._process.join(TO_END)
+            if self.process is not None and self._has_scene:
+                self.process.join(TO_END)
             connection.close()
-        if self._process is not None:
-            self._process.terminate()
-            self._process.join(5.0)
+        if self.process is not None:
+            self.process.terminate()
+            self.process.join(5.0)
 
     def _listen(self, connection: Connection) -> None:
         while True:

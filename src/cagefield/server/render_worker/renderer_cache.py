@@ -14,13 +14,13 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.frame import Frame
+from cagefield.rendering.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.tasks import (
     EditValues,
     PictureDone,
@@ -68,7 +68,7 @@ class RendererCache:
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
         self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
-        self._exact: list[_Kept] = []
+        self.exact_renderers: list[_Kept] = []
         self._quick: list[_Kept] = []
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
@@ -79,7 +79,7 @@ class RendererCache:
         began = time.perf_counter()
         try:
             renderer = (
-                self.plain if task.look.before else self.renderer(task.shown, task.exact, giving_up(stop))
+                self.plain if task.display.before else self.renderer(task.shown, task.exact, giving_up(stop))
             )
         except GivenUpError:
             return Stopped(task.number)
@@ -89,7 +89,7 @@ class RendererCache:
             return Stopped(task.number)
         rendered = time.perf_counter()
         near, far = self.reach(task.camera)
-        pixels = encoding.picture_of(frame, task.look.view, (near, far))
+        pixels = encoding.picture_of(frame, task.display.view, (near, far))
         picture, form = encoding.plain_or_jpeg(pixels, MOVING_QUALITY if task.moving else REST_QUALITY)
         few = not task.moving and frame.width * frame.height <= MOST_DEPTHS
         stride = 1 if few else 2
@@ -107,13 +107,15 @@ class RendererCache:
             time.perf_counter() - rendered,
         )
 
-    def still(self, shown: Shown, camera: Camera, look: Look, stop: Stop | None = None) -> Frame | None:
+    def still(
+        self, shown: Shown, camera: Camera, display: Display, stop: Stop | None = None
+    ) -> RenderResult | None:
         """A whole picture, its edits exact; None where it was stopped."""
         region = Region(0, 0, camera.width, camera.height, camera.width, camera.height)
-        task = PictureTask(0, shown, camera, region, look, stop is None, True, 0)
+        task = PictureTask(0, shown, camera, region, display, stop is None, True, 0)
         stopping = stop or (lambda: False)
         try:
-            renderer = self.plain if look.before else self.renderer(shown, True, giving_up(stopping))
+            renderer = self.plain if display.before else self.renderer(shown, True, giving_up(stopping))
         except GivenUpError:
             return None
         return self._frame(task, renderer, stopping)
@@ -142,21 +144,21 @@ class RendererCache:
 
         `proceed` is called while it is made, and gives it up by raising.
         """
-        for kept in self._exact if exact else (*self._exact, *self._quick):
+        for kept in self.exact_renderers if exact else (*self.exact_renderers, *self._quick):
             if kept.shown == shown:
                 return kept.renderer
         edits = self.edits(shown.edits)
         if not exact and self._is_sampled:
-            ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
+            ready = {id(edit) for kept in self.exact_renderers for edit in kept.renderer.edits}
             edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
         # Occupancy under edits that both share is kept.
-        last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
+        last = self.exact_renderers[-1:] if exact else (self._quick or self.exact_renderers[-1:])
         renderer = (last[0].renderer if last else self.plain).with_edits(
             EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact, proceed=proceed
         )
         if exact:
             # Two: what pages show, and what a job renders.
-            self._exact = [*self._exact[-1:], _Kept(shown, renderer)]
+            self.exact_renderers = [*self.exact_renderers[-1:], _Kept(shown, renderer)]
         else:
             self._quick = [_Kept(shown, renderer)]
         return renderer
@@ -176,26 +178,28 @@ class RendererCache:
         distance = float(np.linalg.norm(camera.origin - self._middle))
         return max(0.0, distance - self._radius), distance + self._radius
 
-    def _frame(self, task: PictureTask, edited: AnyRenderer, stop: Stop) -> Frame | None:
+    def _frame(self, task: PictureTask, edited: AnyRenderer, stop: Stop) -> RenderResult | None:
         """The region of the picture; left of a split without the edits."""
-        region, split = task.region, task.look.split
-        if task.look.before or split is None:
-            return self._part(task, edited, region, stop)
+        region, split = task.region, task.display.split
+        if task.display.before or split is None:
+            return self.part(task, edited, region, stop)
         left = min(max(round(split * region.full_width) - region.x, 0), region.width)
-        parts: list[Frame] = []
+        parts: list[RenderResult] = []
         for renderer, x, width in ((self.plain, 0, left), (edited, left, region.width - left)):
             if width > 0:
-                part = self._part(task, renderer, replace(region, x=region.x + x, width=width), stop)
+                part = self.part(task, renderer, replace(region, x=region.x + x, width=width), stop)
                 if part is None:
                     return None
                 parts.append(part)
         return parts[0] if len(parts) == 1 else _beside(parts[0], parts[1])
 
-    def _part(self, task: PictureTask, renderer: AnyRenderer, region: Region, stop: Stop) -> Frame | None:
+    def part(
+        self, task: PictureTask, renderer: AnyRenderer, region: Region, stop: Stop
+    ) -> RenderResult | None:
         return renderer.render(
             task.camera,
             background=self.scene.background,
-            normals=task.look.view == "normals",
+            normals=task.display.view == "normals",
             region=(region.x, region.y, region.width, region.height),
             should_stop=None if task.moving else stop,
             step=self._step(task.camera, renderer.step) if task.moving else None,
@@ -235,7 +239,7 @@ def _warm_splats(stage: WarmStage) -> None:
     renderer.render(camera, normals=stage is WarmStage.DELETION)
 
 
-def _beside(left: Frame, right: Frame) -> Frame:
+def _beside(left: RenderResult, right: RenderResult) -> RenderResult:
     """Two frames of the same height as one."""
 
     def join(a: Float32, b: Float32) -> Float32:
@@ -244,7 +248,7 @@ def _beside(left: Frame, right: Frame) -> Frame:
     normals = None
     if left.normals is not None and right.normals is not None:
         normals = join(left.normals, right.normals)
-    return Frame(
+    return RenderResult(
         join(left.rgb, right.rgb),
         join(left.opacity, right.opacity),
         join(left.depth, right.depth),

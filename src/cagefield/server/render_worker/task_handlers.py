@@ -16,7 +16,7 @@ from cagefield.server.render_worker.cancellation import GivenUpError, giving_up
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
-from cagefield.server.render_worker.pictures import Look
+from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
 from cagefield.server.render_worker.tasks import (
@@ -91,7 +91,7 @@ class TaskHandlers:
         return Answered(task.number, (most / voxel, mean / voxel))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
-        frame = self._renderers.still(task.shown, task.still.camera, Look(), stop)
+        frame = self._renderers.still(task.shown, task.still.camera, Display(), stop)
         if frame is None:
             return Stopped(task.number)
         self._files.add(task, frame)
@@ -99,10 +99,10 @@ class TaskHandlers:
 
     def _still(self, task: StillTask) -> bytes:
         """The picture as a PNG."""
-        frame = self._renderers.still(task.shown, task.camera, task.look)
+        frame = self._renderers.still(task.shown, task.camera, task.display)
         if frame is None:
             raise CagefieldError("the picture was given up; try again")
-        return png(picture_of(frame, task.look.view, self._renderers.reach(task.camera)))
+        return png(picture_of(frame, task.display.view, self._renderers.reach(task.camera)))
 
     def _surface(self, task: SurfaceTask) -> tuple[list[float], list[float]] | None:
         """(point, normal) of the surface at a pixel; None where the picture is half empty."""

@@ -11,7 +11,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit
 from cagefield.keyframes import Still
-from cagefield.server.render_worker.pictures import Look, Region
+from cagefield.server.render_worker.pictures import Display, Region
 
 
 class WarmStage(Enum):
@@ -48,7 +48,7 @@ class PictureTask:
     camera: Camera
     """Of the size of the whole picture that `region` is a part of."""
     region: Region
-    look: Look
+    display: Display
     moving: bool
     exact: bool
     generation: int
@@ -61,7 +61,7 @@ class StillTask:
     number: int
     shown: Shown
     camera: Camera
-    look: Look
+    display: Display
 
 
 @dataclass(frozen=True)

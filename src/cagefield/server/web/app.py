@@ -66,11 +66,11 @@ def application(coordinator: Coordinator, hello: server_messages.Hello, guard: G
         page = coordinator.pages.get(_number(request.query_params.get("page", str(newest))))
         if page is None:
             return PlainTextResponse("give ?page=, the number of an open page", 404)
-        camera, look, shown = page.camera, page.look, coordinator.shown()
+        camera, display, shown = page.camera, page.display, coordinator.shown()
         if camera is None:
             return PlainTextResponse("this page has sent no camera yet", 409)
         try:
-            content = await coordinator.ask(lambda number: StillTask(number, shown, camera, look))
+            content = await coordinator.ask(lambda number: StillTask(number, shown, camera, display))
         except CagefieldError as error:
             return PlainTextResponse(str(error), 500)
         return _download(content, "screenshot.png", "image/png")

@@ -22,7 +22,7 @@ from cagefield.server.protocol.conversion import (
     view_height,
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
-from cagefield.server.render_worker.pictures import Look
+from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
@@ -72,9 +72,9 @@ class MessageHandlers:
     def _camera(self, message: common.CameraMessage) -> None:
         self._coordinator.camera(self._page, camera_of(message), message.seq, message.moving)
 
-    @_handles(client_messages.LookMessage)
-    def _look(self, message: client_messages.LookMessage) -> None:
-        self._coordinator.look(self._page, Look(message.view, message.before, message.split))
+    @_handles(client_messages.DisplayMessage)
+    def _display(self, message: client_messages.DisplayMessage) -> None:
+        self._coordinator.display(self._page, Display(message.view, message.before, message.split))
 
     @_handles(client_messages.PresentedMessage)
     def _presented(self, message: client_messages.PresentedMessage) -> None:

@@ -96,7 +96,7 @@ async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue
     try:
         while True:
             message = await receive_queue.get()
-            with _told(page):
+            with errors_reported_to(page):
                 rest = handlers.handle(message)
                 if rest is not None:
                     task = asyncio.ensure_future(_finish(rest, page))
@@ -109,12 +109,12 @@ async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue
 
 
 async def _finish(rest: Coroutine[Any, Any, None], page: Page) -> None:
-    with _told(page):
+    with errors_reported_to(page):
         await rest
 
 
 @contextlib.contextmanager
-def _told(page: Page) -> Iterator[None]:
+def errors_reported_to(page: Page) -> Iterator[None]:
     """What cannot be done becomes a line for the page's user."""
     try:
         yield

@@ -32,7 +32,7 @@ function opaqueRenderer(antialias: boolean): WebGLRenderer {
   return new WebGLRenderer({ canvas, context: context ?? undefined });
 }
 
-export class Stage {
+export class Viewport {
   /** Whether the processor draws the page. */
   readonly software = isSoftware();
   readonly renderer = opaqueRenderer(!this.software);
@@ -97,7 +97,7 @@ export class Stage {
   }
 
   /** Looks from a camera-to-world pose, row by row, and orbits around the point of its axis next to `around`. */
-  look(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
+  lookFrom(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
     this.take();
     const { camera } = this;
     if (this.orbit === null || camera.up.distanceTo(new Vector3(...up)) > 1e-6) {

@@ -8,7 +8,7 @@ import { facesTowards } from "./picking";
 import type { Corners, EditState, Vec3 } from "./protocol";
 import { obstacle, selected, showsCages, type Editor } from "./store";
 
-export interface Scenery {
+export interface CageOverlay {
   segments: Segment[];
   dots: Dot[];
 }
@@ -47,8 +47,8 @@ export function draggable(editor: Editor, cages: Cages): { cage: "inner" | "oute
 }
 
 /** Lines and dots for everything that is to be seen of the edits. */
-export function scenery(editor: Editor, drag: Drag | null, grid: Vec3[][], eye: Vec3): Scenery {
-  const out: Scenery = { segments: [], dots: [] };
+export function cageOverlay(editor: Editor, drag: Drag | null, grid: Vec3[][], eye: Vec3): CageOverlay {
+  const out: CageOverlay = { segments: [], dots: [] };
   if (!showsCages(editor) || editor.state === null) return out;
   const chosen = selected(editor);
   for (const edit of editor.state.edits) {
@@ -62,7 +62,7 @@ export function scenery(editor: Editor, drag: Drag | null, grid: Vec3[][], eye: 
   return out;
 }
 
-function chosenEdit(out: Scenery, editor: Editor, edit: EditState, cages: Cages, grid: Vec3[][], eye: Vec3): void {
+function chosenEdit(out: CageOverlay, editor: Editor, edit: EditState, cages: Cages, grid: Vec3[][], eye: Vec3): void {
   const tint = colour(edit.colour);
   const setting = editor.mode === "set";
   const dim = edit.enabled ? 1 : 0.4;
@@ -83,21 +83,21 @@ function chosenEdit(out: Scenery, editor: Editor, edit: EditState, cages: Cages,
   }
 }
 
-function cage(out: Scenery, corners: Corners, tint: Color, stroke: Stroke, dim = 1): void {
+function cage(out: CageOverlay, corners: Corners, tint: Color, stroke: Stroke, dim = 1): void {
   for (const [i, j] of EDGES) segment(out, corners[i], corners[j], tint, stroke, dim);
 }
 
-function polyline(out: Scenery, points: Vec3[], tint: Color, stroke: Stroke): void {
+function polyline(out: CageOverlay, points: Vec3[], tint: Color, stroke: Stroke): void {
   for (let i = 1; i < points.length; i++) segment(out, points[i - 1], points[i], tint, stroke);
 }
 
-function segment(out: Scenery, from: Vec3, to: Vec3, tint: Color, stroke: Stroke, dim = 1): void {
+function segment(out: CageOverlay, from: Vec3, to: Vec3, tint: Color, stroke: Stroke, dim = 1): void {
   out.segments.push({
     from, to, colour: tint, width: stroke.width, alpha: stroke.alpha * dim, hidden: stroke.hidden * dim,
   }); // prettier-ignore
 }
 
-function highlight(out: Scenery, corners: Corners, part: Part): void {
+function highlight(out: CageOverlay, corners: Corners, part: Part): void {
   const own = cornersOf(part);
   if (part.kind === "corner") return;
   for (const [i, j] of EDGES) {
@@ -106,7 +106,7 @@ function highlight(out: Scenery, corners: Corners, part: Part): void {
 }
 
 function dots(
-  out: Scenery, corners: Corners, tint: Color, hover: Part | null, chosen: number[], main: boolean, eye: Vec3,
+  out: CageOverlay, corners: Corners, tint: Color, hover: Part | null, chosen: number[], main: boolean, eye: Vec3,
 ): void { // prettier-ignore
   const size = main ? 9 : 7;
   facesTowards(corners, eye).forEach((at, index) => {

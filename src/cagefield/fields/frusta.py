@@ -14,7 +14,7 @@ MARGIN = 0.05
 """A picture reaches this share of its size over its edges here, for what is interpolated there."""
 
 
-def seen_by(
+def in_frusta(
     cameras: Sequence[Camera], points: NDArray[Any], near: float = 0.0, least: int = 1
 ) -> NDArray[np.bool_]:
     """True [N] where a point [N,3] lies in the pictures of `least` cameras, at a depth of `near` or more.

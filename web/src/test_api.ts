@@ -5,10 +5,10 @@ import type { Latency } from "./latency";
 import type { Operation } from "./operations";
 import type { PictureHeader } from "./protocol";
 import { pickCorner } from "./picking";
-import { draggable } from "./scenery";
+import { draggable } from "./cage_overlay";
 import { selected, type Editor } from "./store";
 
-export interface Inspector {
+export interface TestApi {
   readonly now: Editor;
   readonly picture: PictureHeader | null;
   readonly latency: Latency;
@@ -31,14 +31,14 @@ export interface Inspector {
 
 declare global {
   interface Window {
-    cagefield?: Inspector;
+    cagefield?: TestApi;
   }
 }
 
-export function inspector(app: App): Inspector {
-  const { stage } = app;
+export function testApi(app: App): TestApi {
+  const { viewport } = app;
   const inWindow = (x: number, y: number): { x: number; y: number } => {
-    const box = stage.canvas.getBoundingClientRect();
+    const box = viewport.canvas.getBoundingClientRect();
     return { x: box.left + x, y: box.top + y };
   };
   return {
@@ -50,7 +50,7 @@ export function inspector(app: App): Inspector {
     },
     latency: app.latency,
     get camera() {
-      return { c2w: stage.c2w, seq: app.camera.seq };
+      return { c2w: viewport.c2w, seq: app.camera.seq };
     },
     get drag() {
       if (app.drag === null) return null;
@@ -71,27 +71,27 @@ export function inspector(app: App): Inspector {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);
       const posed = edit && app.shown(edit)[cage];
       if (!posed) throw new Error(`edit ${id} has no ${cage} cage`);
-      const { x, y } = stage.project(middle(posed.corners, cornersOf({ kind, index })));
+      const { x, y } = viewport.project(middle(posed.corners, cornersOf({ kind, index })));
       return inWindow(x, y);
     },
     grip(axis) {
       app.arrange();
-      const { width, height } = stage.points;
+      const { width, height } = viewport.points;
       const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
       const edit = selected(app.store.now);
       const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
       const slack = { x: 4 / width, y: 4 / height };
       const at = app.gizmo.grip(axis, slack, (device) =>
-        cages.every(({ corners }) => pickCorner(...pixel(device), corners, stage.project) === null),
+        cages.every(({ corners }) => pickCorner(...pixel(device), corners, viewport.project) === null),
       );
       return at && inWindow(...pixel(at));
     },
     project(point) {
-      const { x, y } = stage.project(point);
+      const { x, y } = viewport.project(point);
       return inWindow(x, y);
     },
     depth(x, y) {
-      const box = stage.canvas.getBoundingClientRect();
+      const box = viewport.canvas.getBoundingClientRect();
       return app.pictures.depth.at((x - box.left) / box.width, (y - box.top) / box.height);
     },
   };

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import CagefieldError
+from cagefield.renamed_modules import old_names
 from cagefield.typing import Float32
 
 Background = str | Sequence[float] | NDArray[Any] | None
@@ -44,7 +45,7 @@ def to_uint8(values: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 @dataclass(frozen=True)
-class Frame:
+class RenderResult:
     """One rendered picture; arrays are read-only.
 
     rgb      [H,W,3] float32: over `background`; with background None the straight colour (not premultiplied,
@@ -84,8 +85,8 @@ class Frame:
         *,
         normals: NDArray[Any] | None = None,
         background: Background = None,
-    ) -> Frame:
-        """Frame from the accumulated colour sum(weights * rgb) [H,W,3] over a background."""
+    ) -> RenderResult:
+        """Result from the accumulated colour sum(weights * rgb) [H,W,3] over a background."""
         behind = background_rgb(background)
         opacity = np.clip(opacity, 0.0, 1.0)
         if behind is None:
@@ -115,11 +116,11 @@ class Frame:
             return self.rgb * self.opacity[..., None]
         return self.rgb - (1.0 - self.opacity)[..., None] * np.asarray(self.background, np.float32)
 
-    def over(self, background: Background) -> Frame:
+    def over(self, background: Background) -> RenderResult:
         """This frame over another background (or over nothing, for "none")."""
         if background_rgb(background) == self.background:
             return self
-        other = Frame.from_premultiplied(
+        other = RenderResult.from_premultiplied(
             self.premultiplied(), self.opacity, self.depth, background=background
         )
         return replace(other, normals=self.normals)
@@ -131,3 +132,6 @@ class Frame:
     def rgba8(self) -> NDArray[np.uint8]:
         """Straight colour and opacity [H,W,4] uint8."""
         return to_uint8(np.concatenate([self.over(None).rgb, self.opacity[..., None]], axis=-1))
+
+
+__getattr__ = old_names(__name__, {"Frame": RenderResult})
