@@ -160,6 +160,15 @@ export interface Command {
   edit?: number | null;
 }
 /**
+ * What is shown: a view; `before` leaves the edits out, `split` left of a share of the width.
+ */
+export interface DisplayMessage {
+  type: "display";
+  view?: "colour" | "depth" | "opacity" | "normals";
+  before?: boolean;
+  split?: number | null;
+}
+/**
  * A drag of an edit's cages begins.
  */
 export interface DragBegin {
@@ -225,15 +234,6 @@ export interface LoadEdits {
   type: "load_edits";
   text: string;
   append?: boolean;
-}
-/**
- * What is shown: a view; `before` leaves the edits out, `split` left of a share of the width.
- */
-export interface DisplayMessage {
-  type: "display";
-  view?: "colour" | "depth" | "opacity" | "normals";
-  before?: boolean;
-  split?: number | null;
 }
 /**
  * A mirrored copy of an edit's cages and operations, across the plane through the scene's middle.
