@@ -131,7 +131,7 @@ def drag(editor: EditorPage) -> None:
     frames: list[Image.Image] = []
     filmed(editor, "Z", [(0.0, -3.0 * step) for step in range(19)], frames)
     editor.tools(tool="rotate")
-    filmed(editor, "Y", [(0.0, -4.0 * step) for step in range(16)], frames)
+    filmed(editor, "Y", [(0.0, -4.0 * step) for step in range(9)], frames)
     times = [90] * len(frames)
     times[0] = times[-1] = 900
     frames[0].save(
@@ -152,13 +152,17 @@ def filmed(editor: EditorPage, grip: str, path: list[Point], frames: list[Image.
     for x, y in path:
         page.mouse.move(at[0] + x, at[1] + y)
         page.wait_for_timeout(900)
-        picture = Image.open(io.BytesIO(page.screenshot(type="png"))).convert("RGB")
-        frames.append(
-            picture.resize((picture.width * 5 // 8, picture.height * 5 // 8), Image.Resampling.LANCZOS)
-        )
+        frames.append(small_shot(editor))
     page.mouse.up()
     editor.until("cagefield.drag === null")
     editor.settle()
+    frames.append(small_shot(editor))
+
+
+def small_shot(editor: EditorPage) -> Image.Image:
+    """The window at 5/8 of its size."""
+    picture = Image.open(io.BytesIO(editor.page.screenshot(type="png"))).convert("RGB")
+    return picture.resize((picture.width * 5 // 8, picture.height * 5 // 8), Image.Resampling.LANCZOS)
 
 
 def shot(editor: EditorPage, name: str) -> None:
