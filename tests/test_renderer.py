@@ -154,7 +154,7 @@ def test_edited_matches_the_plain_renderer(name, contracted):
 def test_deformed_occupancy_holds_all_density_and_is_tight(name):
     """No point with density lies in a block marked empty; the marked blocks are not many more."""
     field, edits = ball(), EDITS[name]
-    occupied = Renderer(field, edits)._occupancy
+    occupied = Renderer(field, edits).occupancy
     rng = np.random.default_rng(0)
     low, high = np.minimum(-1, edits.bounds[0]), np.maximum(1, edits.bounds[1])
     p = rng.uniform(low, high, (60000, 3))
