@@ -40,7 +40,7 @@ class Export:
     splats: int | None = None
     """Most splats that are fitted, or points; left out, as many as the pictures' detail and the time allow,
     300,000 at most."""
-    minutes: float = 4.0
+    minutes: float = 2.0
     """How long to fit splats to voxels."""
     steps: int | None = None
     """Fit this many steps instead: on a CPU that gives the same splats each time."""
@@ -101,6 +101,7 @@ class Export:
             minutes=self.minutes if self.steps is None else None,
             splats=self.splats,
             sh_degree=scene.field.sh_degree,
+            dropout=0.0,
         )
         with stages() as move:
             result = fitted_splats(scene, config, move)
