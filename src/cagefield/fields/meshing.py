@@ -78,4 +78,5 @@ def mesh_of(field: VoxelField, level: float | None = None) -> Mesh:
     for start in range(0, len(positions), BLOCK):
         rows = slice(start, start + BLOCK)
         rgb[rows] = field(positions[rows], -normals[rows])[1]
-    return Mesh(positions, normals, rgb, np.ascontiguousarray(faces, np.int32))
+    # Its faces turn the other way.
+    return Mesh(positions, normals, rgb, np.ascontiguousarray(faces[:, ::-1], np.int32))

@@ -40,6 +40,9 @@ SEED_SHARE = 0.6
 WIDTH, THICKNESS = 0.7, 0.15
 """Sigmas of a first splat along and across the surface, in distances to its neighbours."""
 
+STEP = 8.0
+"""Pixels of depth from a pixel to its neighbours that are a step, and no slope."""
+
 FIRST_OPACITY = 0.7
 EMPTY_STEP = 4  # pixels along a side that share a distance up to which there is nothing
 
@@ -75,6 +78,7 @@ class Surface:
             raise CagefieldError("a surface needs pictures with normals; render with normals=True")
         length = np.linalg.norm(picture.normals, axis=-1)
         solid = (picture.opacity > SOLID) & np.isfinite(picture.depth) & (length > 0.5)
+        solid &= ~_is_step(picture.depth, solid, camera)
         rows, columns = np.nonzero(solid)
         origins, directions = camera.rays(np.stack([columns, rows], axis=1))
         distances = picture.depth[solid].astype(np.float64)[:, None]
@@ -183,6 +187,16 @@ def _pictures(
             raise CagefieldError("a picture of the field was given up; try again")
         on_stage("Rendering", number / len(cameras), f"picture {number} of {len(cameras)}")
         yield picture
+
+
+def _is_step(depth: Float32, solid: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
+    """True [H,W] beside a step in depth: there a pixel's mean lies between two surfaces, and on none."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    far = maximum_filter(np.where(solid, depth, -np.inf), 3)
+    near = minimum_filter(np.where(solid, depth, np.inf), 3)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(far - near > STEP * near / camera.fx)
 
 
 def _share(count: int, cameras: int) -> int:
