@@ -50,7 +50,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
 def file(tmp_path: Path) -> Path:
     """A file of splats, alone in its folder."""
     (tmp_path / "capture").mkdir()
-    write_splats(tmp_path / "capture" / "ball.ply", ball_of_splats())
+    write_splats(ball_of_splats(), tmp_path / "capture" / "ball.ply")
     return tmp_path / "capture" / "ball.ply"
 
 
@@ -112,12 +112,12 @@ def test_a_scenes_path_is_not_a_files(file: Path, tmp_path: Path) -> None:
 
 def test_scenes_that_nobody_opened_for_long_leave_the_cache(file: Path, tmp_path: Path) -> None:
     old, edited = scene_of_file(file), tmp_path / "other.ply"
-    write_splats(edited, ball_of_splats(500))
+    write_splats(ball_of_splats(500), edited)
     kept = scene_of_file(edited)
     (kept.parent / f".{kept.name}.cagefield-autosave.json").write_text("{}")
     for scene in (old, kept):
         os.utime(scene, (0, os.stat(file).st_mtime - 86400.0 * (KEPT_DAYS + 1)))
-    write_splats(tmp_path / "third.ply", ball_of_splats(400))
+    write_splats(ball_of_splats(400), tmp_path / "third.ply")
     newest = scene_of_file(tmp_path / "third.ply")
     assert (old.exists(), kept.exists(), newest.exists()) == (False, True, True)
     assert scene_of_file(tmp_path / "third.ply") == newest
@@ -193,7 +193,7 @@ def test_a_file_that_is_too_large_is_refused_by_what_it_says_and_by_what_comes(
 def test_a_dropped_file_takes_the_scenes_place_and_pages_come_again(
     server: EditorServer, tmp_path: Path
 ) -> None:
-    write_splats(tmp_path / "other.ply", ball_of_splats(300))
+    write_splats(ball_of_splats(300), tmp_path / "other.ply")
     origin = f"http://localhost:{server.port}"
     with page(server) as (client, hello):
         client.send("load_edits", text=EDIT, append=False)

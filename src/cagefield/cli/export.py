@@ -88,7 +88,7 @@ class Export:
             splats, figures = self._fitted(scene)
         if cages:
             splats = splats.take(inside(cages, splats.means))
-        write_splats(self.out, splats, axes=self.axes)
+        write_splats(splats, self.out, None if self.axes == "auto" else self.axes)
         return f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
 
     def _fitted(self, scene: Scene) -> tuple[SplatField, str]:

@@ -134,7 +134,7 @@ def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bo
     stack = EditStack(Edit(**values) for values in edits)
     splats = baked(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
-    write_splats(out, splats)
+    write_splats(splats, out)
     return len(splats)
 
 
