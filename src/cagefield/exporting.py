@@ -173,7 +173,7 @@ def cages_of(selection: str, edits: EditStack) -> tuple[Cage, ...]:
     """
     text = selection.strip()
     if text.startswith("{"):
-        found = parse_edits(f"[{{inner: {text}}}]", source="--selection", check=False)
+        found = parse_edits(f"[{{adjustment: discrete, inner: {text}}}]", source="--selection", check=False)
         return tuple(edit.inner for edit in found)
     named = [edit for edit in edits if edit.name == selection]
     if named:
