@@ -22,7 +22,7 @@ from cagefield.benchmarking.tables import Table, number, write_text
 from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_ply import read_splat_ply
+from cagefield.formats.splat_files import read_splats
 from cagefield.rendering.images import write_png
 from cagefield.rendering.splat_renderer import SplatRenderer
 
@@ -103,7 +103,7 @@ def main() -> None:
     machine = f"Machine: {Machine.here()}"
     rows = []
     if options.ply:
-        field = read_splat_ply(options.ply)
+        field = read_splats(options.ply)
         rows += [frame_row(options.ply.name, field, size, size) for size in (200, 400, 800)]
     for count in (10_000, 50_000, 200_000, 800_000):
         rows.append(frame_row("random", random_splats(count), 400, 400))

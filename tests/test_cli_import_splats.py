@@ -12,8 +12,8 @@ from cagefield import Scene
 from cagefield.camera_paths import shared_up
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
+from cagefield.formats.splat_files import write_splats
 from cagefield.formats.splat_import import import_splats
-from cagefield.formats.splat_ply import write_splat_ply
 from commands import printed, refused
 from scenes import files_of
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats
@@ -24,7 +24,7 @@ SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """A ball of splats in a file."""
-    write_splat_ply(tmp_path / "ball.ply", ball_of_splats())
+    write_splats(ball_of_splats(), tmp_path / "ball.ply")
     return tmp_path / "ball.ply"
 
 

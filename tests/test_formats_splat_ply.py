@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.formats.splat_ply import read_splat_ply, write_splat_ply
+from cagefield.formats.splat_files import read_splats, write_splats
 from cagefield.ply import read_ply
 from scenes import SH_C0
 from splat_scenes import assert_same_splats, random_splats
@@ -49,9 +49,9 @@ def write_columns(path: Path, columns: dict[str, np.ndarray], order: str = "<", 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_what_is_written_is_read(tmp_path: Path, degree: int) -> None:
     field = random_splats(degree=degree)
-    write_splat_ply(tmp_path / "a.ply", field)
+    write_splats(field, tmp_path / "a.ply")
     # opacity goes through a logit in float32: 1e-6; one of 1 comes back as 1 - 1e-7
-    assert_same_splats(read_splat_ply(tmp_path / "a.ply"), field, atol=2e-6)
+    assert_same_splats(read_splats(tmp_path / "a.ply"), field, atol=2e-6)
     written = read_ply(tmp_path / "a.ply").elements["vertex"]
     for name, expected in columns_of(field).items():
         scale = 3.0 if name.startswith("rot") else 1.0
@@ -65,7 +65,7 @@ def test_any_order_of_columns_and_others_beside_them(tmp_path: Path, order: str)
     columns = columns_of(field) | {"transform": np.arange(20.0), "nx": np.zeros(20)}
     names = np.random.default_rng(3).permutation(list(columns)).tolist()
     write_columns(tmp_path / "a.ply", {name: columns[name] for name in names}, order)
-    assert_same_splats(read_splat_ply(tmp_path / "a.ply"), field, atol=2e-6)
+    assert_same_splats(read_splats(tmp_path / "a.ply"), field, atol=2e-6)
 
 
 def test_a_mesh_s_faces_may_follow(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_mesh_s_faces_may_follow(tmp_path: Path) -> None:
     lines += ["element face 1", "property list uchar int vertex_index"]
     table = np.stack(list(columns.values()), axis=1).astype("<f4").tobytes()
     (tmp_path / "a.ply").write_bytes(header(*lines) + table + b"\x03" + bytes(12))
-    assert_same_splats(read_splat_ply(tmp_path / "a.ply"), field, atol=2e-6)
+    assert_same_splats(read_splats(tmp_path / "a.ply"), field, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -91,10 +91,10 @@ def test_comments_say_which_filter_the_splats_want(
     tmp_path: Path, comments: tuple[str, ...], antialiased: bool
 ) -> None:
     write_columns(tmp_path / "a.ply", columns_of(random_splats(4)), comments=comments)
-    field = read_splat_ply(tmp_path / "a.ply")
+    field = read_splats(tmp_path / "a.ply")
     assert field.antialiased is antialiased
-    write_splat_ply(tmp_path / "b.ply", field)
-    assert read_splat_ply(tmp_path / "b.ply").antialiased is antialiased
+    write_splats(field, tmp_path / "b.ply")
+    assert read_splats(tmp_path / "b.ply").antialiased is antialiased
 
 
 def test_flat_splats_and_byte_colours(tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_flat_splats_and_byte_colours(tmp_path: Path) -> None:
         columns.pop(f"f_dc_{index}")
         columns[name] = np.array([0.0, 51.0, 102.0, 255.0])
     write_columns(tmp_path / "a.ply", columns)
-    field = read_splat_ply(tmp_path / "a.ply")
+    field = read_splats(tmp_path / "a.ply")
     np.testing.assert_allclose(0.5 + SH_C0 * field.sh[:, 0, 1], [0.0, 0.2, 0.4, 1.0], atol=1e-6)
     thin = np.exp(field.log_scales[:, 2] - field.log_scales[:, :2].min(axis=1))
     np.testing.assert_allclose(thin, 1e-3, rtol=1e-5)
@@ -121,7 +121,7 @@ def test_splats_without_numbers_are_left_out_with_a_warning(tmp_path: Path) -> N
     columns["opacity"] = np.where(np.arange(6) == 1, np.inf, columns["opacity"])
     write_columns(tmp_path / "a.ply", columns)
     with pytest.warns(UserWarning, match="2 of 6 splats hold no numbers and are left out"):
-        read = read_splat_ply(tmp_path / "a.ply")
+        read = read_splats(tmp_path / "a.ply")
     np.testing.assert_array_equal(read.means, field.means[[0, 1, 3, 5]])
     np.testing.assert_array_equal(read.quaternions[0], (1, 0, 0, 0))
     assert read.opacities[1] == 1.0 and read.log_scales[3, 0] == -30.0
@@ -184,7 +184,7 @@ def test_compressed_files(tmp_path: Path, with_colours: bool) -> None:
     rest = np.random.default_rng(5).integers(0, 256, (300, 9))
     data, _ = packed(field, with_colours, rest)
     (tmp_path / "a.ply").write_bytes(data)
-    read = read_splat_ply(tmp_path / "a.ply")
+    read = read_splats(tmp_path / "a.ply")
     # half a step of 10 bits over the box of 2, over the logarithms' range of 2.7
     np.testing.assert_allclose(read.means, field.means, atol=2.0 / 1023 / 2 + 1e-6)
     np.testing.assert_allclose(read.log_scales, field.log_scales, atol=2.8 / 1023 / 2 + 1e-6)
@@ -230,10 +230,10 @@ def cut(data: bytes) -> bytes:
     ],
 )
 def test_damaged_files_are_one_line(tmp_path: Path, damage, message: str) -> None:
-    write_splat_ply(tmp_path / "a.ply", random_splats())
+    write_splats(random_splats(), tmp_path / "a.ply")
     (tmp_path / "a.ply").write_bytes(damage((tmp_path / "a.ply").read_bytes()))
     with pytest.raises(FieldError, match=r"a\.ply: .*" + message) as caught:
-        read_splat_ply(tmp_path / "a.ply")
+        read_splats(tmp_path / "a.ply")
     assert "\n" not in str(caught.value)
 
 
@@ -252,7 +252,7 @@ def test_damaged_compressed_files_are_one_line(tmp_path: Path, old: bytes, new: 
     assert data.count(old) == 1
     (tmp_path / "a.ply").write_bytes(data.replace(old, new))
     with pytest.raises(FieldError, match=message):
-        read_splat_ply(tmp_path / "a.ply")
+        read_splats(tmp_path / "a.ply")
 
 
 def test_truncated_ascii_and_missing_files(tmp_path: Path) -> None:
@@ -260,18 +260,18 @@ def test_truncated_ascii_and_missing_files(tmp_path: Path) -> None:
     text = (tmp_path / "a.ply").read_bytes()
     (tmp_path / "a.ply").write_bytes(text[: len(text) - 30])
     with pytest.raises(FieldError, match="4 rows of vertex are not 38 numbers each"):
-        read_splat_ply(tmp_path / "a.ply")
+        read_splats(tmp_path / "a.ply")
     with pytest.raises(FieldError, match="no such file; give a"):
-        read_splat_ply(tmp_path / "b.ply")
+        read_splats(tmp_path / "b.ply")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data/splats is not there")
 def test_files_that_others_wrote() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        biker = read_splat_ply(SHARED / "biker.compressed.ply")
-        fruit = read_splat_ply(SHARED / "fruit_drops_minimal.ply")
-        tiny = read_splat_ply(SHARED / "tiny_gauss.ply")
+        biker = read_splats(SHARED / "biker.compressed.ply")
+        fruit = read_splats(SHARED / "fruit_drops_minimal.ply")
+        tiny = read_splats(SHARED / "tiny_gauss.ply")
     assert (len(biker), biker.sh_degree) == (152_746, 0)
     assert (len(fruit), fruit.sh_degree) == (4_721, 3)
     assert (len(tiny), tiny.sh_degree) == (1_432, 3)

@@ -7,7 +7,7 @@ Source: Turk, "The PLY Polygon File Format" (1994).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -36,6 +36,15 @@ class Ply:
     elements: Mapping[str, Columns]
 
 
+@dataclass(frozen=True, eq=False)
+class PlyTable:
+    """An element of an open file: `rows(first, last)` reads some of its rows, column by column."""
+
+    count: int
+    columns: tuple[str, ...]
+    rows: Callable[[int, int], Columns]
+
+
 @dataclass
 class _Element:
     name: str
@@ -50,18 +59,30 @@ def read_ply(path: str | Path) -> Ply:
     Raises:
         FieldError: no such file, no PLY, a header that makes no sense, less data than it says.
     """
+    comments, tables = open_ply(path)
+    return Ply(comments, {name: table.rows(0, table.count) for name, table in tables.items()})
+
+
+def open_ply(path: str | Path) -> tuple[tuple[str, ...], dict[str, PlyTable]]:
+    """(comments, elements) of a PLY file, up to the first with a list property; no rows are read yet.
+
+    Raises:
+        FieldError: as `read_ply`.
+    """
     path = Path(path)
     if not path.is_file():
         raise FieldError(f"{path}: no such file; give a .ply of splats")
     with path.open("rb") as file:
         kind, comments, declared = _header(path, file)
-        elements: dict[str, Columns] = {}
+        tables: dict[str, PlyTable] = {}
         for element in declared:
             if element.has_list:
                 break
             row = np.dtype([(name, _ORDERS[kind] + code) for name, code in element.properties])
-            elements[element.name] = _rows(path, file, kind, element, row)
-    return Ply(tuple(comments), elements)
+            names = tuple(name for name, _ in element.properties)
+            reader = _text(path, file, element) if kind == "ascii" else _binary(path, file, element, row)
+            tables[element.name] = PlyTable(element.count, names, reader)
+    return tuple(comments), tables
 
 
 def _header(path: Path, file: BinaryIO) -> tuple[str, list[str], list[_Element]]:
@@ -100,24 +121,37 @@ def _header(path: Path, file: BinaryIO) -> tuple[str, list[str], list[_Element]]
     raise FieldError(f"{path}: its header has no end; the file may be truncated, copy it again")
 
 
-def _rows(path: Path, file: BinaryIO, kind: str, element: _Element, row: np.dtype[Any]) -> Columns:
-    """The columns of an element, read from where the file stands."""
+def _text(path: Path, file: BinaryIO, element: _Element) -> Callable[[int, int], Columns]:
+    """The rows of an element in text, read at once from where the file stands."""
     names = [name for name, _ in element.properties]
-    if kind == "ascii":
-        lines = [file.readline().split() for _ in range(min(element.count, path.stat().st_size))]
-        try:
-            values = np.array(lines, np.float64).reshape(element.count, len(names))
-        except ValueError:
-            raise FieldError(
-                f"{path}: its {element.count} rows of {element.name} are not {len(names)} numbers each; the "
-                "file may be truncated, copy it again"
-            ) from None
-        return {name: values[:, column] for column, name in enumerate(names)}
-    left = path.stat().st_size - file.tell()
+    lines = [file.readline().split() for _ in range(min(element.count, path.stat().st_size))]
+    try:
+        values = np.array(lines, np.float64).reshape(element.count, len(names))
+    except ValueError:
+        raise FieldError(
+            f"{path}: its {element.count} rows of {element.name} are not {len(names)} numbers each; the "
+            "file may be truncated, copy it again"
+        ) from None
+    return lambda first, last: {name: values[first:last, column] for column, name in enumerate(names)}
+
+
+def _binary(
+    path: Path, file: BinaryIO, element: _Element, row: np.dtype[Any]
+) -> Callable[[int, int], Columns]:
+    """Reads rows of an element that begins where the file stands; the file then stands at its end."""
+    begin, left = file.tell(), path.stat().st_size - file.tell()
     if element.count * row.itemsize > left:
         raise FieldError(
             f"{path}: it says {element.count} of {element.name}, and holds {left // max(1, row.itemsize)}; "
             "it is truncated, copy it again"
         )
-    table = np.frombuffer(file.read(element.count * row.itemsize), row)
-    return {name: table[name] for name in names}
+    file.seek(element.count * row.itemsize, 1)
+
+    def rows(first: int, last: int) -> Columns:
+        count = max(0, min(last, element.count) - first)
+        if not row.itemsize:
+            return {}
+        table = np.fromfile(path, row, count, offset=begin + first * row.itemsize)
+        return {name: table[name] for name in row.names or ()}
+
+    return rows

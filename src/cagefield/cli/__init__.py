@@ -60,6 +60,7 @@ def parse(args: list[str]) -> Command | int:
 
     from cagefield.cli.bake import Bake
     from cagefield.cli.bench import Bench
+    from cagefield.cli.convert import Convert
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
     from cagefield.cli.export import Export
@@ -77,6 +78,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[Poses, tyro.conf.subcommand("poses")]
         | Annotated[Train, tyro.conf.subcommand("train")]
         | Annotated[ImportField, tyro.conf.subcommand("import")]
+        | Annotated[Convert, tyro.conf.subcommand("convert")]
         | Annotated[Bake, tyro.conf.subcommand("bake")]
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from cagefield.cli.options import Baking, BakingOptions, Device, Flag, Output
+from cagefield.cli.options import Axes, Baking, BakingOptions, Device, Flag, Output
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -22,19 +22,21 @@ Unbounded = Literal["auto", "on", "off"]
 
 @dataclass(frozen=True)
 class ImportField:
-    """Read a splat file (.ply, .compressed.ply) or a nerf-pytorch checkpoint (.tar, .ckpt): a scene.
+    """Read a splat file (.ply, .spz, .sog, .splat, .ksplat, .glb) or a checkpoint (.tar, .ckpt): a scene.
 
-    Splats stay splats and keep the file's coordinates; a NeRF is baked into voxels.
+    Splats stay splats and keep the file's coordinates, in the axes of PLY; a NeRF is baked into voxels.
     """
 
     file: tyro.conf.Positional[Path]
-    """Splats in 3DGS' or PlayCanvas' layout, or a checkpoint of yenchenlin's or krrish94's nerf-pytorch."""
+    """Splats, or a checkpoint of nerfstudio's splatfacto, yenchenlin's or krrish94's nerf-pytorch."""
     out: Output
     """Scene folder."""
     data: Path | None = None
     """Data set it was trained on: its cameras become the scene's; cameras all around if left out."""
     up: Up = "y-down"
     """Which way splats are turned, where --data is left out: most files have y pointing down."""
+    axes: Axes | None = None
+    """Where x, y and z of the file point, such as rdf (right, down, front); left out, as its format says."""
     unbounded: Unbounded = "auto"
     """Splats far away are surroundings: auto where they are much farther than most."""
     config: Path | None = None
@@ -50,12 +52,13 @@ class ImportField:
 
     def run(self) -> None:
         """Reads, bakes where it must, and writes; prints what it found."""
+        from cagefield.formats.splat_files import holds_splats
         from cagefield.scene_files import check_destination
 
         check_destination(self.out, self.overwrite)
         if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:
             raise CagefieldError(f"--fov-deg is {self.fov_deg}; it must be from 1 to 170")
-        if self.file.suffix.lower() == ".ply":
+        if holds_splats(self.file):
             scene, lines = self._splats()
         else:
             scene, lines = self._nerf()
@@ -64,14 +67,14 @@ class ImportField:
 
     def _splats(self) -> tuple[Scene, str]:
         """The scene of a splat file, and lines that say what it holds."""
+        from cagefield.formats.splat_files import read_splats
         from cagefield.formats.splat_import import import_splats
-        from cagefield.formats.splat_ply import read_splat_ply
         from cagefield.scene import Scene
 
         if self.config is not None or self.fov_deg is not None:
             raise CagefieldError("--config and --fov-deg are for NeRFs; leave them out for splats")
         imported = import_splats(
-            read_splat_ply(self.file),
+            read_splats(self.file, self.axes),
             self.up,
             dataset=self._dataset(),
             unbounded={"auto": None, "on": True, "off": False}[self.unbounded],
@@ -93,8 +96,8 @@ class ImportField:
         from cagefield.formats.nerf_pytorch_config import Settings, find_config, read_config
         from cagefield.formats.nerf_pytorch_import import import_nerf
 
-        if self.up != "y-down" or self.unbounded != "auto":
-            raise CagefieldError("--up and --unbounded are for splats; leave them out for a NeRF")
+        if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
+            raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")
         found = read_checkpoint(self.file)
         config = self.config or find_config(self.file)
         settings = Settings() if config is None else read_config(config)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Device = Annotated[
     Literal["auto", "cpu", "cuda", "metal", "vulkan"], tyro.conf.arg(help="Where kernels run.")
 ]
+Axes = Literal["rdf", "rub", "luf", "ruf", "ldb", "rdb", "ldf", "lub"]
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]
 Flag = tyro.conf.FlagCreatePairsOff[bool]

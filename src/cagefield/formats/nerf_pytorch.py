@@ -13,9 +13,7 @@ Depth, width, skips and octaves are what the tensors' shapes say; a config's are
 
 from __future__ import annotations
 
-import pickle
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +24,7 @@ from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.mlp import Linear, Mlp
+from cagefield.formats.torch_files import read_tensors_of
 
 YENCHENLIN = ("network_fn_state_dict", "network_fine_state_dict")
 _KRRISH94 = "krrish94/nerf-pytorch"
@@ -57,7 +56,7 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
             tensors and plain values (it is not unpickled), tensors that are missing, unknown or misshapen.
     """
     path = Path(path)
-    content = _unpickled(path)
+    content = read_tensors_of(path)
     for project, names, read in (
         ("yenchenlin/nerf-pytorch", YENCHENLIN, _yenchenlin),
         (_KRRISH94, KRRISH94, _krrish94),
@@ -76,41 +75,6 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
         f"{path}: no nerf-pytorch checkpoint: it holds {_listed(content)}; expected {YENCHENLIN[0]!r} or "
         f"{KRRISH94[0]!r}"
     )
-
-
-def _unpickled(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise FieldError(f"{path}: no such checkpoint; give the .tar or .ckpt file that nerf-pytorch wrote")
-    try:
-        import torch
-    except ImportError as error:
-        raise FieldError(
-            f"{path}: reading a checkpoint needs PyTorch, which is not installed; "
-            "pip install 'cagefield[nerf]'"
-        ) from error
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # torch's, of pickles that are refused anyway
-            content = torch.load(path, map_location="cpu", weights_only=True)
-    except pickle.UnpicklingError as error:
-        found = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
-        what = f" ({found.group(1)})" if found else ""
-        raise FieldError(
-            f"{path}: holds Python objects beside tensors{what}, or is no checkpoint; unpickling those can "
-            "run any code, so it is refused; save the two state dicts alone with torch.save and read that"
-        ) from error
-    except (RuntimeError, EOFError, OSError, ValueError, KeyError, AttributeError) as error:
-        # An end too early has no text, a wrong opcode is a KeyError of its number.
-        reason = "" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
-        raise FieldError(
-            f"{path}: not a readable checkpoint ({reason or 'no file of torch.save'}); it may be truncated, "
-            "copy it again"
-        ) from error
-    if not isinstance(content, dict):
-        raise FieldError(
-            f"{path}: holds a {type(content).__name__}, expected the dict that nerf-pytorch saves"
-        )
-    return content
 
 
 class _State:

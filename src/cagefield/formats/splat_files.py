@@ -1,23 +1,226 @@
-"""Splat files by their names' ends."""
+"""Splat files by their names: one way to read, write and convert all of them.
+
+| ending | format | read | written |
+| --- | --- | --- | --- |
+| .ply | 3DGS, and what follows it | yes | yes |
+| .compressed.ply | PlayCanvas | yes | yes |
+| .spz | Niantic, versions 1 to 4 | yes | 3 |
+| .sog, a folder with meta.json | PlayCanvas, versions 1 and 2 | yes | 2, as one file |
+| .splat | antimatter15 | yes | yes |
+| .ksplat | mkkellogg | yes | no |
+| .glb | KHR_gaussian_splatting | yes | yes |
+| .ckpt | nerfstudio's splatfacto | yes | no |
+"""
 
 from __future__ import annotations
 
+import dataclasses
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
+
+from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_ply import read_splat_ply, write_splat_ply
+from cagefield.formats.splat_axes import PLY, Axes, with_axes
+from cagefield.formats.splat_compressed_ply import open_compressed_ply, write_compressed_ply
+from cagefield.formats.splat_gltf import GLTF_AXES, open_splat_gltf, write_splat_gltf
+from cagefield.formats.splat_ksplat import open_ksplat
+from cagefield.formats.splat_nerfstudio import is_splatfacto, open_splatfacto
+from cagefield.formats.splat_ply import open_splat_ply, write_splat_ply
+from cagefield.formats.splat_rows import open_splat_rows, write_splat_rows
+from cagefield.formats.splat_sog import META, open_sog
+from cagefield.formats.splat_sog_writer import write_sog
+from cagefield.formats.splat_spz import SPZ_AXES, open_spz, write_spz
+from cagefield.formats.splat_table import (
+    FieldTable,
+    OnProgress,
+    SplatBatch,
+    SplatSource,
+    SplatTable,
+    cleaned,
+    spooled,
+)
+from cagefield.ply import open_ply
+
+READABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".ckpt", META)
+WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
+
+_OPEN: dict[str, Callable[[Path], SplatSource]] = {
+    ".spz": open_spz,
+    ".sog": open_sog,
+    ".splat": open_splat_rows,
+    ".ksplat": open_ksplat,
+    ".glb": open_splat_gltf,
+    ".ckpt": open_splatfacto,
+}
+_WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] = {
+    ".ply": (write_splat_ply, PLY),
+    ".compressed.ply": (write_compressed_ply, PLY),
+    ".spz": (write_spz, SPZ_AXES),
+    ".sog": (write_sog, PLY),
+    ".splat": (write_splat_rows, PLY),
+    ".glb": (write_splat_gltf, GLTF_AXES),
+}
 
 
-def read_splats(path: str | Path, axes: str | None = None) -> SplatField:
-    """The splats of a file. Raises FieldError where there are none."""
-    if Path(path).suffix.lower() != ".ply":
-        raise FieldError(f"{path}: splats are read from .ply; give such a file")
-    return read_splat_ply(path)
+def ending_of(path: Path) -> str:
+    """The ending that says a file's format, such as ".compressed.ply"; "" where it is none of them."""
+    name = path.name.lower()
+    if path.is_dir() or name == META:
+        return META
+    return max((ending for ending in READABLE if name.endswith(ending)), key=len, default="")
 
 
-def write_splats(field: SplatField, path: str | Path, axes: str | None = None) -> None:
-    """Writes splats to a file, complete or not at all."""
-    if Path(path).suffix.lower() != ".ply":
-        raise FieldError(f"{path}: splats are written as .ply; give such a name")
-    write_splat_ply(path, field)
+def read_splats(
+    path: str | Path, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
+) -> SplatField:
+    """The splats of a file, in PLY's axes (x right, y down, z forwards).
+
+    `axes` are those that the file is in, where it is wrong or silent about them. Splats with a value that is
+    no number are left out with one warning.
+
+    Raises:
+        FieldError: no such file, a format that is not known, a file that is damaged or holds no splats.
+    """
+    source = open_splats(Path(path))
+    count, degree = source.count, min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
+    shapes = ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
+    arrays = [np.empty((count, *shape), np.float32) for shape in shapes]
+    done = 0
+    for batch in _batches(source, axes):
+        parts = (batch.means, batch.log_scales, batch.quaternions, batch.opacities, batch.sh)
+        for array, part in zip(arrays, parts, strict=True):
+            array[done : done + len(batch)] = part
+        done += len(batch)
+        on_progress(done / count)
+    means, log_scales, quaternions, opacities, sh = (array[:done] for array in arrays)
+    return SplatField(means, log_scales, quaternions, opacities, sh, antialiased=source.antialiased)
+
+
+def write_splats(
+    field: SplatField,
+    path: str | Path,
+    axes: Axes | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> None:
+    """Writes the splats of a field in PLY's axes as the format of the path's ending, whole or not at all.
+
+    `axes` are those to write in place of the format's own.
+
+    Raises:
+        FieldError: a format that cannot be written, or a field without splats.
+    """
+    if not len(field):
+        raise FieldError(f"{path}: there are no splats to write")
+    _write(FieldTable(field), Path(path), axes, on_progress)
+
+
+def convert_splats(
+    source: str | Path,
+    target: str | Path,
+    *,
+    axes: Axes | None = None,
+    target_axes: Axes | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> tuple[int, int]:
+    """(number of splats, degree of their harmonics) that went from one file into another, by a temporary one.
+
+    Memory does not grow with their number, but for a byte or two each in images and codes.
+
+    Raises:
+        FieldError: as `read_splats` and `write_splats`.
+    """
+    writer_of(Path(target))
+    found = open_splats(Path(source))
+    degree = min(found.sh_degree, spherical_harmonics.MAX_DEGREE)
+    with spooled(
+        _batches(found, axes), degree, found.antialiased, found.count, lambda share: on_progress(0.4 * share)
+    ) as table:
+        _write(table, Path(target), target_axes, lambda share: on_progress(0.4 + 0.6 * share))
+        return table.count, degree
+
+
+def open_splats(path: Path) -> SplatSource:
+    """The open file of splats; its values are read when its batches are.
+
+    Raises:
+        FieldError: no such file, a format that is not known, a file that is damaged.
+    """
+    if not path.exists():
+        raise FieldError(f"{path}: no such file; give a file of splats ({', '.join(READABLE[:-1])})")
+    ending = ending_of(path)
+    if ending == META:
+        return open_sog(path)
+    if ending.endswith(".ply"):
+        _, tables = open_ply(path)
+        packed = "vertex" in tables and "packed_position" in tables["vertex"].columns
+        return (open_compressed_ply if packed else open_splat_ply)(path)
+    if ending not in _OPEN:
+        raise FieldError(f"{path}: no format of splats that is known; these are: {', '.join(READABLE)}")
+    return _OPEN[ending](path)
+
+
+def holds_splats(path: Path) -> bool:
+    """Whether a file is one of splats, by its ending; a checkpoint, by what it holds."""
+    ending = ending_of(path)
+    return is_splatfacto(path) if ending == ".ckpt" else bool(ending)
+
+
+def writer_of(path: Path) -> tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]:
+    """(what writes the format of a path's ending, its axes).
+
+    Raises:
+        FieldError: a format that is not written.
+    """
+    ending = ending_of(path)
+    if ending not in _WRITE:
+        raise FieldError(f"{path}: no format of splats that is written; these are: {', '.join(WRITABLE)}")
+    return _WRITE[ending]
+
+
+def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
+    """The splats that can be shown, in PLY's axes, with harmonics of a degree that a field may have."""
+    most = spherical_harmonics.MAX_DEGREE
+    if source.sh_degree > most:
+        warnings.warn(
+            f"{source.path}: its harmonics have degree {source.sh_degree}; those above {most} are left out",
+            stacklevel=3,
+        )
+    kept = (min(source.sh_degree, most) + 1) ** 2
+    for batch in cleaned(source, source.batches()):
+        cut = dataclasses.replace(batch, sh=batch.sh[:, :kept])
+        yield with_axes(cut, axes or source.axes, PLY)
+
+
+def _write(table: SplatTable, path: Path, axes: Axes | None, on_progress: OnProgress) -> None:
+    write, own = writer_of(path)
+    write(path, _Turned(table, axes or own), on_progress)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Turned:
+    """A table in other axes than PLY's."""
+
+    table: SplatTable
+    axes: str
+
+    @property
+    def count(self) -> int:
+        return self.table.count
+
+    @property
+    def sh_degree(self) -> int:
+        return self.table.sh_degree
+
+    @property
+    def antialiased(self) -> bool:
+        return self.table.antialiased
+
+    def batches(self) -> Iterator[SplatBatch]:
+        return (with_axes(batch, PLY, self.axes) for batch in self.table.batches())
+
+    def sorted_batches(self) -> Iterator[SplatBatch]:
+        return (with_axes(batch, PLY, self.axes) for batch in self.table.sorted_batches())

@@ -1,0 +1,50 @@
+"""`cagefield convert`: a splat file as one of another format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from cagefield.cli.options import Axes, Flag, progress_bar
+from cagefield.errors import CagefieldError
+
+
+@dataclass(frozen=True)
+class Convert:
+    """Write a splat file in another format, by its ending: .ply, .compressed.ply, .spz, .sog, .splat, .glb.
+
+    Memory does not grow with the number of splats. .ksplat and splatfacto's checkpoints are read, too.
+    """
+
+    file: tyro.conf.Positional[Path]
+    """Splats."""
+    out: tyro.conf.Positional[Path]
+    """File to write."""
+    axes: Axes | None = None
+    """Where x, y and z of the file point: right or left, up or down, front or back; as its format says."""
+    out_axes: Axes | None = None
+    """Axes to write; left out, those of the format."""
+    overwrite: Flag = False
+    """Replace the file that is there."""
+
+    def run(self) -> None:
+        """Converts; prints what was written."""
+        from cagefield.formats.splat_files import convert_splats, writer_of
+
+        writer_of(self.out)
+        if self.out.exists() and not self.overwrite:
+            raise CagefieldError(f"{self.out} exists; add --overwrite to replace it")
+        if self.out.exists() and self.out.samefile(self.file):
+            raise CagefieldError(f"{self.out} is the file to be converted; write to another one")
+        with progress_bar("Converting") as move:
+            count, degree = convert_splats(
+                self.file,
+                self.out,
+                axes=self.axes,
+                target_axes=self.out_axes,
+                on_progress=lambda share: move(share, 1.0, ""),
+            )
+        size = self.out.stat().st_size / 1e6
+        print(f"{count} splats, SH degree {degree}, {size:.3g} MB written to {self.out}")

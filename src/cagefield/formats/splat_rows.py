@@ -1,0 +1,66 @@
+"""antimatter15's .splat: 32 bytes a splat, nothing else.
+
+Position (3 float32), scales (3 float32, not logarithms), colour and opacity (4 uint8: .5 + C0 times the
+coefficient of degree 0, in [0, 1]), rotation (4 uint8, w x y z: 128 + 128 q). No harmonics, no header.
+
+Source: antimatter15/splat, convert.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from cagefield import sh as spherical_harmonics
+from cagefield.atomic_files import replaced_file
+from cagefield.errors import FieldError
+from cagefield.formats.splat_axes import PLY
+from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+
+_ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rotation", "u1", 4)])
+
+
+def open_splat_rows(path: Path) -> SplatSource:
+    """The splats of a .splat file.
+
+    Raises:
+        FieldError: a size that is no multiple of 32 bytes.
+    """
+    size = path.stat().st_size
+    if not size or size % _ROW.itemsize:
+        raise FieldError(f"{path}: {size} bytes are no whole number of splats of 32; copy the file again")
+    count = size // _ROW.itemsize
+
+    def batches() -> Iterator[SplatBatch]:
+        for first in range(0, count, BATCH):
+            rows = np.fromfile(path, _ROW, min(BATCH, count - first), offset=first * _ROW.itemsize)
+            yield of_rows(rows["mean"], rows["scale"], rows["rgba"], rows["rotation"])
+
+    return SplatSource(path, count, 0, PLY, batches)
+
+
+def of_rows(mean, scale, rgba, rotation) -> SplatBatch:  # type: ignore[no-untyped-def]
+    """Splats of means, linear scales, colours and opacities in 8 bits, and rotations in 8 bits."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_scales = np.log(scale.astype(np.float64))
+    colour = (rgba[:, :3] / 255.0 - 0.5) / spherical_harmonics.C0
+    quaternions = (rotation.astype(np.float64) - 128.0) / 128.0
+    return SplatBatch(mean, log_scales, quaternions, rgba[:, 3] / 255.0, colour[:, None])
+
+
+def write_splat_rows(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
+    """Writes the splats in their order, complete or not at all; harmonics are left out."""
+    with replaced_file(path) as temporary, temporary.open("wb") as out:
+        done = 0
+        for batch in table.batches():
+            rows = np.zeros(len(batch), _ROW)
+            rows["mean"], rows["scale"] = batch.means, np.exp(batch.log_scales)
+            colour = batch.sh[:, 0].astype(np.float64) * spherical_harmonics.C0 + 0.5
+            rgba = np.concatenate([colour, batch.opacities[:, None]], axis=1)
+            rows["rgba"] = np.clip(rgba * 255.0 + 0.5, 0, 255)
+            rows["rotation"] = np.clip(np.round(batch.quaternions.astype(np.float64) * 128.0 + 128.0), 0, 255)
+            out.write(rows.tobytes())
+            done += len(batch)
+            on_progress(done / table.count)

@@ -1,0 +1,330 @@
+"""Niantic's SPZ, versions 1 to 4: one stream a quantity, quantised and compressed.
+
+Version 1 to 3: gzip of a header of 16 bytes (magic "NGSP", version, count, degree of the harmonics, bits of
+the fraction, flags, a reserved byte) and the streams one after the other. Version 4: a header of 32 bytes, a
+table of contents, and one Zstandard frame a stream. Streams:
+
+    positions   3 x 24-bit fixed point (version 1: 3 x float16)
+    opacities   uint8, in [0, 1]
+    colours     3 x uint8: f_dc = (u / 255 - .5) / .15
+    scales      3 x uint8: log scale = u / 16 - 10
+    rotations   versions 1, 2: x y z as uint8, u / 127.5 - 1, w >= 0; 3, 4: the smallest three, 9 bits and a
+                sign each, and the index of the largest (x y z w)
+    harmonics   uint8, (u - 128) / 128, coefficient by coefficient, rgb inner
+
+Axes are "rub", unless the extension SPZ_ADBE_coordinate_system of a version 4 file says otherwise.
+
+Source: nianticlabs/spz, src/cc/load-spz.cc and README.md.
+"""
+
+from __future__ import annotations
+
+import gzip
+import struct
+import tempfile
+import zlib
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any, BinaryIO, Literal, cast
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from cagefield.atomic_files import replaced_file
+from cagefield.errors import FieldError
+from cagefield.formats.splat_axes import AXES, Axes
+from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+from cagefield.typing import AnyArray
+
+SPZ_AXES: Axes = "rub"
+FRACTION = 12
+"""Bits of the fraction of positions in files that are written, where they fit."""
+
+_MAGIC = b"NGSP"
+_OLD, _NEW = struct.Struct("<4sIIBBBB"), struct.Struct("<4sIIBBBBI12s")
+_ANTIALIASED, _EXTENSIONS = 1, 2
+_COORDINATES = 0xADBE0003
+_COLOUR = 0.15
+_MOST_RATIO = 1040
+"""Deflate packs 1032 bytes into one at most; what claims to hold more is damaged."""
+
+_FIRST_STEP, _STEP = 8, 16
+"""Steps to which harmonics of degree 1 and above it are rounded, as Niantic's own writer does."""
+
+# Coordinate systems of the extension, by their number.
+_SYSTEMS = (None, "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf")
+
+
+def open_spz(path: Path) -> SplatSource:
+    """The splats of a .spz file, decompressed to a temporary one.
+
+    Raises:
+        FieldError: a file that is no SPZ, of a version that is not known, or damaged.
+    """
+    with path.open("rb") as file:
+        start = file.read(_NEW.size)
+        if start[:4] == _MAGIC:
+            return _open_new(path, file, start)
+        file.seek(0)
+        try:
+            with gzip.open(file) as stream:
+                return _open_old(path, stream)
+        except (OSError, EOFError, zlib.error):
+            raise _damaged(path, "it is no gzip that can be read to its end") from None
+
+
+def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
+    header = stream.read(_OLD.size)
+    if len(header) < _OLD.size or header[:4] != _MAGIC:
+        raise _damaged(path, "it does not begin as SPZ does")
+    _, version, count, degree, fraction, flags, _ = _OLD.unpack(header)
+    if not 1 <= version <= 3:
+        raise FieldError(f"{path}: SPZ of version {version}; 1 to 4 are read")
+    widths = _widths(path, version, count, degree)
+    spool = _spool()
+    left = sum(widths) * count
+    while left:
+        part = stream.read(min(left, 1 << 24))
+        if not part:
+            raise _damaged(path, f"it ends {left} bytes early")
+        spool.write(part)
+        left -= len(part)
+    return _source(path, spool, widths, version, count, degree, fraction, flags, SPZ_AXES)
+
+
+def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
+    if len(start) < _NEW.size:
+        raise _damaged(path, "its header is cut off")
+    _, version, count, degree, fraction, flags, streams, contents, _ = _NEW.unpack(start)
+    if version != 4:
+        # Files of versions 1 to 3 that were left uncompressed.
+        file.seek(0)
+        return _open_old(path, file)
+    widths = _widths(path, version, count, degree)
+    axes = SPZ_AXES
+    if flags & _EXTENSIONS:
+        axes = _axes_said(file.read(max(0, contents - _NEW.size)), axes)
+    file.seek(contents)
+    table = file.read(16 * streams)
+    expected = [width * count for width in widths if width]
+    raw = [size for _, size in struct.iter_unpack("<QQ", table)] if len(table) == 16 * streams else []
+    if raw != expected:
+        raise _damaged(path, f"its streams have {raw} bytes, expected {expected}")
+    spool, at = _spool(), contents + len(table)
+    for packed, size in struct.iter_unpack("<QQ", table):
+        left = size
+        try:
+            with zstandard.ZstdDecompressor().stream_reader(cast(Any, _Part(file, at, packed))) as reader:
+                while left and (part := reader.read(min(left, 1 << 24))):
+                    spool.write(part)
+                    left -= len(part)
+        except zstandard.ZstdError:
+            left = max(left, 1)
+        if left:
+            raise _damaged(path, "one of its streams cannot be decompressed")
+        at += packed
+        if at > path.stat().st_size:
+            raise _damaged(path, "its streams end after the file")
+    return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
+
+
+class _Part:
+    """Some bytes of a file, and no more."""
+
+    def __init__(self, file: BinaryIO, begin: int, size: int) -> None:
+        self._file, self._at, self._left = file, begin, size
+
+    def read(self, size: int = -1) -> bytes:
+        self._file.seek(self._at)
+        part = self._file.read(min(size if size >= 0 else 1 << 20, self._left))
+        self._at += len(part)
+        self._left -= len(part)
+        return part
+
+
+def _axes_said(extensions: bytes, axes: Axes) -> Axes:
+    """The axes that an extension states: records of type (uint32), length (uint32) and content."""
+    at = 0
+    while at + 8 <= len(extensions):
+        kind, length = struct.unpack_from("<II", extensions, at)
+        if kind == _COORDINATES and length >= 1 and at + 8 < len(extensions):
+            number = extensions[at + 8]
+            said = _SYSTEMS[number] if number < len(_SYSTEMS) else None
+            return said if said in AXES else axes  # type: ignore[return-value]
+        at += 8 + length
+    return axes
+
+
+def _widths(path: Path, version: int, count: int, degree: int) -> tuple[int, ...]:
+    """Bytes of a splat in each stream. Raises FieldError where the file cannot hold so many."""
+    if degree > 4:
+        raise _damaged(path, f"harmonics of degree {degree}; at most 4 exist")
+    rotation = 3 if version < 3 else 4
+    widths = (6 if version == 1 else 9, 1, 3, 3, rotation, 3 * ((degree + 1) ** 2 - 1))
+    if not count or sum(widths) * count > _MOST_RATIO * path.stat().st_size:
+        raise _damaged(path, f"it says that it holds {count} splats")
+    return widths
+
+
+def _spool() -> IO[bytes]:
+    """A temporary file, in memory while it is small; it ends with the source."""
+    return cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 26))
+
+
+def _source(
+    path: Path,
+    spool: IO[bytes],
+    widths: tuple[int, ...],
+    version: int,
+    count: int,
+    degree: int,
+    fraction: int,
+    flags: int,
+    axes: Axes,
+) -> SplatSource:
+    begins = np.concatenate([[0], np.cumsum(widths)]) * count
+
+    def column(number: int, first: int, last: int) -> NDArray[np.uint8]:
+        spool.seek(int(begins[number]) + first * widths[number])
+        return np.frombuffer(spool.read((last - first) * widths[number]), np.uint8).reshape(last - first, -1)
+
+    def batches() -> Iterator[SplatBatch]:
+        for first in range(0, count, BATCH):
+            last = min(first + BATCH, count)
+            positions, alpha, colours, scales, turns, rest = (
+                column(number, first, last) if widths[number] else np.zeros((last - first, 0), np.uint8)
+                for number in range(6)
+            )
+            sh = np.concatenate([(colours / 255.0 - 0.5) / _COLOUR, (rest - 128.0) / 128.0], axis=1)
+            yield SplatBatch(
+                positions.view("<f2").astype(np.float64) if version == 1 else _fixed(positions, fraction),
+                scales / 16.0 - 10.0,
+                _first_three(turns) if version < 3 else _smallest_three(turns.view("<u4")[:, 0]),
+                alpha[:, 0] / 255.0,
+                sh.reshape(last - first, -1, 3),
+            )
+
+    return SplatSource(path, count, degree, axes, batches, bool(flags & _ANTIALIASED))
+
+
+def write_spz(
+    path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Literal[3, 4] = 3
+) -> None:
+    """Writes splats in SPZ's axes, sorted through space: version 3, which every viewer reads, or 4.
+
+    Positions have 12 bits of fraction, fewer where they do not fit: half a step is 1.2e-4 units.
+    """
+    with ExitStack() as stack:
+        columns = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(6)]
+        fraction = _fraction_for(table)
+        done = 0
+        for batch in table.sorted_batches():
+            for file, values in zip(columns, _encoded(batch, fraction), strict=True):
+                file.write(values.tobytes())
+            done += len(batch)
+            on_progress(0.6 * done / table.count)
+        flags = _ANTIALIASED if table.antialiased else 0
+        sizes = [file.tell() for file in columns]
+        for file in columns:
+            file.seek(0)
+        with replaced_file(path) as temporary, temporary.open("wb") as out:
+            if version == 3:
+                with gzip.GzipFile(fileobj=out, mode="wb", filename="", mtime=0) as packed:
+                    packed.write(_OLD.pack(_MAGIC, 3, table.count, table.sh_degree, fraction, flags, 0))
+                    for number, file in enumerate(columns):
+                        _copy(file, packed)
+                        on_progress(0.6 + 0.4 * (number + 1) / 6)
+                return
+            used = [(file, size) for file, size in zip(columns, sizes, strict=True) if size]
+            head = (_MAGIC, 4, table.count, table.sh_degree, fraction, flags, len(used), _NEW.size, b"")
+            out.write(_NEW.pack(*head) + bytes(16 * len(used)))
+            entries = []
+            for number, (file, size) in enumerate(used):
+                begin = out.tell()
+                zstandard.ZstdCompressor(level=12).copy_stream(file, out, size=size)
+                entries.append((out.tell() - begin, size))
+                on_progress(0.6 + 0.4 * (number + 1) / len(used))
+            out.seek(_NEW.size)
+            out.write(b"".join(struct.pack("<QQ", *entry) for entry in entries))
+
+
+def _copy(source: IO[bytes], target: Any) -> None:
+    while part := source.read(1 << 22):
+        target.write(part)
+
+
+def _fraction_for(table: SplatTable) -> int:
+    most = max(float(np.abs(batch.means).max()) for batch in table.batches())
+    return int(np.clip(np.floor(np.log2((2**23 - 1) / max(most, 1e-30))), 0, FRACTION))
+
+
+def _encoded(batch: SplatBatch, fraction: int) -> tuple[AnyArray, ...]:
+    fixed = np.clip(np.round(batch.means.astype(np.float64) * 2.0**fraction), -(2**23), 2**23 - 1)
+    positions = fixed.astype("<i4").view(np.uint8).reshape(len(batch), 3, 4)[:, :, :3]
+    colours = batch.sh[:, 0].astype(np.float64) * (_COLOUR * 255.0) + 0.5 * 255.0
+    rest = batch.sh[:, 1:].astype(np.float64).reshape(len(batch), -1)
+    steps = np.full(rest.shape[1], _STEP)
+    steps[:9] = _FIRST_STEP
+    rest = np.round(rest * 128.0) + 128.0
+    rest = np.floor((rest + steps / 2) / steps) * steps
+    return (
+        positions,
+        _bytes(batch.opacities.astype(np.float64) * 255.0),
+        _bytes(colours),
+        _bytes((batch.log_scales.astype(np.float64) + 10.0) * 16.0),
+        _packed_rotations(batch.quaternions),
+        _bytes(rest),
+    )
+
+
+def _bytes(values: AnyArray) -> NDArray[np.uint8]:
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+
+
+def _fixed(positions: NDArray[np.uint8], fraction: int) -> AnyArray:
+    """24-bit fixed point numbers [n,9] as [n,3]."""
+    whole = np.zeros((len(positions), 3, 4), np.uint8)
+    whole[:, :, 1:] = positions.reshape(-1, 3, 3)
+    return (whole.view("<i4")[:, :, 0] >> 8) / 2.0**fraction
+
+
+def _first_three(turns: NDArray[np.uint8]) -> AnyArray:
+    xyz = turns / 127.5 - 1.0
+    w = np.sqrt(np.maximum(0.0, 1.0 - (xyz**2).sum(axis=1)))
+    return np.concatenate([w[:, None], xyz], axis=1)
+
+
+def _smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
+    """Quaternions [n,4] (w x y z)."""
+    largest = (packed >> 30).astype(np.int64)
+    xyzw = np.zeros((len(packed), 4))
+    rest = packed.astype(np.uint32)
+    for axis in (3, 2, 1, 0):
+        here = largest != axis
+        value = (rest & 511) / 511.0 * np.sqrt(0.5) * np.where(rest >> 9 & 1, -1.0, 1.0)
+        xyzw[here, axis] = value[here]
+        rest = np.where(here, rest >> 10, rest)
+    np.put_along_axis(
+        xyzw, largest[:, None], np.sqrt(np.maximum(0.0, 1.0 - (xyzw**2).sum(axis=1)))[:, None], axis=1
+    )
+    return xyzw[:, [3, 0, 1, 2]]
+
+
+def _packed_rotations(quaternions: AnyArray) -> NDArray[np.uint32]:
+    xyzw = quaternions.astype(np.float64)[:, [1, 2, 3, 0]]
+    largest = np.abs(xyzw).argmax(axis=1)
+    negated = np.take_along_axis(xyzw, largest[:, None], axis=1) < 0.0
+    xyzw = np.where(negated, -xyzw, xyzw)
+    packed = largest.astype(np.uint32)
+    for axis in range(4):
+        here = largest != axis
+        size = np.clip(np.round(np.abs(xyzw[:, axis]) * np.sqrt(2.0) * 511.0), 0, 511).astype(np.uint32)
+        value = size | (xyzw[:, axis] < 0.0).astype(np.uint32) << np.uint32(9)
+        packed = np.where(here, packed << np.uint32(10) | value, packed)
+    return packed.astype("<u4")
+
+
+def _damaged(path: Path, why: str) -> FieldError:
+    return FieldError(f"{path}: no SPZ file that can be read: {why}; copy or export it again")
