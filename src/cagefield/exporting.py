@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from cagefield.cages import Cage
 from cagefield.camera_paths import shared_up
@@ -24,7 +23,7 @@ from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.baking import bake
 from cagefield.fields.meshing import Mesh, mesh_of
 from cagefield.fields.splat import SplatField
-from cagefield.rendering.deformed_splats import deformed_splats
+from cagefield.rendering.baked_splats import baked_splats
 from cagefield.rendering.edited_field import EditedField, edited_bounds
 from cagefield.scene import Scene
 from cagefield.training.splat_config import SplatConfig
@@ -54,22 +53,7 @@ def baked(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
     if not isinstance(scene.field, SplatField):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
-    if not scene.edits.active:
-        return scene.field
-    deformed = deformed_splats(scene.field, scene.edits, preserve_opacity=scene.preserve_opacity)
-    full = deformed.covariances[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3).astype(np.float64)
-    values, axes = np.linalg.eigh(full)
-    axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0
-    return SplatField(
-        deformed.means,
-        0.5 * np.log(np.maximum(values, 1e-20)),
-        np.roll(Rotation.from_matrix(axes).as_quat(), 1, axis=1),
-        deformed.opacities,
-        deformed.sh,
-        scene.field.antialiased,
-        edited_bounds(scene.field.bounds, scene.edits),
-        scene.field.unbounded,
-    )
+    return baked_splats(scene.field, scene.edits, preserve_opacity=scene.preserve_opacity)
 
 
 def fitted_splats(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from cagefield.cli.options import Device, Flag, Output, check_file, progress_bar, stages
+from cagefield.cli.options import Axes, Device, Flag, Output, check_file, progress_bar, stages
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -35,8 +35,9 @@ class Export:
     selection: str | None = None
     """Only what a cage holds: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
-    axes: str = "auto"
-    """Axes of a file of splats: auto, those that its format has; or rdf, rub, ..."""
+    axes: Axes | None = None
+    """Axes of a file of splats: where x, y and z point, right or left, up or down, front or back; left out,
+    those of its format. Coordinates of the scene count as rdf, those of 3DGS' .ply."""
     splats: int | None = None
     """Most splats that are fitted, or points; left out, as many as the pictures' detail and the time allow,
     300,000 at most."""
@@ -66,9 +67,14 @@ class Export:
     def _check(self) -> None:
         """Refuses what cannot be written before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
+        from cagefield.formats.splat_files import writer_of
 
         check_file(self.out, self.overwrite)
         suffix = self.out.suffix.lower()
+        if self.what == "splats":
+            writer_of(self.out)
+        elif self.axes is not None:
+            raise CagefieldError("--axes are for splats; leave them out for a mesh or points")
         if self.what == "mesh" and suffix not in MESH_SUFFIXES:
             raise CagefieldError(f"{self.out}: a mesh is written as .ply or .glb; give such a name")
         if self.what == "points" and suffix != ".ply":
@@ -88,7 +94,7 @@ class Export:
             splats, figures = self._fitted(scene)
         if cages:
             splats = splats.take(inside(cages, splats.means))
-        write_splats(splats, self.out, None if self.axes == "auto" else self.axes)
+        write_splats(splats, self.out, self.axes)
         return f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
 
     def _fitted(self, scene: Scene) -> tuple[SplatField, str]:

@@ -16,7 +16,9 @@ from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
+from cagefield.formats.splat_sog import META
 from cagefield.scene import Scene
+from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
@@ -32,7 +34,8 @@ def open_scene(path: Path, device: str = "auto") -> tuple[Coordinator, server_me
 
     What a crash left is restored. Raises CagefieldError for a folder that is no scene, a file without splats.
     """
-    if path.is_file():
+    path = path.parent if path.name == META else path
+    if path.is_file() or ((path / META).is_file() and not is_scene(path)):
         return open_cached(scene_of_file(path), path, device)
     return open_cached(path, None, device)
 

@@ -12,7 +12,6 @@ import shutil
 import time
 from pathlib import Path
 
-from cagefield.errors import SceneError
 from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import stem_of
 
@@ -28,7 +27,7 @@ def opened_folder() -> Path:
 
 
 def scene_of_file(file: Path) -> Path:
-    """The scene's folder, in the cache, of a splat file; read where it is not there yet.
+    """The scene's folder, in the cache, of a splat file or .sog's folder; read where it is not there yet.
 
     Raises CagefieldError for a file that holds no splats.
     """
@@ -49,12 +48,11 @@ def scene_of_file(file: Path) -> Path:
 
 def _digest(file: Path) -> str:
     """A name for the content of a file."""
-    if not file.is_file():
-        raise SceneError(f"{file} does not exist; give a scene's folder or a file of splats")
     content = hashlib.blake2b(digest_size=8)
-    with file.open("rb") as stream:
-        while block := stream.read(_BLOCK):
-            content.update(block)
+    for part in sorted(file.iterdir()) if file.is_dir() else [file]:
+        with part.open("rb") as stream:
+            while block := stream.read(_BLOCK):
+                content.update(block)
     return content.hexdigest()
 
 
