@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from cagefield.server.render_queue.damage import Differing, everywhere
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import (
     MOST_MOVING,
@@ -21,8 +22,8 @@ RATE = 1e6
 class Bench:
     """A scheduler with a renderer of RATE rays a second, and pages that show pictures when told to."""
 
-    def __init__(self, rate: float = RATE) -> None:
-        self.scheduler = Scheduler()
+    def __init__(self, rate: float = RATE, differing: Differing = everywhere) -> None:
+        self.scheduler = Scheduler(differing)
         self.now = 0.0
         self.rate = rate
         self.sent: list[Request] = []
@@ -241,6 +242,26 @@ def test_while_a_drag_goes_on_pictures_are_quick_and_tiles_too() -> None:
     b.scheduler.edits(1, False, b.now)
     tiles = b.finish()
     assert {(tile.exact, tile.moving) for tile in tiles} == {(True, False)} and tiles[-1].final
+
+
+def test_tiles_of_a_held_drag_cover_its_coarse_pictures() -> None:
+    bench = Bench(5e5, lambda page, one, another: (0.313, 0.427, 0.619, 0.773))
+    bench.open(1)
+    bench.finish()
+    bench.settle()
+    bench.finish()
+    bench.scheduler.edits(1, True, bench.now)
+    quick = bench.step()
+    assert quick is not None and quick.moving and quick.region.full_width < SIDE
+    bench.settle()
+    tiles = bench.finish()
+    assert tiles and not any(tile.moving or tile.exact for tile in tiles)
+    r, size = quick.region, SIDE / quick.region.full_width
+    # The quick picture's part in pixels of the whole view: wider than what it shows, by its own large pixels.
+    assert min(t.region.x for t in tiles) <= r.x * size
+    assert min(t.region.y for t in tiles) <= r.y * size
+    assert max(t.region.x + t.region.width for t in tiles) >= (r.x + r.width) * size
+    assert max(t.region.y + t.region.height for t in tiles) >= (r.y + r.height) * size
 
 
 def test_a_drag_that_ends_with_something_new_shows_it_quickly_first() -> None:

@@ -14,7 +14,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from cagefield.server.render_queue.damage import WHOLE, Differing, Rect, Showing, everywhere, pixels, tiles
+from cagefield.server.render_queue.damage import (
+    WHOLE,
+    Differing,
+    Rect,
+    Showing,
+    everywhere,
+    pixels,
+    tiles,
+    union,
+)
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_worker.pictures import Display, Region
 
@@ -297,6 +306,9 @@ class Scheduler:
         rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)
         if exact and self.whole_at_rest and rect is not None:
             rect = WHOLE
+        elif not exact:
+            # Parts of coarse pictures are larger, by their pixels, than what they had to show.
+            rect = union(rect, p.showing.coarse)
         part = pixels(rect, p.width, p.height)
         p.whole = part == (0, 0, p.width, p.height)
         count = min(max(1.0, part[2] * part[3] / (self._rate * TILE_SECONDS)), MOST_TILES)
