@@ -5,12 +5,14 @@ A red ball over a grey floor, one server and one page for all tests; each begins
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 from cagefield.cameras import Camera
 from cagefield.edits import load_edits
@@ -183,3 +185,65 @@ def test_edits_are_saved_found_again_and_rendered_to_a_video(editor: EditorPage,
     editor.settle()
     assert 2.0 * cone(frame).at == pytest.approx(cone(editor.pixels()).at, abs=4.0)
     editor.press("n")
+
+
+def test_the_ball_follows_while_it_is_dragged(editor: EditorPage) -> None:
+    start = cone(editor.pixels())
+    with editor.held(editor.grip("X"), (35, 0)):
+        editor.until(
+            "cagefield.picture.drag === cagefield.drag?.id && cagefield.picture.seq === cagefield.drag.seq"
+            " && cagefield.picture.final"
+        )
+        image = Image.open(io.BytesIO(editor.page.screenshot(clip=editor.box)))
+        held = cone(np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0)
+        assert held.at[0] - start.at[0] == pytest.approx(35, abs=8)
+    editor.settle()
+
+
+def test_a_snapped_drag_moves_by_round_lengths(editor: EditorPage) -> None:
+    start = editor.edit
+    mouse, keyboard, at = editor.page.mouse, editor.page.keyboard, editor.grip("X")
+
+    def drag() -> None:
+        mouse.move(*at)
+        mouse.down()
+        keyboard.down("Control")
+        for step in range(1, 6):
+            mouse.move(at[0] + 7 * step, at[1])
+        mouse.up()
+        keyboard.up("Control")
+
+    editor.changed(drag)
+    by = moved(start["deformed"], editor.edit["deformed"])[0, 0]
+    digits = f"{by:.9f}".rstrip("0").rstrip(".")
+    # A round length has one digit that is 1, 2 or 5, or few of them: no more than two places.
+    assert by > 0.05 and len(digits.split(".")[-1]) <= 2, digits
+
+
+def test_before_and_after_stand_side_by_side(editor: EditorPage) -> None:
+    clean = editor.pixels()
+    editor.drag(editor.grip("X"), (40, 0))
+    after = editor.pixels()
+    editor.page.keyboard.down("b")
+    editor.until("cagefield.now.before && cagefield.picture.before && cagefield.settled")
+    image = Image.open(io.BytesIO(editor.page.screenshot(clip=editor.box)))
+    held = cone(np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0)
+    editor.page.keyboard.up("b")
+    editor.until("!cagefield.now.before && !cagefield.picture.before && cagefield.settled")
+    assert held.at == pytest.approx(cone(clean).at, abs=3.0)
+    editor.press("p")
+    editor.until("cagefield.picture.split !== null && cagefield.settled")
+    split = editor.pixels()
+    editor.press("p")
+    editor.until("cagefield.picture.split === null && cagefield.settled")
+    middle = clean.shape[1] // 2
+    left, right = slice(0, middle - 30), slice(middle + 30, None)
+    # Of each side a few pixels differ: the splitter's labels.
+    for side, shown, other in ((left, clean, after), (right, after, clean)):
+        assert share_of_other_pixels(split[:, side], shown[:, side]) < 0.01
+        assert share_of_other_pixels(split[:, side], other[:, side]) > 0.01
+
+
+def share_of_other_pixels(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """The share of pixels that differ by more than a tenth."""
+    return float((np.abs(a - b).max(axis=-1) > 0.1).mean())

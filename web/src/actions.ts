@@ -3,6 +3,7 @@ import { extent, middle } from "./cage";
 import { leading } from "./drag";
 import type { App } from "./app";
 import type { Command, EditState, Mirror, Place, Vec3 } from "./protocol";
+import { isSplats, openAddress, send } from "./upload";
 import { selected, target, type CageName, type Editor, type Tool, type View } from "./store";
 
 const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
@@ -11,7 +12,11 @@ const CAGES: CageName[] = ["inner", "outer", "both"];
 export class Actions {
   private camera = -1;
 
-  constructor(private readonly app: App) {}
+  /** `whereTo` asks for the folder to save into. */
+  constructor(
+    private readonly app: App,
+    private readonly whereTo: () => void = () => undefined,
+  ) {}
 
   tool(tool: Tool): void {
     this.app.store.set({ tool });
@@ -150,12 +155,29 @@ export class Actions {
     if (text.trim() !== "") this.app.send({ type: "load_edits", text, append: true });
   }
 
+  /** Opens a file of splats in the place of the scene; takes another file's edits. */
   async load(file: File): Promise<void> {
-    this.app.send({ type: "load_edits", text: await file.text(), append: false });
+    if (isSplats(file.name)) await this.open(file);
+    else this.app.send({ type: "load_edits", text: await file.text(), append: false });
   }
 
+  /** Saves; of a file that was opened, asks for a folder first. */
   save(): void {
-    this.command("save");
+    if (this.app.store.now.state?.is_file) this.whereTo();
+    else this.command("save");
+  }
+
+  private async open(file: File): Promise<void> {
+    if (this.app.store.now.upload !== null) {
+      this.app.say("another file is being opened", "warning");
+      return;
+    }
+    const { name } = file;
+    this.app.store.set({ upload: { name, share: 0 } });
+    const progress = (share: number): void => this.app.store.set({ upload: { name, share } });
+    const why = await send(new XMLHttpRequest(), file, openAddress(location, name), progress);
+    this.app.store.set({ upload: null });
+    if (why !== null) this.app.say(why, "error");
   }
 
   addKey(): void {

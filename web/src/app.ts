@@ -17,7 +17,7 @@ import { Viewport } from "./viewport";
 import { Store, obstacle, selected, showsCages, target } from "./store";
 import { decode, unpack } from "./picture_message";
 import type { Operation } from "./operations";
-import type { Answer, Ask, EditState, Hello, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
+import type { Answer, Ask, EditState, Hello, Job, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
 
 /** What of the page's state shows in the canvas. */
 const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection", "preview"] as const;
@@ -205,19 +205,21 @@ export class App {
         this.store.set({ preparing: message });
         break;
       case "job":
-        this.store.set({ jobs: [...this.store.now.jobs.filter((job) => job.job !== message.job), message] });
+        this.takeJob(message);
         break;
     }
   }
 
   private greeted(hello: Hello): void {
-    const first = this.store.now.hello === null;
-    this.store.set({ hello });
+    const before = this.store.now.hello;
+    const another = before !== null && before.scene !== hello.scene;
+    this.store.set(another ? { hello, state: null, corners: [], hover: null, jobs: [] } : { hello });
     this.lines.slack = 1.5 * hello.voxel;
-    if (first) {
+    if (before === null || another) {
       const [low, high] = hello.bounds;
       const around = low.map((x, i) => 0.5 * (x + high[i])) as Vec3;
-      this.viewport.lookFrom(recallCamera() ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
+      const recalled = another ? null : recallCamera();
+      this.viewport.lookFrom(recalled ?? hello.start.c2w, hello.start.fov_y_deg, hello.up, around);
     }
     this.camera.restate();
     this.sendLook();
@@ -236,6 +238,16 @@ export class App {
       this.placedAfter = null;
       this.store.set({ mode: "set", cage: "inner" });
     }
+  }
+
+  /** Shows how far a job is; a file that this page asked for is downloaded when it is there. */
+  private takeJob(job: Job): void {
+    this.store.set({ jobs: [...this.store.now.jobs.filter((other) => other.job !== job.job), job] });
+    if (job.what !== "splats" || job.state !== "done" || job.page !== this.store.now.hello?.page) return;
+    const link = document.createElement("a");
+    link.href = `exports/${job.job}/${encodeURIComponent(job.out)}${location.search}`;
+    link.download = job.out;
+    link.click();
   }
 
   private takePreview(preview: Preview): void {

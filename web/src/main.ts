@@ -23,9 +23,9 @@ const root = h("div", { class: "editor" }, view);
 document.body.append(root);
 
 const app = new App(view);
-const actions = new Actions(app);
-const pointer = new Pointer(app);
 const questions = dialogs(app);
+const actions = new Actions(app, () => questions.saveAs());
+const pointer = new Pointer(app);
 const keys = bindings(app, actions, pointer, questions);
 listenForKeys(app, actions, pointer, keys);
 
@@ -47,6 +47,15 @@ app.store.watch(["state", "hello"], ({ hello, state }) => {
 addEventListener("beforeunload", (event) => {
   if (app.store.now.hello !== null) remember(app.store.now, app.viewport.c2w);
   if (app.store.now.state?.saved === false) event.preventDefault();
+});
+addEventListener("dragover", (event) => {
+  if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
+});
+addEventListener("drop", (event) => {
+  const file = event.dataTransfer?.files[0];
+  if (file === undefined) return;
+  event.preventDefault();
+  void actions.load(file);
 });
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) app.player.stop();

@@ -37,6 +37,7 @@ export type PageMessage =
   | Ask
   | SetPath
   | RenderJob
+  | ExportSplats
   | CancelJob;
 export type ServerMessage = Hello | State | Dragged | Answer | Notice | Preview | Preparing | Job;
 
@@ -201,6 +202,13 @@ export interface DragMove {
   drag: number;
   seq: number;
   operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
+}
+/**
+ * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
+ */
+export interface ExportSplats {
+  type: "export";
+  form: "ply" | "compressed.ply" | "spz" | "sog" | "splat" | "glb";
 }
 /**
  * Shrinks the inner cage to the dense region inside it.
@@ -406,7 +414,9 @@ export interface Hello {
   type: "hello";
   version: string;
   page: number;
+  scene: string;
   name: string;
+  splats: boolean;
   /**
    * @minItems 2
    * @maxItems 2
@@ -418,12 +428,13 @@ export interface Hello {
   cameras: number[][];
 }
 /**
- * How far a background job is.
+ * How far a background job is; of one whose file is to be downloaded, `page` asked for it.
  */
 export interface Job {
   type: "job";
   job: number;
-  what: "test_views" | "camera_path";
+  page: number;
+  what: ("test_views" | "camera_path") | "splats";
   state: "running" | "done" | "cancelled" | "failed";
   done: number;
   total: number;
@@ -468,6 +479,7 @@ export interface State {
   entry: number;
   saved: boolean;
   path: string;
+  is_file: boolean;
   preserve_opacity: boolean;
   keys: Key[];
   loop: boolean;

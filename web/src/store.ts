@@ -49,6 +49,8 @@ export interface Editor {
   /** How much of the renderer is ready, or null before it was said. */
   preparing: Preparing | null;
   jobs: Job[];
+  /** A file that this page opens, and the share of it that has been sent. */
+  upload: { name: string; share: number } | null;
   /** What a page plays of the camera path, and pictures show, or null. */
   preview: Preview | null;
   figures: Figures;
@@ -76,6 +78,7 @@ export const START: Editor = {
   notice: null,
   preparing: null,
   jobs: [],
+  upload: null,
   preview: null,
   figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false },
 };

@@ -14,7 +14,7 @@ export function edit(change: Partial<EditState> = {}): EditState {
 
 export function state(change: Partial<State> = {}): State {
   return {
-    type: "state", revision: 1, pictured: 1, edits: [edit()], selected: 1, history: ["Open"], entry: 0, saved: true, path: "scene",
+    type: "state", revision: 1, pictured: 1, edits: [edit()], selected: 1, history: ["Open"], entry: 0, saved: true, path: "scene", is_file: false,
     preserve_opacity: false, keys: [], loop: false, ...change,
   }; // prettier-ignore
 }

@@ -63,6 +63,7 @@ def parse(args: list[str]) -> Command | int:
     from cagefield.cli.convert import Convert
     from cagefield.cli.demo import Demo
     from cagefield.cli.edit import ApplyEdits
+    from cagefield.cli.export import Export
     from cagefield.cli.import_field import ImportField
     from cagefield.cli.info import Info
     from cagefield.cli.make_scene import MakeScene
@@ -81,6 +82,7 @@ def parse(args: list[str]) -> Command | int:
         | Annotated[Bake, tyro.conf.subcommand("bake")]
         | Annotated[View, tyro.conf.subcommand("view")]
         | Annotated[ApplyEdits, tyro.conf.subcommand("edit")]
+        | Annotated[Export, tyro.conf.subcommand("export")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Info, tyro.conf.subcommand("info")]
         | Annotated[Bench, tyro.conf.subcommand("bench")]

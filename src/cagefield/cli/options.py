@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
@@ -170,6 +170,23 @@ def progress_bar(what: str) -> Iterator[Callable[[float, float, str], None]]:
                 print(f"{what} {25 * quarters}%" + (f": {note}" if note else ""), file=sys.stderr)
 
         yield move
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, float, str], None]]:
+    """A function (stage, done, note) that moves a bar of each stage on stderr, one at a time."""
+    with ExitStack() as shown:
+        current = ""
+        move: Callable[[float, float, str], None]
+
+        def moved(stage: str, done: float, note: str) -> None:
+            nonlocal current, move
+            if stage != current:
+                shown.close()
+                current, move = stage, shown.enter_context(progress_bar(stage))
+            move(done, 1.0, note)
+
+        yield moved
 
 
 def track(items: Iterable[T], total: int, what: str) -> Iterator[T]:

@@ -5,13 +5,22 @@ from __future__ import annotations
 import dataclasses
 import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from cagefield.cli.options import BakingOptions, Device, Flag, Output, Training, TrainingOptions, progress_bar
+from cagefield.cli.options import (
+    BakingOptions,
+    Device,
+    Flag,
+    Output,
+    Training,
+    TrainingOptions,
+    progress_bar,
+    stages,
+)
 from cagefield.cli.photo_options import Photos
 from cagefield.errors import CagefieldError
 
@@ -228,27 +237,6 @@ def train_scene(
     return Scene.trained(result, dataset), result
 
 
-class _Stages:
-    """Progress bars on stderr, one for each stage, one at a time."""
-
-    def __init__(self) -> None:
-        self._stage, self._bar = "", ExitStack()
-        self._move: Callable[[float, float, str], None]
-
-    def __enter__(self) -> _Stages:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-    def move(self, stage: str, done: float, note: str) -> None:
-        """Moves the bar of a stage; another stage's is closed first."""
-        if stage != self._stage:
-            self._bar.close()
-            self._stage, self._move = stage, self._bar.enter_context(progress_bar(stage))
-        self._move(done, 1.0, note)
-
-
 def train_splats(
     dataset: Dataset, config: SplatConfig, checkpoint: Path | None = None, *, resume: bool = False
 ) -> tuple[Scene, SplatTrainResult]:
@@ -256,10 +244,10 @@ def train_splats(
     from cagefield.scene import Scene
     from cagefield.training.splat import train_splat
 
-    with _Stages() as stages:
+    with stages() as move:
 
         def on_progress(progress: Any) -> None:
-            stages.move("Training", progress.done, str(progress))
+            move("Training", progress.done, str(progress))
 
         result = train_splat(
             dataset,
@@ -267,7 +255,7 @@ def train_splats(
             checkpoint=checkpoint,
             resume=resume,
             on_progress=on_progress,
-            on_stage=stages.move,
+            on_stage=move,
         )
     return Scene.trained(result, dataset), result
 

@@ -1,62 +1,70 @@
-"""Edited splats as ordinary ones: a field in which nothing is left of its edits."""
+"""Edited splats as a field of their own, as a file of splats can hold them.
+
+Notation: J = d(deformed)/d(canonical) at a splat's mean, R diag(s) its own axes and scales. Its covariance
+becomes J C J^T = A A^T with A = J R diag(s) = U S V^T, so U are its new axes and S its new scales. Colour
+turns by P, the rotation of J's polar decomposition J = P (P^T J): see `sh_rotation`.
+
+Which splats move, which are copied and which are hidden: `moved_splats`; opacity: `deformed_splats`; those
+that the map bends over, or that a cut goes through, are split first: `splat_splitting`.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 
 from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
-from cagefield.quaternions import quaternions_of
-from cagefield.rendering.deformed_splats import Places, deformed_splats
+from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import moved_splats
 from cagefield.rendering.splat_splitting import split_for_edits
 from cagefield.sh_rotation import rotated_sh
+from cagefield.typing import Array
 
 
 def baked_splats(
-    field: SplatField,
-    edits: EditStack,
-    *,
-    preserve_opacity: bool = True,
-    split: bool = True,
-    proceed: Callable[[], None] | None = None,
+    field: SplatField, edits: EditStack, *, preserve_opacity: bool = True, split: bool = True
 ) -> SplatField:
-    """The splats that edits make of a field, in deformed space; the field itself without edits.
+    """The splats that edits make of a field; those that no edit reaches come first, as they were.
 
-    Covariances J C J^T become rotations and scales, harmonics are turned by R of J = R S (see
-    `deformed_splats`); splats that the map bends over, or that a cut goes through, are split first unless
-    `split` is False. Those that no edit reaches are as they were, bit for bit.
+    Its box is the field's, grown by where edits take something.
 
     Raises:
         EditError: an edit that cannot be evaluated.
     """
     if not edits.active:
         return field
-    parted = split_for_edits(field, edits, proceed=proceed) if split else field
-    splats = deformed_splats(parted, edits, preserve_opacity=preserve_opacity, proceed=proceed)
-    moved = moved_splats(parted, edits, proceed=proceed)
-    if moved.is_at_rest:
-        return parted
-    places = Places(moved)
-    here = places.moved
-    full = splats.covariances[here][:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].astype(np.float64).reshape(-1, 3, 3)
-    variances, axes = np.linalg.eigh(full)
-    axes[:, :, 2] *= np.linalg.det(axes)[:, None]
-    sh = splats.sh
-    if splats.rotations is not None:
-        sh = places.put(sh, rotated_sh(sh[here], splats.rotations[here]))
-    log_scales = (0.5 * np.log(np.maximum(variances, 1e-60))).astype(np.float32)
-    made = SplatField(
-        splats.means,
-        places.put(places.of(parted.log_scales), log_scales),
-        places.put(places.of(parted.quaternions), quaternions_of(axes).astype(np.float32)),
-        splats.opacities,
-        sh,
-        antialiased=field.antialiased,
-        unbounded=field.unbounded,
+    if split:
+        field = split_for_edits(field, edits)
+    moved = moved_splats(field, edits)
+    kept = ~moved.left
+    own = field.take(moved.source)
+    axes = (
+        rotation_matrices(own.quaternions.astype(np.float64))
+        * np.exp(own.log_scales.astype(np.float64))[:, None]
     )
-    low, high = np.minimum(field.bounds[0], made.bounds[0]), np.maximum(field.bounds[1], made.bounds[1])
-    return dataclasses.replace(made, bounds=np.stack([low, high]))
+    turned, scales, _ = np.linalg.svd(moved.jacobian @ axes)
+    turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
+    opacities = own.opacities.astype(np.float64)
+    if not preserve_opacity:
+        growth = np.cbrt(np.abs(np.linalg.det(moved.jacobian)))
+        opacities = 1.0 - (1.0 - opacities) ** growth
+    boxes = np.concatenate([field.bounds[None], *(edit.boxes for edit in edits.active)])
+    return dataclasses.replace(
+        field,
+        means=np.concatenate([field.means[kept], moved.points.astype(np.float32)]),
+        log_scales=np.concatenate(
+            [field.log_scales[kept], np.log(np.maximum(scales, 1e-30))], dtype=np.float32
+        ),
+        quaternions=np.concatenate([field.quaternions[kept], quaternions_of(turned)], dtype=np.float32),
+        opacities=np.concatenate([field.opacities[kept], opacities], dtype=np.float32),
+        sh=np.concatenate([field.sh[kept], rotated_sh(own.sh, _polar_rotations(moved.jacobian))]),
+        bounds=np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
+    )
+
+
+def _polar_rotations(jacobian: Array) -> Array:
+    """P [N,3,3] of J = P S with S symmetric and positive."""
+    u, _, vt = np.linalg.svd(jacobian)
+    return np.asarray(u @ vt)

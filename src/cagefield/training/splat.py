@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,9 @@ from cagefield.fields.splat import SplatField
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.loop import run_to_end
 from cagefield.training.splat_config import SplatConfig
+
+if TYPE_CHECKING:
+    from cagefield.training.splat_seeds import Seeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,7 @@ def train_splat(
     dataset: Dataset,
     config: SplatConfig | None = None,
     *,
+    seeds: Seeds | None = None,
     checkpoint: Path | str | None = None,
     resume: bool = False,
     on_progress: Callable[[object], None] | None = None,
@@ -60,7 +65,8 @@ def train_splat(
     """The splats trained on the data set's photos, with PSNR and SSIM on its test views.
 
     A capture without points gets them from its poses first (`points_of`), and keeps them in the user's cache;
-    then the photos' surfaces are found. `on_stage` is told what is being found, how far that is, and a note.
+    then the photos' surfaces are found. `seeds` take the place of both. `on_stage` is
+    told what is being found, how far that is, and a note.
     With `checkpoint`, the state of the run is written there every minute and at its end, which may be early
     (Ctrl-C; `finished` is then False); `resume` continues it. On a CPU a resumed run of given `steps` ends
     in the same field as an uninterrupted one.
@@ -74,12 +80,13 @@ def train_splat(
     config = config or SplatConfig()
     report = on_stage or (lambda stage, done, note: None)
     points = None
-    if dataset.unbounded or dataset.points is not None:
+    if seeds is None and (dataset.unbounded or dataset.points is not None):
         points = points_of(
             dataset, points_cache(), on_progress=partial(report, "Finding points"), seed=config.seed
         )
-    report("Finding surfaces", 0.0, "")
-    run = SplatRun(dataclasses.replace(dataset, points=points), config)
+    if seeds is None:
+        report("Finding surfaces", 0.0, "")
+    run = SplatRun(dataclasses.replace(dataset, points=points), config, seeds)
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
     train_psnr = test_psnr = test_ssim = float("nan")

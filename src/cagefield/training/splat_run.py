@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, needles, split
 from cagefield.training.splat_poses import FROM, PoseRefinement
-from cagefield.training.splat_seeds import camera_scale, depths_seen, first_splats, in_front_of
+from cagefield.training.splat_seeds import Seeds, camera_scale, depths_seen, first_splats, in_front_of
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
 
@@ -65,17 +66,27 @@ STEPS_A_MINUTE = 800
 """Steps that count as a minute where a run is limited by steps."""
 
 
+def most_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
+    """The most splats of a training: what is asked for, else what the photos' detail and the time allow."""
+    if config.splats is not None:
+        return config.splats
+    pixels = float(np.median([camera.width * camera.height for camera in cameras]))
+    minutes = config.minutes or config.steps / STEPS_A_MINUTE
+    return int(np.clip(PIXEL_SHARE * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
+
+
 class SplatRun:
     """A training run; see `loop.Run`."""
 
-    def __init__(self, dataset: Dataset, config: SplatConfig) -> None:
+    def __init__(self, dataset: Dataset, config: SplatConfig, seeds: Seeds | None = None) -> None:
+        """`seeds` are what to begin with; left out, they are looked for in the photos (`first_splats`)."""
         self._config, self._dataset = config, dataset
         self.views = load_views(dataset.train)
         self._rng = np.random.default_rng(config.seed)
         self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
-        self._most = self._most_splats()
-        self.state, self.empty = first_splats(dataset, self.views, config, self._most)
+        self._most = most_splats([view.cameras[0] for view in self.views], config)
+        self.state, self.empty = seeds or first_splats(dataset, self.views, config, self._most)
         self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
@@ -86,14 +97,6 @@ class SplatRun:
         self._queue: list[int] = []
         self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
         self._cold = True
-
-    def _most_splats(self) -> int:
-        """The most splats: what is asked for, else what the photos' detail and the time allow."""
-        if self._config.splats is not None:
-            return self._config.splats
-        pixels = float(np.median([view.cameras[0].width * view.cameras[0].height for view in self.views]))
-        minutes = self._config.minutes or self._config.steps / STEPS_A_MINUTE
-        return int(np.clip(PIXEL_SHARE * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
 
     @property
     def done(self) -> float:

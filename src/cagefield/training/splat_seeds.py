@@ -8,7 +8,7 @@ cameras and have the colour that the photos show in their direction. And what th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,12 +47,18 @@ SWEPT_SIDE = 150
 """Least longer side of the photos that surface points are looked for in."""
 
 
-def first_splats(
-    dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, most: int
-) -> tuple[SplatState, list[NDArray[np.float32]]]:
-    """The splats that a training begins with, at most `most`; what the photos know to be empty.
+class Seeds(NamedTuple):
+    """The splats that a training begins with, and what each photo knows to be empty.
 
     The latter [2,H,W] by photo: distances along its pixels' rays, 0 where nobody knows, and how sure that is.
+    """
+
+    state: SplatState
+    empty: list[NDArray[np.float32]]
+
+
+def first_splats(dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, most: int) -> Seeds:
+    """The splats that a training on photos begins with, at most `most`.
 
     At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
     capture, on a sphere far away. Where the data set has no points they are random ones.
@@ -93,7 +99,7 @@ def first_splats(
         state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
     axes = Rotation.from_matrix(views[0].cameras[0].c2w[:3, :3])
     state.quaternions[:] = np.roll(axes.as_quat(), 1)
-    return state, empty
+    return Seeds(state, empty)
 
 
 def neighbour_distance(positions: Array) -> Array:

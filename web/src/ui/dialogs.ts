@@ -1,10 +1,21 @@
 /** Questions before something is written: where to, how large. */
 import type { App } from "../app";
+import type { ExportSplats } from "../protocol";
 import { h } from "./dom";
+
+const FORMS: [ExportSplats["form"], string][] = [
+  ["ply", ".ply: every program, large"],
+  ["spz", ".spz: a tenth of that"],
+  ["sog", ".sog: for the web, smallest"],
+  ["compressed.ply", ".compressed.ply: PlayCanvas"],
+  ["splat", ".splat: no view-dependent colour"],
+  ["glb", ".glb: glTF"],
+];
 
 export interface Dialogs {
   element: HTMLElement;
   saveAs: () => void;
+  download: () => void;
   render: (what: "test_views" | "camera_path") => void;
 }
 
@@ -34,6 +45,12 @@ export function dialogs(app: App): Dialogs {
         app.send({ type: "save_as", path: path.value, overwrite: overwrite.checked });
       });
       path.select();
+    },
+    download() {
+      const form = h("select", {}, ...FORMS.map(([value, label]) => h("option", { value }, label)));
+      ask("Download the edited splats", "Download", [h("label", { class: "field" }, h("span", {}, "File"), form)], () => {
+        app.send({ type: "export", form: form.value as ExportSplats["form"] });
+      });
     },
     render(what) {
       const film = what === "camera_path";

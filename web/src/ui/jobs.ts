@@ -4,7 +4,7 @@ import type { App } from "../app";
 import type { Job } from "../protocol";
 import { h, iconButton } from "./dom";
 
-const WHAT: Record<Job["what"], string> = { test_views: "Test views", camera_path: "Video" };
+const WHAT: Record<Job["what"], string> = { test_views: "Test views", camera_path: "Video", splats: "Splats" };
 const GONE_AFTER = 8000;
 
 export function jobs(app: App): HTMLElement {
@@ -20,15 +20,22 @@ export function jobs(app: App): HTMLElement {
   return list;
 }
 
+function described(job: Job): string {
+  const file = job.what === "splats";
+  if (job.state === "running") return file ? `writing ${job.out}` : `${job.done} of ${job.total}`;
+  if (job.state === "done") return file ? `${job.out} is ready` : `written to ${job.out}`;
+  return job.text || job.state;
+}
+
 function shown(app: App, job: Job): HTMLElement {
-  const bar = h("progress", { max: Math.max(1, job.total), value: job.done });
-  const state =
-    job.state === "running" ? `${job.done} of ${job.total}` : job.state === "done" ? `written to ${job.out}` : job.text || job.state;
+  const bar = h("progress", { max: Math.max(1, job.total) });
+  // Without a value it shows that something goes on, and not how far.
+  if (job.what !== "splats" || job.state !== "running") bar.value = job.done;
   const stop = job.state === "running" ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel") : null;
   return h(
     "div",
     { class: `job ${job.state}` },
-    h("div", { class: "row" }, h("strong", {}, WHAT[job.what]), h("span", { class: "quiet", title: job.out }, state), stop),
+    h("div", { class: "row" }, h("strong", {}, WHAT[job.what]), h("span", { class: "quiet", title: job.out }, described(job)), stop),
     bar,
   );
 }

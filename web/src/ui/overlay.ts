@@ -11,7 +11,7 @@ const TEXT_EVERY = 150;
 
 export function overlay(app: App, pointer: Pointer): HTMLElement {
   const layer = h("div", { class: "overlay" });
-  layer.append(splitter(app), readout(app, pointer), toasts(app), lost(app), hint(app));
+  layer.append(splitter(app), readout(app, pointer), toasts(app), lost(app), opening(app), hint(app));
   return layer;
 }
 
@@ -77,6 +77,21 @@ function lost(app: App): HTMLElement {
   const line = h("div", { class: "lost", role: "alert" }, "The server is gone. Trying again…");
   app.store.watch(["connection"], ({ connection }) => {
     line.hidden = connection !== "lost";
+  });
+  return line;
+}
+
+/** How far a file of splats is on its way to the server, and that it is being read there. */
+function opening(app: App): HTMLElement {
+  const name = h("span");
+  const bar = h("progress", { max: 1 });
+  const line = h("div", { class: "opening", role: "status" }, name, bar);
+  app.store.watch(["upload"], ({ upload }) => {
+    line.hidden = upload === null;
+    if (upload === null) return;
+    name.textContent = upload.share < 1 ? `Sending ${upload.name}` : `Opening ${upload.name}`;
+    if (upload.share < 1) bar.value = upload.share;
+    else bar.removeAttribute("value");
   });
   return line;
 }

@@ -1,8 +1,10 @@
 /** The row on top: the scene, undo and redo, what is shown, saving. */
-import { Camera, CircleQuestionMark, Columns2, Download, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
+import { Camera, CircleQuestionMark, Columns2, Download, FileDown, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import type { View } from "../store";
+import { SPLATS } from "../upload";
+import type { Dialogs } from "./dialogs";
 import { h, iconButton, iconLink } from "./dom";
 
 const VIEWS: [View, string][] = [
@@ -12,7 +14,7 @@ const VIEWS: [View, string][] = [
   ["normals", "Normals"],
 ];
 
-export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void }): HTMLElement {
+export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveAs" | "download">): HTMLElement {
   const name = h("span", { class: "scene-name" });
   const unsaved = h("span", { class: "unsaved", title: "There are unsaved changes" });
   const mode = h("span", { class: "mode-badge" });
@@ -23,13 +25,14 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
   );
   const split = iconButton(Columns2, "Before and after, side by side (P); hold B for before", () => actions.toggleSplit(), "split");
   const grid = iconButton(Grid3x3, "Deformed lattice (L)", () => actions.toggle("grid"), "grid");
-  const file = h("input", { type: "file", accept: ".yaml,.yml,.json", hidden: true });
+  const file = h("input", { type: "file", accept: [".yaml", ".yml", ".json", ...SPLATS].join(), hidden: true });
   file.onchange = () => {
     const chosen = file.files?.[0];
     if (chosen) void actions.load(chosen);
     file.value = "";
   };
   const save = iconButton(Save, "Save (Ctrl+S)", () => actions.save(), "save");
+  const splats = iconButton(FileDown, "Download the edited splats…", () => dialogs.download(), "download");
   const panel = iconButton(PanelRight, "Panel (N)", () => actions.toggle("panel"), "panel-toggle");
   app.store.watch(["state", "hello", "view", "split", "grid", "panel", "mode"], (now) => {
     name.textContent = now.hello?.name ?? "";
@@ -38,6 +41,7 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
     undo.disabled = (now.state?.entry ?? 0) <= 0;
     redo.disabled = now.state === null || now.state.entry >= now.state.history.length - 1;
     for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
+    splats.hidden = now.hello?.splats !== true;
     split.classList.toggle("on", now.split !== null);
     grid.classList.toggle("on", now.grid);
     panel.classList.toggle("on", now.panel);
@@ -67,8 +71,9 @@ export function topbar(app: App, actions: Actions, dialogs: { saveAs: () => void
       { class: "group" },
       save,
       iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as"),
-      iconButton(FolderOpen, "Load an edit file…", () => file.click(), "load"),
+      iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load"),
       iconLink(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
+      splats,
       screenshot,
     ),
     h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),

@@ -30,11 +30,13 @@ _EDITS = "edits.yaml"
 class SceneStore:
     """Where a session is kept: the scene's folder, and the autosave beside it.
 
-    `origin` is the folder whose field is rendered, `path` the one that is saved to.
+    `origin` is the folder whose field is rendered, `path` the one that is saved to. A file that was opened is
+    `source`: its scene lies in the user's cache, and there is nothing to save to before Save as.
     """
 
-    def __init__(self, scene: Scene, path: Path) -> None:
+    def __init__(self, scene: Scene, path: Path, source: Path | None = None) -> None:
         self.scene = scene
+        self.source = None if source is None else source.resolve()
         self.origin = path.resolve()
         self.path = path.resolve()
         self.trouble: str | None = None
@@ -63,6 +65,11 @@ class SceneStore:
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
         return None if document == self.document() else document
+
+    @property
+    def shown_path(self) -> Path:
+        """The folder of the scene; for a file, one beside it that Save as may make."""
+        return self.path if self.source is None else self.source.with_name(f"{stem_of(self.source)}-scene")
 
     # ---- keeping ----
 
@@ -93,6 +100,8 @@ class SceneStore:
         Raises SceneError, once, where another program has changed the edits meanwhile; saving again replaces
         them.
         """
+        if self.source is not None:
+            raise SceneError(f"{self.source.name} is a file and stays as it is; use Save as")
         if not self.path.is_dir():
             raise SceneError(f"{self.path} is not there any more; use Save as, with a new folder")
         now = self._fingerprint()
@@ -117,7 +126,7 @@ class SceneStore:
         """
         target = Path(path).expanduser()
         if not target.is_absolute():
-            target = self.path.parent / target
+            target = self.shown_path.parent / target
         if target.resolve() == self.path:
             self.save(session)
             return
@@ -133,7 +142,7 @@ class SceneStore:
             (target / CAMERA_PATH).write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
-        self.path = target.resolve()
+        self.path, self.source = target.resolve(), None
         self._done(session)
 
     def _done(self, session: Session) -> None:
@@ -152,6 +161,11 @@ class SceneStore:
             return hashlib.sha256((self.path / _EDITS).read_bytes()).hexdigest()
         except OSError:
             return ""
+
+
+def stem_of(file: Path) -> str:
+    """The name of a splat file without its suffix, .compressed.ply included."""
+    return file.name.removesuffix(file.suffix).removesuffix(".compressed") or file.name
 
 
 def _content(document: Document) -> dict[str, object]:

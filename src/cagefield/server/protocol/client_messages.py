@@ -19,6 +19,7 @@ from cagefield.server.protocol.common import (
     Key,
     Message,
     ShellName,
+    SplatForm,
     Text,
     View,
 )
@@ -258,6 +259,13 @@ class RenderJob(Message):
     overwrite: bool = False
 
 
+class ExportSplats(Message):
+    """Writes the edited splats, the edits baked in, to a file to be downloaded; in the background."""
+
+    type: Literal["export"] = "export"
+    form: SplatForm
+
+
 class CancelJob(Message):
     """Stops a job; what it wrote of its file is removed."""
 
@@ -268,7 +276,8 @@ class CancelJob(Message):
 PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange
-    | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob | CancelJob,
+    | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
+    | ExportSplats | CancelJob,
     Field(discriminator="type"),
 ]  # fmt: skip
 

@@ -30,6 +30,7 @@ View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
 ShellName: TypeAlias = Literal["flow", "trilinear"]
 FalloffName: TypeAlias = Literal["smooth", "linear"]
 JobKind: TypeAlias = Literal["test_views", "camera_path"]
+SplatForm: TypeAlias = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb"]
 Level: TypeAlias = Literal["info", "warning", "error"]
 
 Corner: TypeAlias = Annotated[int, Field(ge=0, le=7)]

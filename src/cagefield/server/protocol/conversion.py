@@ -113,7 +113,12 @@ def edit_state(
 
 
 def state_of(
-    session: Session, path: str, pictured: int, errors: dict[int, tuple[float, float]]
+    session: Session,
+    path: str,
+    pictured: int,
+    errors: dict[int, tuple[float, float]],
+    *,
+    is_file: bool = False,
 ) -> server_messages.State:
     """Everything that pages show of the edits, drags included; `errors` of lattices by edit, where known."""
     document = session.shown
@@ -128,6 +133,7 @@ def state_of(
         entry=session.history.entry,
         saved=session.saved,
         path=path,
+        is_file=is_file,
         preserve_opacity=document.preserve_opacity,
         keys=[
             common.Key(c2w=list(key.c2w), fov_y_deg=key.fov_y_deg, seconds=key.seconds, parts=dict(key.parts))

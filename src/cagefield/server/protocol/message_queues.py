@@ -15,7 +15,7 @@ class SendQueue:
     """Messages to a page in order; those that a newer one supersedes are not sent."""
 
     def __init__(self) -> None:
-        self.waiting: deque[tuple[str | None, str | bytes]] = deque()
+        self.waiting: deque[tuple[str | None, str | bytes | None]] = deque()
         self._some = asyncio.Event()
 
     def __len__(self) -> int:
@@ -36,8 +36,13 @@ class SendQueue:
         self.waiting.append((None, content))
         self._some.set()
 
-    async def get(self) -> str | bytes:
-        """The next message, waited for."""
+    def end(self) -> None:
+        """Nothing comes after what waits."""
+        self.waiting.append((None, None))
+        self._some.set()
+
+    async def get(self) -> str | bytes | None:
+        """The next message, waited for; None at the end."""
         while not self.waiting:
             self._some.clear()
             await self._some.wait()

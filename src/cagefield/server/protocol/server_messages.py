@@ -29,7 +29,11 @@ class Hello(Message):
     type: Literal["hello"] = "hello"
     version: str
     page: int
+    scene: str
+    """Another one where another scene or file is opened in the place of this one."""
     name: str
+    splats: bool
+    """True where the field is of splats, which can be downloaded."""
     bounds: tuple[Vec3, Vec3]
     voxel: float
     up: Vec3
@@ -80,6 +84,9 @@ class State(Message):
     """Where in the history we are; entries after it can be redone."""
     saved: bool
     path: str
+    """The scene's folder; of a file that was opened, the one to suggest."""
+    is_file: bool
+    """True for a file that was opened: there is no folder to save into before one is chosen."""
     preserve_opacity: bool
     keys: list[Key]
     loop: bool
@@ -153,11 +160,12 @@ class Preparing(Message):
 
 
 class Job(Message):
-    """How far a background job is."""
+    """How far a background job is; of one whose file is to be downloaded, `page` asked for it."""
 
     type: Literal["job"] = "job"
     job: int
-    what: JobKind
+    page: int = 0
+    what: JobKind | Literal["splats"]
     state: Literal["running", "done", "cancelled", "failed"]
     done: int
     total: int

@@ -13,9 +13,10 @@ from cagefield.errors import CagefieldError
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
-from cagefield.server.protocol import client_messages, server_messages
+from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.dispatcher import BackgroundTask
+from cagefield.server.render_queue.exports import Exports
 from cagefield.server.render_queue.jobs import Job
 from cagefield.server.render_worker.tasks import (
     Answered,
@@ -51,6 +52,7 @@ class BackgroundWork:
         self._jobs: list[Job] = []
         self._ending: list[EndJobTask] = []
         self._numbers = 0
+        self.exports = Exports(session, store, tell)
 
     def next(self, generation: int) -> BackgroundTask | None:
         """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
@@ -113,13 +115,13 @@ class BackgroundWork:
 
     def jobs(self) -> list[server_messages.Job]:
         """How far the jobs that go on are."""
-        return [_message(job, "running") for job in self._jobs]
+        return [*(_message(job, "running") for job in self._jobs), *self.exports.running()]
 
     def render(self, message: client_messages.RenderJob) -> None:
         """Begins a job. Raises CagefieldError where it could not write its result."""
         out = Path(message.out).expanduser()
         if not out.is_absolute():
-            out = self._store.path.parent / out
+            out = self._store.shown_path.parent / out
         self._numbers += 1
         document, size = self._session.document, (message.width, message.height)
         if message.what == "camera_path":
@@ -131,8 +133,15 @@ class BackgroundWork:
         self._jobs.append(job)
         self._tell(_message(job, "running"))
 
+    def export(self, page: int, form: common.SplatForm) -> None:
+        """Begins to write the edited splats for a page. Raises CagefieldError where there are none."""
+        self._numbers += 1
+        self.exports.begin(self._numbers, page, form)
+
     def cancel(self, number: int) -> None:
         """Ends a job. Raises CagefieldError where it is over already."""
+        if self.exports.cancel(number):
+            return
         job = next((job for job in self._jobs if job.number == number), None)
         if job is None:
             raise CagefieldError(f"job {number} is over already")

@@ -49,6 +49,7 @@ class Coordinator:
     def __init__(self, session: Session, store: SceneStore, device: str = "auto") -> None:
         self.session = session
         self.store = store
+        self.device = device
         self.pages: dict[int, Page] = {}
         shown = store.scene.field
         self.spread = spread(shown) if isinstance(shown, SplatField) else 0.0
@@ -135,7 +136,13 @@ class Coordinator:
     def state(self) -> server_messages.State:
         """Everything that pages show of the edits."""
         self._refresh_shown()
-        return state_of(self.session, str(self.store.path), self._pictured, self.background.errors())
+        return state_of(
+            self.session,
+            str(self.store.shown_path),
+            self._pictured,
+            self.background.errors(),
+            is_file=self.store.source is not None,
+        )
 
     def changed(self, but: Page | None = None) -> None:
         """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
@@ -159,6 +166,11 @@ class Coordinator:
         self.notice("info", f"saved to {self.store.path}")
 
     # ---- rendering ----
+
+    def close(self) -> None:
+        """Ends the rendering process and what goes on, and tells the pages to come again."""
+        self.background.exports.close()
+        self.dispatcher.close()
 
     async def ask(self, make: Callable[[int], Task]) -> Any:
         """What the rendering process answers to a task. Raises CagefieldError."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -20,10 +20,14 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_worker.tasks import StillTask
 from cagefield.server.web.security import Guard
+from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
 
 STATIC = Path(__file__).parent / "static"
 """The page as it was built."""
+
+_READING = ("GET", "HEAD")
+"""Methods of requests that change nothing; all others must say their origin, as sockets must."""
 
 _HEADERS = {
     "Content-Security-Policy": (
@@ -36,25 +40,57 @@ _HEADERS = {
 }
 
 
-def application(coordinator: Coordinator, hello: server_messages.Hello, guard: Guard) -> ASGIApp:
-    """The application of one editor; starts the rendering process and ends it."""
+def application(
+    coordinator: Coordinator,
+    hello: server_messages.Hello,
+    guard: Guard,
+    reopen: Reopen | None = None,
+) -> ASGIApp:
+    """The application of one editor; starts the rendering process and ends it.
+
+    `reopen` makes the editor of a file that a page sends; without it none is taken.
+    """
+
+    editor = OpenEditor(coordinator, hello, reopen)
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
-        coordinator.dispatcher.start()
+        editor.start()
         yield
-        coordinator.dispatcher.close()
+        editor.close()
 
     async def socket(websocket: WebSocket) -> None:
-        await attend(websocket, coordinator, hello)
+        await attend(websocket, editor.coordinator, editor.hello)
 
     async def edits(_: Request) -> Response:
-        return _download(dump_edits(coordinator.session.document.stack), "edits.yaml", "application/yaml")
+        document = editor.coordinator.session.document
+        return _download(dump_edits(document.stack), "edits.yaml", "application/yaml")
+
+    async def open_file(request: Request) -> Response:
+        length = request.headers.get("content-length", "")
+        try:
+            await editor.open(
+                request.query_params.get("name", ""),
+                request.stream(),
+                int(length) if length.isascii() and length.isdigit() else None,
+            )
+        except TooLargeError as error:
+            return PlainTextResponse(str(error), 413)
+        except (CagefieldError, OSError) as error:
+            return PlainTextResponse(str(error), 400)
+        return PlainTextResponse("opened")
+
+    async def export(request: Request) -> Response:
+        number = _number(request.path_params["number"])
+        file = editor.coordinator.background.exports.file(number)
+        if file is None or not file.is_file():
+            return PlainTextResponse("there is no such file any more; export it again", 404)
+        return FileResponse(file, media_type="application/octet-stream", filename=file.name)
 
     async def camera_path(_: Request) -> Response:
         from cagefield.keyframe_files import dump_path
 
-        document = coordinator.session.document
+        document = editor.coordinator.session.document
         try:
             text = dump_path(document.placed_keys, loop=document.loop)
         except CagefieldError as error:
@@ -62,6 +98,7 @@ def application(coordinator: Coordinator, hello: server_messages.Hello, guard: G
         return _download(text, "camera_path.json", "application/json")
 
     async def screenshot(request: Request) -> Response:
+        coordinator = editor.coordinator
         newest = max(coordinator.pages, default=0)
         page = coordinator.pages.get(_number(request.query_params.get("page", str(newest))))
         if page is None:
@@ -80,6 +117,8 @@ def application(coordinator: Coordinator, hello: server_messages.Hello, guard: G
         Route("/edits.yaml", edits),
         Route("/camera_path.json", camera_path),
         Route("/screenshot.png", screenshot),
+        Route("/open", open_file, methods=["POST"]),
+        Route("/exports/{number}/{name}", export),
         Mount("/", StaticFiles(directory=STATIC, html=True)),
     ]
     return _Guarded(Starlette(routes=routes, lifespan=life), guard)
@@ -111,7 +150,7 @@ class _Guarded:
             connection.headers,
             connection.cookies,
             connection.query_params,
-            needs_origin=scope["type"] == "websocket",
+            needs_origin=scope["type"] == "websocket" or scope["method"] not in _READING,
         )
         if scope["type"] == "websocket":
             if refusal is None:
@@ -123,7 +162,11 @@ class _Guarded:
         respond = _with_headers(send)
         if refusal is not None:
             await PlainTextResponse(refusal + "\n", 403)(scope, receive, respond)
-        elif self._guard.token is not None and "token" in connection.query_params:
+        elif (
+            self._guard.token is not None
+            and "token" in connection.query_params
+            and scope["method"] in _READING
+        ):
             await self._keep_token(scope, receive, respond)
         else:
             await self._app(scope, receive, respond)

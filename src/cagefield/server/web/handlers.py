@@ -290,6 +290,10 @@ class MessageHandlers:
         self._coordinator.background.render(message)
         self._coordinator.pump()
 
+    @_handles(client_messages.ExportSplats)
+    def _export(self, message: client_messages.ExportSplats) -> None:
+        self._coordinator.background.export(self._page.number, message.form)
+
     @_handles(client_messages.CancelJob)
     def _cancel_job(self, message: client_messages.CancelJob) -> None:
         self._coordinator.background.cancel(message.job)

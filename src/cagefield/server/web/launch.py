@@ -15,34 +15,49 @@ import cagefield
 from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
+from cagefield.formats.splat_sog import META
 from cagefield.scene import Scene
+from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
+from cagefield.server.web.opening import scene_of_file
 from cagefield.server.web.security import Guard
 
 
 def open_scene(path: Path, device: str = "auto") -> tuple[Coordinator, server_messages.Hello]:
-    """The editor of a scene folder, and what its pages are told first; what a crash left is restored.
+    """The editor of a scene folder or a file of splats, and what its pages are told first.
 
-    Raises CagefieldError for a folder that is no scene.
+    What a crash left is restored. Raises CagefieldError for a folder that is no scene, a file without splats.
     """
+    path = path.parent if path.name == META else path
+    if path.is_file() or ((path / META).is_file() and not is_scene(path)):
+        return open_cached(scene_of_file(path), path, device)
+    return open_cached(path, None, device)
+
+
+def open_cached(
+    path: Path, source: Path | None, device: str = "auto"
+) -> tuple[Coordinator, server_messages.Hello]:
+    """The same of a scene folder, which is that of a file `source` where one is given."""
     scene = Scene.open(path)
-    store = SceneStore(scene, path)
+    store = SceneStore(scene, path, source)
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()
     if recovered is not None:
         session.restore(recovered)
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
-    return coordinator, hello_of(scene, path.resolve().name)
+    name = path.resolve().name if source is None else source.name
+    return coordinator, hello_of(scene, name, str(path.resolve()))
 
 
-def hello_of(scene: Scene, name: str) -> server_messages.Hello:
-    """What a page is told first."""
+def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
+    """What a page is told first; `path` tells the scene from others."""
     cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds
@@ -51,7 +66,9 @@ def hello_of(scene: Scene, name: str) -> server_messages.Hello:
     return server_messages.Hello(
         version=cagefield.__version__,
         page=0,
+        scene=path,
         name=name,
+        splats=isinstance(scene.field, SplatField),
         bounds=(vec3(lower), vec3(upper)),
         voxel=scene.field.sample_spacing,
         up=vec3(shared_up(np.stack(every))) if every else (0.0, 0.0, 1.0),
@@ -109,8 +126,13 @@ def serve(
     coordinator: Coordinator, hello: server_messages.Hello, guard: Guard, listening: socket.socket
 ) -> None:
     """Runs the web server to its end (Ctrl+C, or a signal to terminate)."""
+    device = coordinator.device
+
+    def reopen(scene: Path, source: Path) -> tuple[Coordinator, server_messages.Hello]:
+        return open_cached(scene, source, device)
+
     config = uvicorn.Config(
-        application(coordinator, hello, guard),
+        application(coordinator, hello, guard, reopen),
         log_level="warning",
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,

@@ -20,8 +20,8 @@ from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.web.handlers import MessageHandlers
 from cagefield.server.web.security import Allowance
 
-TOO_BIG, TOO_MANY = 1009, 1008
-"""Close codes of RFC 6455: message too big, policy violation."""
+TOO_BIG, TOO_MANY, COME_AGAIN = 1009, 1008, 1012
+"""Close codes of RFC 6455 and its registry: message too big, policy violation, service restart."""
 
 _log = logging.getLogger(__name__)
 
@@ -128,6 +128,9 @@ def errors_reported_to(page: Page) -> Iterator[None]:
 async def _send(socket: WebSocket, page: Page) -> None:
     while True:
         content = await page.send_queue.get()
+        if content is None:
+            await socket.close(COME_AGAIN, "another scene was opened")
+            return
         if isinstance(content, bytes):
             await socket.send_bytes(content)
         else:

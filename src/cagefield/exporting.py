@@ -1,0 +1,207 @@
+"""A scene as other programs want it: splats, a mesh or points, its edits baked in.
+
+Splats of a scene of splats are its own, moved by its edits. To any other field splats are fitted
+(`training.splat_fitting`): they are trained on the scene's own pictures, edits and all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cages import Cage
+from cagefield.camera_paths import shared_up
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import EditStack
+from cagefield.edits.files import load_edits, parse_edits
+from cagefield.errors import CagefieldError, EditError
+from cagefield.fields.baking import bake
+from cagefield.fields.meshing import Mesh, mesh_of
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.baked_splats import baked_splats
+from cagefield.rendering.edited_field import EditedField, edited_bounds
+from cagefield.scene import Scene
+from cagefield.training.splat_config import SplatConfig
+
+if TYPE_CHECKING:
+    from cagefield.training.splat import SplatTrainResult
+    from cagefield.training.splat_fitting import Surface
+
+MOST_SPLATS = 300_000
+"""Splats that are fitted at most, unless more are asked for."""
+
+DETAIL = 0.5
+"""Pixels of the pictures that splats are fitted to, in voxels at the middle of the field; see `side_of`."""
+
+LONGEST_SIDE = 800
+MOST_VIEWS, MOST_HELD_OUT = 120, 20
+
+RINGS = ((-15.0, 12), (15.0, 16), (40.0, 12), (65.0, 8))
+"""Elevation, degrees, and number of cameras around a scene that has none, or whose edits reach beyond it."""
+
+FOV_X = math.radians(45.0)
+OnStage = Callable[[str, float, str], None]
+Cameras = tuple[tuple[Camera, ...], tuple[Camera, ...]]
+
+
+def baked(scene: Scene) -> SplatField:
+    """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
+    if not isinstance(scene.field, SplatField):
+        raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
+    return baked_splats(scene.field, scene.edits, preserve_opacity=scene.preserve_opacity)
+
+
+def fitted_splats(
+    scene: Scene, config: SplatConfig, on_stage: OnStage = lambda stage, done, note: None
+) -> SplatTrainResult:
+    """Splats fitted to an edited scene of voxels, and how well cameras that they were not fitted to see them.
+
+    Raises CagefieldError where nothing of the field can be seen.
+    """
+    from cagefield.training.splat_fitting import fit_splats
+    from cagefield.training.splat_run import most_splats
+
+    cameras, held_out = fitting_cameras(scene)
+    config = replace(config, splats=config.splats or min(MOST_SPLATS, most_splats(cameras, config)))
+    return fit_splats(
+        scene.renderer,
+        cameras,
+        held_out,
+        edited_bounds(scene.field.bounds, scene.edits),
+        config,
+        unbounded=scene.field.unbounded,
+        background=scene.background,
+        on_stage=on_stage,
+    )
+
+
+def fitting_cameras(scene: Scene) -> Cameras:
+    """The cameras that splats are fitted to a scene from, and those that are held out.
+
+    The scene's train and test cameras; without the latter every eighth is held out. A bounded scene without
+    cameras, or with edits that reach beyond its bounds, is also seen from rings around it.
+    """
+    train = tuple(
+        scene.cameras.get("train") or (camera for group in scene.cameras.values() for camera in group)
+    )
+    test = scene.cameras.get("test", ()) if "train" in scene.cameras else ()
+    bounds = edited_bounds(scene.field.bounds, scene.edits)
+    beyond = not np.allclose(bounds, scene.field.bounds)
+    if not train or (beyond and not scene.field.unbounded):
+        train += _rings(bounds, scene_up(scene))
+    if not test:
+        train, test = tuple(c for n, c in enumerate(train) if n % 8 or len(train) < 4), train[::8]
+    train, test = _evenly(train, MOST_VIEWS), _evenly(test, MOST_HELD_OUT)
+    middle, spacing = scene.field.center, scene.field.sample_spacing
+    return tuple(_sized(c, middle, spacing) for c in train), tuple(_sized(c, middle, spacing) for c in test)
+
+
+def scene_up(scene: Scene) -> NDArray[np.float64]:
+    """The unit direction [3] that is up for a scene's cameras; z where it has none."""
+    poses = [camera.c2w for group in scene.cameras.values() for camera in group]
+    return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+
+def scene_mesh(
+    scene: Scene, resolution: int | None = None, on_progress: Callable[[float], None] | None = None
+) -> Mesh:
+    """The surface of an edited scene, of an unbounded one that in its box of interest.
+
+    Where the scene has edits, holds splats or is unbounded, or a `resolution` (voxels along the longest axis)
+    is given, it is baked onto an even grid first. Raises FieldError where there is no surface.
+    """
+    field = scene.field
+    edited = bool(scene.edits.active)
+    if not isinstance(field, SplatField) and not (edited or field.contracted or resolution):
+        return mesh_of(field)
+    bounds = edited_bounds(field.bounds, scene.edits)
+    if isinstance(field, SplatField):
+        source: SplatField | EditedField = replace(baked(scene), bounds=bounds)
+    else:
+        source = EditedField(field, scene.edits, bounds, scene.preserve_opacity)
+    if resolution is None:
+        resolution = int(np.clip((bounds[1] - bounds[0]).max() / field.sample_spacing + 1, 64, 384))
+    eyes = [camera.origin for group in scene.cameras.values() for camera in group]
+    voxels = bake(
+        source,
+        resolution,
+        bounds=bounds,
+        sh_degree=min(field.sh_degree, 2),
+        eyes=np.array(eyes) if eyes else None,
+        on_progress=on_progress,
+    )
+    return mesh_of(voxels)
+
+
+def scene_points(scene: Scene, count: int, on_stage: OnStage) -> Surface:
+    """At most `count` points of an edited scene's surface, drawn evenly from what its cameras see."""
+    from cagefield.training.splat_fitting import surface_seen
+
+    cameras, _ = fitting_cameras(scene)
+    return surface_seen(scene.renderer, cameras, count, on_stage=on_stage)
+
+
+def cages_of(selection: str, edits: EditStack) -> tuple[Cage, ...]:
+    """The cages, in deformed space, that a selection means.
+
+    An edit's name: its inner cage where the edit has taken it. An edit file's name: those of its edits. Or a
+    cage as edit files have it: `{center: [0, 0, 1], size: [1, 1, 2]}`.
+
+    Raises:
+        EditError: none of these.
+    """
+    text = selection.strip()
+    if text.startswith("{"):
+        found = parse_edits(f"[{{adjustment: discrete, inner: {text}}}]", source="--selection", check=False)
+        return tuple(edit.inner for edit in found)
+    named = [edit for edit in edits if edit.name == selection]
+    if named:
+        return tuple(edit.deformed for edit in named)
+    if text.lower().endswith((".yaml", ".yml", ".json")):
+        return tuple(edit.deformed for edit in load_edits(text, check=False))
+    names = ", ".join(f'"{edit.name}"' for edit in edits if edit.name) or "none has a name"
+    raise EditError(
+        f'--selection "{selection}" is no edit of the scene ({names}); give an edit\'s name, an edit file, '
+        "or a cage such as {center: [0, 0, 1], size: [1, 1, 2]}"
+    )
+
+
+def inside(cages: tuple[Cage, ...], positions: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """True [N] where one of the cages holds a position [N,3]. Raises CagefieldError where none does."""
+    held = np.zeros(len(positions), bool)
+    for cage in cages:
+        held |= cage.contains(np.asarray(positions, np.float64))
+    if not held.any():
+        raise CagefieldError("the selection holds nothing of the scene; look where its cage is in the editor")
+    return held
+
+
+def _sized(camera: Camera, middle: NDArray[np.float64], spacing: float) -> Camera:
+    """The camera with pixels of DETAIL voxels at the middle of the field, or its own finer ones."""
+    own = max(camera.width, camera.height)
+    distance = float(np.linalg.norm(camera.origin - middle))
+    wanted = own * distance / (camera.fx * DETAIL * spacing)
+    side = min(LONGEST_SIDE, max(own, wanted))
+    return camera.resized(max(1, round(camera.width * side / own)), max(1, round(camera.height * side / own)))
+
+
+def _rings(bounds: NDArray[np.float64], up: NDArray[np.float64]) -> tuple[Camera, ...]:
+    radius = 0.5 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
+    return tuple(
+        camera
+        for elevation, count in RINGS
+        for camera in turntable(
+            bounds.mean(axis=0), radius, count, elevation=math.radians(elevation), up=up,
+            width=400, height=400, fov_x=FOV_X,
+        )
+    )  # fmt: skip
+
+
+def _evenly(cameras: tuple[Camera, ...], most: int) -> tuple[Camera, ...]:
+    rows = np.unique(np.linspace(0, len(cameras) - 1, min(most, len(cameras))).round().astype(int))
+    return tuple(cameras[row] for row in rows)

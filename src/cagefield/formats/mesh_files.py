@@ -1,0 +1,139 @@
+"""Meshes and point clouds as files: PLY for both, binary glTF for meshes, colours at the vertices.
+
+PLY: x y z, nx ny nz (float), red green blue (uchar, as a screen shows them), and faces as lists of vertices.
+glTF has y up and linear colours: the scene's own up becomes y by the node's rotation, positions stay what
+they are; COLOR_0 is linear, 16 bits.
+
+Sources: Turk, "The PLY Polygon File Format" (1994); Khronos, "glTF 2.0 Specification", sections 3.7.2.1 and
+4.4; IEC 61966-2-1 (sRGB).
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield.atomic_files import replaced_file
+from cagefield.errors import FieldError
+from cagefield.fields.meshing import Mesh
+from cagefield.rendering.render_result import to_uint8
+
+MESH_SUFFIXES = (".ply", ".glb")
+_FLOAT, _UINT, _USHORT = 5126, 5125, 5123
+_ARRAY, _ELEMENTS = 34962, 34963
+
+
+def write_points(
+    path: str | Path, positions: NDArray[Any], rgb: NDArray[Any], normals: NDArray[Any] | None = None
+) -> None:
+    """Writes positions [M,3], colours [M,3] in [0,1] and normals [M,3] as a PLY, complete or not at all."""
+    _write_ply(Path(path), positions, normals, rgb, None)
+
+
+def write_mesh(path: str | Path, mesh: Mesh, up: ArrayLike = (0.0, 0.0, 1.0)) -> None:
+    """Writes a mesh as .ply or .glb, complete or not at all; `up` [3] is the scene's, for glTF.
+
+    Raises:
+        FieldError: another suffix.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".ply":
+        _write_ply(path, mesh.positions, mesh.normals, mesh.rgb, mesh.faces)
+    elif path.suffix.lower() == ".glb":
+        _write_glb(path, mesh, np.asarray(up, np.float64))
+    else:
+        raise FieldError(f"{path}: a mesh is written as {' or '.join(MESH_SUFFIXES)}; give such a name")
+
+
+def _write_ply(
+    path: Path,
+    positions: NDArray[Any],
+    normals: NDArray[Any] | None,
+    rgb: NDArray[Any],
+    faces: NDArray[np.int32] | None,
+) -> None:
+    columns = [(name, "<f4") for name in ("x", "y", "z")]
+    columns += [(name, "<f4") for name in ("nx", "ny", "nz")] if normals is not None else []
+    columns += [(name, "u1") for name in ("red", "green", "blue")]
+    table = np.empty(len(positions), columns)
+    parts = [positions, *([] if normals is None else [normals]), to_uint8(np.asarray(rgb))]
+    for name, values in zip(table.dtype.names or (), np.concatenate(parts, axis=1).T, strict=True):
+        table[name] = values
+    header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
+    header += [f"element vertex {len(table)}"]
+    header += [f"property {'uchar' if kind == 'u1' else 'float'} {name}" for name, kind in columns]
+    if faces is not None:
+        header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+    with replaced_file(path) as temporary, temporary.open("wb") as file:
+        file.write("\n".join([*header, "end_header", ""]).encode())
+        file.write(table.tobytes())
+        if faces is not None:
+            rows = np.empty(len(faces), [("count", "u1"), ("vertices", "<i4", (3,))])
+            rows["count"], rows["vertices"] = 3, faces
+            file.write(rows.tobytes())
+
+
+def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64]) -> None:
+    colours = np.full((len(mesh.rgb), 4), 65535, "<u2")
+    colours[:, :3] = np.rint(65535.0 * linear(mesh.rgb))
+    parts: list[tuple[NDArray[Any], int, str, int]] = [
+        (mesh.positions.astype("<f4"), _FLOAT, "VEC3", _ARRAY),
+        (mesh.normals.astype("<f4"), _FLOAT, "VEC3", _ARRAY),
+        (colours, _USHORT, "VEC4", _ARRAY),
+        (mesh.faces.astype("<u4").reshape(-1), _UINT, "SCALAR", _ELEMENTS),
+    ]
+    views, accessors, offset = list[dict[str, Any]](), list[dict[str, Any]](), 0
+    for values, component, kind, target in parts:
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": values.nbytes, "target": target})
+        accessors.append(
+            {"bufferView": len(accessors), "componentType": component, "count": len(values), "type": kind}
+        )
+        offset += values.nbytes
+    accessors[0] |= {"min": mesh.positions.min(axis=0).tolist(), "max": mesh.positions.max(axis=0).tolist()}
+    accessors[2]["normalized"] = True
+    document = {
+        "asset": {"version": "2.0", "generator": "cagefield"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "rotation": _to_y(up)}],
+        "meshes": [
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2}, "indices": 3, "material": 0}
+                ]
+            }
+        ],
+        "materials": [
+            {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}, "doubleSided": True}
+        ],
+        "buffers": [{"byteLength": offset}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }
+    text = json.dumps(document, allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    with replaced_file(path) as temporary, temporary.open("wb") as file:
+        file.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + offset))
+        file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        file.write(struct.pack("<I4s", offset, b"BIN\0"))
+        for values, *_ in parts:
+            file.write(values.tobytes())
+
+
+def linear(rgb: NDArray[Any]) -> NDArray[np.float64]:
+    """Linear light [N,3] of colours as screens show them [N,3], both in [0,1]."""
+    c = np.clip(np.asarray(rgb, np.float64), 0.0, 1.0)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def _to_y(up: NDArray[np.float64]) -> list[float]:
+    """The quaternion (x, y, z, w) of a rotation that takes `up` [3] to y."""
+    from scipy.spatial.transform import Rotation
+
+    rotation, _ = Rotation.align_vectors([[0.0, 1.0, 0.0]], [up / np.linalg.norm(up)])
+    return [float(part) for part in rotation.as_quat()]

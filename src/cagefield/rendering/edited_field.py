@@ -1,0 +1,47 @@
+"""A field as its edits make it, to be asked at points of deformed space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import EditStack
+from cagefield.fields.protocol import Field
+from cagefield.typing import Array, Float32
+from cagefield.warps.device_stack import DeviceStack
+
+
+@dataclass(frozen=True, eq=False)
+class EditedField:
+    """A `Field` in deformed space: sigma(p) = |J d| sigma_c(p_c) of the canonical field along d.
+
+    |J d| is 1 where `preserve_opacity` is False; sigma is 0 where an edit left nothing.
+    """
+
+    field: Field
+    edits: EditStack
+    bounds: NDArray[np.float64]
+    preserve_opacity: bool = True
+
+    @cached_property
+    def _stack(self) -> DeviceStack:
+        return DeviceStack.from_stack(self.edits)
+
+    def __call__(self, positions: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
+        """(sigma [N], rgb [N,3]) at deformed positions [N,3] along unit viewdirs [N,3]."""
+        points, along, stretch, emptied = self._stack.to_canonical(
+            np.asarray(positions, np.float32), np.asarray(viewdirs, np.float32)
+        )
+        sigma, rgb = self.field(points, along)
+        if self.preserve_opacity:
+            sigma = sigma * stretch
+        return np.where(emptied, 0.0, sigma).astype(np.float32), rgb
+
+
+def edited_bounds(bounds: Array, edits: EditStack) -> NDArray[np.float64]:
+    """The box [2,3] of a field's bounds and of all that active edits move somewhere else."""
+    boxes = np.concatenate([bounds[None], *(edit.boxes for edit in edits.active)])
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])

@@ -1,0 +1,49 @@
+"""One piece of work in a process of its own: reading and writing large files, beside the pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import signal
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cagefield.errors import CagefieldError, warnings_in_one_line
+
+
+async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
+    """What `work(*args)` returns; work, arguments and result can be pickled.
+
+    Cancelled, it ends the process. Raises CagefieldError: what the work raised, or that the process was lost.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_serve, args=(there, work, args), daemon=True, name="cagefield-file")
+    try:
+        await asyncio.to_thread(process.start)
+        there.close()
+        try:
+            result = await asyncio.to_thread(here.recv)
+        except EOFError:
+            raise CagefieldError("the process that did this ended (out of memory?)") from None
+        if isinstance(result, Exception):
+            raise result
+        return result
+    finally:
+        if process.pid is not None:
+            process.terminate()
+
+
+@warnings_in_one_line()
+def _serve(connection: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        result = work(*args)
+    except CagefieldError as error:
+        result = CagefieldError(str(error))
+    except OSError as error:
+        result = CagefieldError(f"{error.filename or 'the file'}: {error.strerror or error}")
+    except Exception as error:
+        result = CagefieldError(f"that failed: {type(error).__name__}: {error}")
+    connection.send(result)

@@ -1,0 +1,65 @@
+"""Files of splats opened without an import: their scenes lie in the user's cache until Save as is used.
+
+The cached scene has its content's digest in its name: a file that is opened again finds its autosave,
+wherever it lies. Nothing is written beside the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+from pathlib import Path
+
+from cagefield.scene_files import is_scene
+from cagefield.server.editor.persistence import stem_of
+
+KEPT_DAYS = 30
+"""Cached scenes that were not opened for longer are removed, but those with an autosave."""
+
+_BLOCK = 1 << 22
+
+
+def opened_folder() -> Path:
+    """The folder of opened files' scenes in the user's cache."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "opened"
+
+
+def scene_of_file(file: Path) -> Path:
+    """The scene's folder, in the cache, of a splat file or .sog's folder; read where it is not there yet.
+
+    Raises CagefieldError for a file that holds no splats.
+    """
+    from cagefield.formats.splat_files import read_splats
+    from cagefield.formats.splat_import import import_splats
+    from cagefield.scene import Scene
+
+    folder = opened_folder() / f"{stem_of(file)}-{_digest(file)}"
+    if is_scene(folder):
+        os.utime(folder)
+    else:
+        found = import_splats(read_splats(file))
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        _tidy(folder.parent)
+        Scene(found.field, cameras=found.cameras, background=found.background).save(folder)
+    return folder
+
+
+def _digest(file: Path) -> str:
+    """A name for the content of a file."""
+    content = hashlib.blake2b(digest_size=8)
+    for part in sorted(file.iterdir()) if file.is_dir() else [file]:
+        with part.open("rb") as stream:
+            while block := stream.read(_BLOCK):
+                content.update(block)
+    return content.hexdigest()
+
+
+def _tidy(folder: Path) -> None:
+    """Removes scenes that nobody opened for long."""
+    before = time.time() - 86400.0 * KEPT_DAYS
+    for scene in folder.iterdir():
+        kept = folder / f".{scene.name}.cagefield-autosave.json"
+        if scene.is_dir() and scene.stat().st_mtime < before and not kept.exists() and is_scene(scene):
+            shutil.rmtree(scene, ignore_errors=True)

@@ -1,0 +1,98 @@
+"""What is edited now, and a file of splats from a page that takes its place."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import tempfile
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+from cagefield.errors import CagefieldError
+from cagefield.server.protocol import server_messages
+from cagefield.server.render_queue.coordinator import Coordinator
+from cagefield.server.render_worker.own_process import in_own_process
+from cagefield.server.web.opening import scene_of_file
+
+MOST_UPLOAD = 4 << 30
+"""Largest file in bytes that a page may send: 17 million splats with harmonics of degree 3 as a PLY."""
+
+Opened = tuple[Coordinator, server_messages.Hello]
+Reopen = Callable[[Path, Path], Opened]
+
+
+class TooLargeError(CagefieldError):
+    """A file larger than MOST_UPLOAD."""
+
+
+class OpenEditor:
+    """The editor that pages are let into; opening a file changes it for another."""
+
+    def __init__(self, coordinator: Coordinator, hello: server_messages.Hello, reopen: Reopen | None) -> None:
+        """`reopen` makes the editor of a cached scene's folder and the file that it came from, if any may."""
+        self.coordinator, self.hello = coordinator, hello
+        self._reopen = reopen
+        self._is_opening = asyncio.Lock()
+
+    def start(self) -> None:
+        """Starts the rendering process."""
+        self.coordinator.dispatcher.start()
+
+    async def open(self, name: str, content: AsyncIterator[bytes], size: int | None) -> None:
+        """Opens a file of splats that a page sends, of a `size` that it says; pages come again by themselves.
+
+        Changes that were not saved stay in the autosave of what was edited before.
+
+        Raises:
+            TooLargeError: more than MOST_UPLOAD bytes.
+            CagefieldError: another file is being opened, a name that is none, a file without splats.
+        """
+        if self._reopen is None:
+            raise CagefieldError("this editor opens no files; start `cagefield view FILE`")
+        if self._is_opening.locked():
+            raise CagefieldError("another file is being opened; wait until it is there")
+        async with self._is_opening:
+            file_name = Path(name.replace("\\", "/")).name
+            if not file_name or file_name.startswith("."):
+                raise CagefieldError(f"{name!r} is no name of a file; give the file its name, such as x.ply")
+            folder = Path(tempfile.mkdtemp(prefix="cagefield-open-"))
+            try:
+                await _receive(folder / file_name, content, size)
+                scene = await in_own_process(scene_of_file, folder / file_name)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+            self._enter(await asyncio.to_thread(self._reopen, scene, Path.cwd() / file_name))
+
+    def _enter(self, opened: Opened) -> None:
+        """Lets pages into another editor; those of the one before come again."""
+        before, (self.coordinator, self.hello) = self.coordinator, opened
+        for page in list(before.pages.values()):
+            page.send_queue.end()
+        before.close()
+        self.start()
+
+    def close(self) -> None:
+        """Ends the rendering process and all that goes on."""
+        self.coordinator.close()
+
+
+async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) -> None:
+    """Writes what comes into a file. Raises TooLargeError, and CagefieldError where not all of it came."""
+    if size is not None and size > MOST_UPLOAD:
+        raise TooLargeError(_too_large(size))
+    received = 0
+    with file.open("wb") as stream:
+        async for block in content:
+            received += len(block)
+            if received > MOST_UPLOAD:
+                raise TooLargeError(_too_large(received))
+            await asyncio.to_thread(stream.write, block)
+    if size is not None and received != size:
+        raise CagefieldError(f"{file.name}: {received} of {size} bytes came; send it again")
+
+
+def _too_large(size: int) -> str:
+    return (
+        f"the file has {size / 1e9:.1f} GB or more, a page may send {MOST_UPLOAD / 1e9:.1f}; "
+        "open it with `cagefield view FILE`"
+    )

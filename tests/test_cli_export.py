@@ -1,0 +1,256 @@
+"""Scenes exported as splats, meshes and points: what is written, and what is refused in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.files import save_edits
+from cagefield.errors import CagefieldError, EditError
+from cagefield.exporting import (
+    DETAIL,
+    LONGEST_SIDE,
+    MOST_HELD_OUT,
+    MOST_VIEWS,
+    cages_of,
+    fitting_cameras,
+    inside,
+    scene_mesh,
+    scene_up,
+)
+from cagefield.formats.splat_files import read_splats
+from cagefield.ply import read_ply
+from cagefield.rendering.edited_field import EditedField, edited_bounds
+from cagefield.scene import Scene
+from commands import printed, refused
+from scenes import ball_field, ball_scene
+from splat_scenes import ball_of_splats, splat_scene
+
+INNER = Cage.box((0, 0, 0), 1.3)
+MOVED = Edit(INNER, adjustment="discrete", name="ball").translate((0.25, 0, 0))
+COPIED = Edit(INNER, adjustment="discrete", keep_source=True, name="copy").translate((0, 3, 0))
+
+
+def saved(scene: Scene, folder: Path, *edits: Edit) -> Path:
+    """The folder of a scene with edits."""
+    scene.with_edits(EditStack(edits)).save(folder)
+    return folder
+
+
+def centre(file: Path) -> np.ndarray:
+    """The mean position of a PLY's vertices."""
+    vertex = read_ply(file).elements["vertex"]
+    return np.stack([vertex[axis] for axis in "xyz"], axis=1).mean(axis=0)
+
+
+# ---- splats of splats ----
+
+
+def test_edits_are_baked_into_splats(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    scene = saved(splat_scene(), tmp_path / "scene", MOVED)
+    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply")
+    assert "600 splats, SH degree 0; edits baked in" in said and f"written to {tmp_path / 'out.ply'}" in said
+    written, expected = read_splats(tmp_path / "out.ply"), ball_of_splats()
+    order, wanted = np.lexsort(written.means.T), np.lexsort(expected.means.T)
+    np.testing.assert_allclose(
+        written.means[order], expected.means[wanted] + np.float32([0.25, 0, 0]), atol=1e-6
+    )
+    np.testing.assert_allclose(written.opacities[order], expected.opacities[wanted], atol=1e-6)
+
+
+def test_a_scene_without_edits_is_written_as_it_is(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene = saved(splat_scene(), tmp_path / "scene")
+    assert "without edits" in printed(capsys, "export", scene, "-o", tmp_path / "out.ply")
+    written, expected = read_splats(tmp_path / "out.ply"), ball_of_splats()
+    for name in ("means", "log_scales", "quaternions", "sh"):
+        np.testing.assert_allclose(getattr(written, name), getattr(expected, name), atol=1e-6)
+
+
+@pytest.mark.parametrize("selection", ["copy", "file", "{center: [0, 3, 0], size: 1.4}"])
+def test_a_selection_is_what_a_cage_holds_after_the_edits(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, selection: str
+) -> None:
+    scene = saved(splat_scene(), tmp_path / "scene", COPIED)
+    if selection == "file":
+        selection = str(tmp_path / "copy.yaml")
+        save_edits(EditStack([COPIED]), selection)
+    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply", "--selection", selection)
+    assert said.startswith("600 splats")
+    means = read_splats(tmp_path / "out.ply").means
+    # Radius .5 around (0, 3, 0); without the selection there are 1200 splats.
+    np.testing.assert_allclose(np.linalg.norm(means - np.array([0, 3, 0]), axis=1), 0.5, atol=1e-5)
+    printed(capsys, "export", scene, "-o", tmp_path / "all.ply")
+    assert len(read_splats(tmp_path / "all.ply")) == 1200
+
+
+def test_selections_that_mean_nothing_are_refused() -> None:
+    stack = EditStack([MOVED])
+    assert cages_of("ball", stack) == (MOVED.deformed,)
+    with pytest.raises(EditError, match=r'"bell" is no edit of the scene \("ball"\); give an edit\'s name'):
+        cages_of("bell", stack)
+    with pytest.raises(EditError, match="a cage needs center and size"):
+        cages_of("{center: [0, 0, 0]}", stack)
+    with pytest.raises(EditError, match="cannot be read"):
+        cages_of("nowhere.yaml", stack)
+    with pytest.raises(CagefieldError, match="the selection holds nothing"):
+        inside((INNER,), np.full((3, 3), 5.0))
+    far = Cage.box((5, 5, 5), 1.0)
+    assert inside((INNER, far), np.array([[0, 0, 0], [5, 5, 5], [3, 3, 3]])).tolist() == [True, True, False]
+
+
+# ---- splats of voxels ----
+
+
+def test_splats_are_fitted_to_voxels_and_their_edits(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene = dataclasses.replace(ball_scene(), field=ball_field(200.0, 25), cameras={})
+    folder = saved(scene, tmp_path / "scene", MOVED)
+    said = printed(
+        capsys, "export", folder, "-o", tmp_path / "out.ply", "--steps", 60, "--splats", 800
+    )  # fmt: skip
+    assert "PSNR against the voxels" in said and "from cameras that were held out" in said
+    splats = read_splats(tmp_path / "out.ply")
+    assert 300 < len(splats) <= 800
+    # The ball, moved: of radius .5 and up to an edge of .083 more, and what splats are wide.
+    low, high = np.quantile(splats.means, (0.02, 0.98), axis=0)
+    np.testing.assert_allclose(0.5 * (low + high)[:2], (0.25, 0), atol=0.04)
+    np.testing.assert_allclose((high - low)[:2], 1.0, atol=0.12)
+    assert float(said.split("held out ")[1].split(" dB")[0]) > 25.0
+
+
+def test_cameras_are_the_scenes_or_stand_around_it() -> None:
+    scene = ball_scene()
+    train, held_out = fitting_cameras(scene)
+    assert (len(train), len(held_out)) == (3, 2)
+    own = scene.cameras["train"][0]
+    distance = np.linalg.norm(own.origin)
+    # Pixels of DETAIL voxels at the middle; more where the camera's own are finer.
+    pixel = distance / train[0].fx
+    assert pixel == pytest.approx(DETAIL * scene.field.sample_spacing, rel=0.02)
+    assert train[0].width / train[0].height == pytest.approx(own.width / own.height, rel=0.02)
+    fine = dataclasses.replace(scene, cameras={"train": tuple(c.resized(1200, 800) for c in train)})
+    train, held_out = fitting_cameras(fine)
+    assert max(train[0].width, train[0].height) == LONGEST_SIDE and (len(train), len(held_out)) == (3, 1)
+    train, held_out = fitting_cameras(dataclasses.replace(scene, cameras={}))
+    assert len(train) + len(held_out) == 48 and not {*train} & {*held_out}
+    many = dataclasses.replace(scene, cameras={"train": own_ring(own, 500), "test": own_ring(own, 90)})
+    assert tuple(map(len, fitting_cameras(many))) == (MOST_VIEWS, MOST_HELD_OUT)
+
+
+def own_ring(camera: Camera, count: int) -> tuple[Camera, ...]:
+    """So many cameras at one place."""
+    return (camera,) * count
+
+
+def test_what_edits_take_out_of_the_box_is_seen_from_around() -> None:
+    scene = ball_scene().with_edits(EditStack([COPIED]))
+    bounds = edited_bounds(scene.field.bounds, scene.edits)
+    np.testing.assert_allclose(bounds, [[-1, -1, -1], [1, 3.65, 1]])
+    train, _ = fitting_cameras(scene)
+    assert len(train) == 3 + 48
+    corners = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
+    for camera in train[3:]:
+        pixels, depth = camera.project(corners)
+        assert (depth > 0).all() and (pixels >= 0).all() and (pixels < (camera.width, camera.height)).all()
+
+
+# ---- meshes and points ----
+
+
+def test_an_edited_field_is_the_field_where_it_was_taken_from() -> None:
+    field, chance = ball_field(), np.random.default_rng(0)
+    edited = EditedField(field, EditStack([MOVED]), edited_bounds(field.bounds, EditStack([MOVED])))
+    points = chance.uniform(-1, 1, (4000, 3)).astype(np.float32)
+    along = np.tile(np.float32([0, 0, 1]), (4000, 1))
+    sigma, rgb = edited(points, along)
+    expected, colour = field(points - np.array([0.25, 0, 0]), along)
+    held, left = MOVED.deformed.contains(points.astype(float)), INNER.contains(points.astype(float))
+    np.testing.assert_allclose(sigma[held], expected[held], rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(rgb[held], colour[held], atol=1e-3)
+    assert (sigma[left & ~held] == 0).all() and (sigma[held] > 0).any()
+
+
+@pytest.mark.parametrize("kind", ["voxels", "splats"])
+def test_meshes_have_the_edits_in_them(capsys: pytest.CaptureFixture[str], tmp_path: Path, kind: str) -> None:
+    pytest.importorskip("skimage", reason="needs scikit-image")
+    scene = ball_scene() if kind == "voxels" else splat_scene()
+    folder = saved(scene, tmp_path / "scene", MOVED)
+    said = printed(capsys, "export", folder, "-o", tmp_path / "out.ply", "--as", "mesh", "--resolution", 48)
+    assert "triangles" in said and "vertices with colours" in said
+    np.testing.assert_allclose(centre(tmp_path / "out.ply"), (0.25, 0, 0), atol=0.03)
+    mesh = scene_mesh(Scene.open(folder), 48)
+    assert np.abs(np.linalg.norm(mesh.positions - [0.25, 0, 0], axis=1) - 0.5).max() < 0.15
+    assert (mesh.rgb[:, 0] > mesh.rgb[:, 1]).mean() > 0.99  # red
+
+
+def test_a_selected_part_of_a_mesh(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    pytest.importorskip("skimage", reason="needs scikit-image")
+    folder = saved(ball_scene(), tmp_path / "scene")
+    half = "{center: [1, 0, 0], size: 2}"
+    printed(capsys, "export", folder, "-o", tmp_path / "half.ply", "--as", "mesh", "--selection", half)
+    vertex = read_ply(tmp_path / "half.ply").elements["vertex"]
+    assert vertex["x"].min() >= 0.0 and vertex["x"].max() > 0.4 and vertex["y"].min() < -0.3
+    printed(capsys, "export", folder, "-o", tmp_path / "whole.glb", "--as", "mesh")
+    assert (tmp_path / "whole.glb").read_bytes()[:4] == b"glTF"
+
+
+def test_points_lie_on_the_surface(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = saved(splat_scene(), tmp_path / "scene", MOVED)
+    said = printed(capsys, "export", folder, "-o", tmp_path / "p.ply", "--as", "points", "--splats", 500)
+    assert "500 points with normals and colours" in said
+    vertex = read_ply(tmp_path / "p.ply").elements["vertex"]
+    points = np.stack([vertex[axis] for axis in "xyz"], axis=1) - (0.25, 0, 0)
+    radius = np.linalg.norm(points, axis=1)
+    # Mean depth through splats that overlap: within a tenth of the ball's radius.
+    assert np.quantile(np.abs(radius - 0.5), 0.9) < 0.05
+    normals = np.stack([vertex[axis] for axis in ("nx", "ny", "nz")], axis=1)
+    assert np.abs(np.einsum("ni,ni->n", normals, points / radius[:, None])).mean() > 0.9
+
+
+def test_up_is_the_cameras(tmp_path: Path) -> None:
+    np.testing.assert_allclose(scene_up(ball_scene()), (0, 0, 1))
+    np.testing.assert_allclose(scene_up(dataclasses.replace(ball_scene(), cameras={})), (0, 0, 1))
+
+
+# ---- refusals ----
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("-o", "x.obj", "--as", "mesh"), "a mesh is written as .ply or .glb"),
+        (("-o", "x.glb", "--as", "points"), "points are written as .ply"),
+        (("-o", "x.xyz"), "x.xyz"),
+        (("-o", "x.ply", "--splats", "7"), "--splats is 7; it must be from 100 to 10000000"),
+        (("-o", "x.ply", "--selection", "arm"), 'selection "arm" is no edit of the scene'),
+    ],
+)
+def test_what_cannot_be_written_is_one_line_before_anything_is_computed(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: tuple[str, ...],
+    line: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    saved(ball_scene(), tmp_path / "scene")
+    assert line in refused(capsys, "export", "scene", *options)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
+
+
+def test_a_file_that_is_there_stays(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    folder = saved(splat_scene(), tmp_path / "scene")
+    (tmp_path / "out.ply").write_text("mine")
+    assert "exists already" in refused(capsys, "export", folder, "-o", tmp_path / "out.ply")
+    assert (tmp_path / "out.ply").read_text() == "mine"
+    printed(capsys, "export", folder, "-o", tmp_path / "out.ply", "--overwrite")
+    assert len(read_splats(tmp_path / "out.ply")) == 600

@@ -1,0 +1,181 @@
+"""Splats fitted to a field's own pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
+from cagefield.quaternions import rotation_matrices
+from cagefield.rendering.metrics import psnr
+from cagefield.rendering.render_result import RenderResult
+from cagefield.rendering.renderers import renderer_of
+from cagefield.training.plane_sweep import CLEAR
+from cagefield.training.splat_config import SplatConfig
+from cagefield.training.splat_fitting import (
+    EMPTY_STEP,
+    FIRST_OPACITY,
+    SOLID,
+    STEP,
+    THICKNESS,
+    WIDTH,
+    Surface,
+    empty_distances,
+    fit_splats,
+    surface_seen,
+    surface_splats,
+    turns_to,
+)
+from scenes import ball_field
+
+BOX = np.array([[-1.0] * 3, [1.0] * 3])
+RADIUS, EDGE = 0.5, 2.0 / 32
+CAMERAS = tuple(
+    camera
+    for elevation in (-0.7, 0.1, 0.8)
+    for camera in turntable((0, 0, 0), 3.0, 6, elevation=elevation, width=64, height=48, fov_x=0.7)
+)
+HELD_OUT = turntable((0, 0, 0), 3.0, 4, elevation=0.45, width=64, height=48, fov_x=0.7)
+BALL = ball_field(density=200.0, resolution=33)
+"""Its surface is where its vertices end: from RADIUS to an edge beyond."""
+
+
+def picture(
+    depth: float | np.ndarray, opacity: float | np.ndarray, shape: tuple[int, int] = (8, 8)
+) -> RenderResult:
+    """A grey picture of depths and opacities, its normals along z."""
+    normals = np.broadcast_to((0.0, 0.0, 1.0), (*shape, 3))
+    grey = np.full((*shape, 3), 0.5)
+    return RenderResult(grey, np.broadcast_to(opacity, shape), np.broadcast_to(depth, shape), normals)
+
+
+# ---- surfaces ----
+
+
+def test_turns_take_z_to_the_normal() -> None:
+    chance = np.random.default_rng(0)
+    normals = chance.normal(size=(200, 3))
+    normals = np.concatenate([normals, np.eye(3), -np.eye(3), [[1e-9, 0.0, -1.0]]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    turned = rotation_matrices(turns_to(normals).astype(np.float64))[:, :, 2]
+    np.testing.assert_allclose(turned, normals, atol=2e-6)  # float32 quaternions
+
+
+def test_the_surface_that_cameras_see_is_the_balls() -> None:
+    surface = surface_seen(renderer_of(BALL), CAMERAS, 3000)
+    distance = np.linalg.norm(surface.positions, axis=1)
+    # Density rises within the edge outside the last vertex; vertices end up to an edge within the radius.
+    assert distance.min() > RADIUS - EDGE and distance.max() < RADIUS + EDGE
+    outwards = surface.positions / distance[:, None]
+    # The ball is a staircase of edges an eighth of its radius long.
+    assert np.einsum("ni,ni->n", surface.normals, outwards).mean() > 0.9
+    # Colours fade to grey in the edge outside, where the field stores nothing; their hue stays.
+    share = (surface.rgb[:, :1] - 0.5) / 0.4
+    np.testing.assert_allclose(surface.rgb - 0.5, share * (0.4, -0.3, -0.4), atol=1e-3)
+    assert share.min() > 0.0
+    octants = {tuple(row) for row in (surface.positions > 0).tolist()}
+    assert len(octants) == 8 and len(surface) == 3000
+
+
+def test_pixels_at_a_step_in_depth_are_on_no_surface() -> None:
+    camera = Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0), width=8, height=8, fov_x=1.0)
+    pixel = 2.0 / camera.fx
+    slope = 2.0 + np.arange(8) * (0.4 * STEP * pixel)
+    step = np.where(np.arange(8) < 4, 2.0, 2.0 + 2.0 * STEP * pixel)
+    assert len(Surface.seen_in(picture(slope[None], 1.0), camera)) == 64
+    # A column on each side has the step among its neighbours.
+    assert len(Surface.seen_in(picture(step[None], 1.0), camera)) == 48
+    # Next to nothing at all there is no step.
+    assert len(Surface.seen_in(picture(2.0, np.where(np.arange(8) < 4, 1.0, 0.0)[None]), camera)) == 32
+    assert len(Surface.seen_in(picture(2.0, SOLID - 0.01), camera)) == 0
+
+
+def test_a_surface_needs_normals_and_something_to_see() -> None:
+    camera = CAMERAS[0]
+    plain = RenderResult(np.zeros((48, 64, 3)), np.ones((48, 64)), np.ones((48, 64)))
+    with pytest.raises(CagefieldError, match="render with normals=True"):
+        Surface.seen_in(plain, camera)
+    elsewhere = Camera.look_at((0, 0, 9), (0, 0, 12), up=(0, 1, 0), width=16, height=16, fov_x=0.5)
+    with pytest.raises(CagefieldError, match="no camera shows a surface"):
+        surface_seen(renderer_of(BALL), [elsewhere], 100)
+
+
+def test_first_splats_lie_flat_on_the_surface() -> None:
+    axis = np.arange(20) * 0.1
+    positions = np.stack([*np.meshgrid(axis, axis), np.zeros((20, 20))], axis=-1).reshape(-1, 3)
+    normals = np.tile(np.float32([0, 0, 1]), (400, 1))
+    rgb = np.tile(np.float32([0.7, 0.3, 0.2]), (400, 1))
+    field = surface_splats(Surface(positions, normals, rgb), 1).to_field(True, BOX, False)
+    inner = ((positions > 0.05) & (positions < 1.85))[:, :2].all(axis=1)
+    # The three nearest on a grid are one spacing away, at its rims too.
+    expected = np.broadcast_to(0.1 * np.array([WIDTH, WIDTH, THICKNESS]), (int(inner.sum()), 3))
+    np.testing.assert_allclose(np.exp(field.log_scales[inner]), expected, rtol=1e-5)
+    np.testing.assert_allclose(field.opacities, FIRST_OPACITY, rtol=1e-5)
+    np.testing.assert_allclose(0.5 + 0.28209479177387814 * field.sh[:, 0], rgb, atol=1e-6)
+    assert (field.sh[:, 1:] == 0).all()
+
+
+def test_empty_space_ends_before_the_nearest_solid_pixel_of_a_square() -> None:
+    depth, opacity = np.full((9, 12), 5.0), np.ones((9, 12))
+    depth[1, 2] = 3.0
+    opacity[2, 5] = 0.5
+    opacity[:, 8:], depth[:, 8:] = 0.0, np.inf
+    distances, known = empty_distances(picture(depth, opacity, (9, 12)))
+    assert EMPTY_STEP == 4 and distances.shape == (2, 3)
+    np.testing.assert_allclose(distances, np.float32([[3 * CLEAR, 0, 0], [5 * CLEAR, 5 * CLEAR, 0]]))
+    np.testing.assert_array_equal(known, [[1, 0, 0], [1, 1, 0]])
+
+
+# ---- the fit ----
+
+
+def score(field: SplatField, reference: object, cameras: tuple[Camera, ...]) -> float:
+    """Mean PSNR of splats against another renderer's pictures, over white."""
+    renderer = renderer_of(field)
+    return float(
+        np.mean(
+            [
+                psnr(renderer.render(c, background="white").rgb, reference.render(c, background="white").rgb)  # type: ignore[attr-defined, union-attr]
+                for c in cameras
+            ]
+        )
+    )
+
+
+def test_fitted_splats_look_like_the_field_from_cameras_that_were_held_out() -> None:
+    reference = renderer_of(BALL)
+    config = SplatConfig(steps=150, splats=1500, sh_degree=0, dropout=0.0)
+    told: list[str] = []
+    result = fit_splats(
+        reference, CAMERAS, HELD_OUT, BOX, config, on_stage=lambda stage, done, note: told.append(stage)
+    )
+    begun = surface_splats(surface_seen(reference, CAMERAS, 900), 0).to_field(True, BOX, False)
+    before, after = score(begun, reference, HELD_OUT), score(result.field, reference, HELD_OUT)
+    assert after > before + 3.0 and after > 30.0
+    # Pictures have 8 bits, which is beyond what these splats show.
+    assert result.test_psnr == pytest.approx(after, abs=0.2)
+    assert len(result.field) <= 1500 and set(told) == {"Rendering", "Fitting"}
+    assert told.index("Fitting") == len(CAMERAS) + len(HELD_OUT)
+
+
+def test_edits_are_in_what_is_fitted() -> None:
+    inner = Cage.box((0, 0, 0), 1.3)
+    moved = Edit(inner, adjustment="discrete").translate((0.5, 0.0, 0.0))
+    reference = renderer_of(BALL, EditStack([moved]))
+    result = fit_splats(
+        reference, CAMERAS, (), BOX, SplatConfig(steps=40, splats=600, sh_degree=0, dropout=0.0)
+    )
+    weights = result.field.opacities
+    np.testing.assert_allclose(
+        np.average(result.field.means, axis=0, weights=weights), (0.5, 0, 0), atol=0.05
+    )
+    assert np.isnan(result.test_psnr)
+
+
+def test_no_cameras_are_refused() -> None:
+    with pytest.raises(CagefieldError, match="no camera"):
+        fit_splats(renderer_of(BALL), (), (), BOX, SplatConfig(steps=1, splats=100))
