@@ -9,6 +9,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.fields.baking import bake
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.metrics import psnr
@@ -174,6 +175,18 @@ def test_edits_are_in_what_is_fitted() -> None:
         np.average(result.field.means, axis=0, weights=weights), (0.5, 0, 0), atol=0.05
     )
     assert np.isnan(result.test_psnr)
+
+
+def test_an_unbounded_field_is_fitted_over_black() -> None:
+    near, far = ball_field(density=200.0, resolution=33), np.array([[-0.4] * 3, [0.4] * 3])
+    voxels = bake(near, 64, bounds=far, sh_degree=0, contracted=True)
+    assert voxels.unbounded
+    reference = renderer_of(voxels)
+    config = SplatConfig(steps=150, splats=1500, sh_degree=0, dropout=0.0)
+    result = fit_splats(reference, CAMERAS, HELD_OUT, far, config, unbounded=True)
+    assert result.field.unbounded and result.test_psnr > 25.0
+    # Black is no splat.
+    assert (np.linalg.norm(result.field.means, axis=1) < 2.0 * RADIUS).mean() > 0.9
 
 
 def test_no_cameras_are_refused() -> None:

@@ -75,7 +75,6 @@ def fitted_splats(
         edited_bounds(scene.field.bounds, scene.edits),
         config,
         unbounded=scene.field.unbounded,
-        background=scene.background,
         on_stage=on_stage,
     )
 

@@ -109,21 +109,18 @@ def fit_splats(
     config: SplatConfig,
     *,
     unbounded: bool = False,
-    background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
     on_stage: OnStage = lambda stage, done, note: None,
 ) -> SplatTrainResult:
     """Splats that look from the cameras as the renderer's pictures do, and their figures from `held_out`.
 
-    `bounds` [2,3] is the box of what is fitted. Of an `unbounded` field the pictures are taken over black, or
-    over white where `background` is; of others without any. `on_stage` is told what is done, how far that
+    `bounds` [2,3] is the box of what is fitted. Of an `unbounded` field the pictures are taken over black,
+    as photos without alpha; of others without any background. `on_stage` is told what is done, how far that
     is, and a note.
 
     Raises:
         CagefieldError: no cameras, or none that shows a surface.
     """
-    behind: Background = None
-    if unbounded:
-        behind = "white" if background == (1.0, 1.0, 1.0) else "black"
+    behind: Background = "black" if unbounded else None
     every = [*cameras, *held_out]
     with tempfile.TemporaryDirectory(prefix="cagefield-fit-") as folder:
         chance = np.random.default_rng(config.seed)
@@ -146,7 +143,7 @@ def fit_splats(
             val=(),
             unbounded=unbounded,
             bounds=bounds,
-            white_background=behind != "black",
+            white_background=not unbounded,
         )
         return train_splat(
             dataset,

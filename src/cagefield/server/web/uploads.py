@@ -61,14 +61,16 @@ class OpenEditor:
                 scene = await in_own_process(scene_of_file, folder / file_name)
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
-            self._enter(await asyncio.to_thread(self._reopen, scene, Path.cwd() / file_name))
+            await self._enter(await asyncio.to_thread(self._reopen, scene, Path.cwd() / file_name))
 
-    def _enter(self, opened: Opened) -> None:
+    async def _enter(self, opened: Opened) -> None:
         """Lets pages into another editor; those of the one before come again."""
         before, (self.coordinator, self.hello) = self.coordinator, opened
         for page in list(before.pages.values()):
             page.send_queue.end()
-        before.close()
+        before.background.exports.close()
+        # It may take seconds to end its process, which the loop has not.
+        await asyncio.to_thread(before.dispatcher.close)
         self.start()
 
     def close(self) -> None:
