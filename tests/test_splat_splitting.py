@@ -139,7 +139,7 @@ def test_nothing_hangs_over_a_cut(delete: bool) -> None:
         return float(weight[INNER.contains(points)].sum() / weight.sum())
 
     whole, split = over(field), over(split_for_edits(field, EditStack([edit])))
-    assert whole > 0.01 and split < 0.2 * whole
+    assert whole > 0.01 and split < 0.3 * whole
 
 
 def test_edits_that_bend_nothing_split_nothing() -> None:

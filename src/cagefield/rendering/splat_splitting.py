@@ -55,8 +55,8 @@ LEAST_WIDTH = 0.15
 ROUNDS = 3
 """Times that what was split is looked through again."""
 
-REACH = 2.5
-"""Standard deviations at which a splat ends, for cuts."""
+REACH = 2.0
+"""Standard deviations at which a splat ends, for cuts: 2 % of it may hang over."""
 
 SMALL = 0.004
 """Splats whose largest standard deviation is below this share of an edit's size are not tried for bending."""
