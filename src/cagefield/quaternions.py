@@ -15,3 +15,12 @@ def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternions_of(rotations: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Unit quaternions [N,4] (w, x, y, z) of rotations [N,3,3]."""
+    from scipy.spatial.transform import Rotation
+
+    if not len(rotations):
+        return np.zeros((0, 4))
+    return np.asarray(Rotation.from_matrix(rotations).as_quat()[:, [3, 0, 1, 2]])

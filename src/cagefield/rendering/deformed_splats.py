@@ -93,7 +93,7 @@ def deformed_splats(
     growth = np.empty(count)
     deform(moved.source, moved.jacobian, field.quaternions, field.log_scales, covariances, rotations, growth)
     means = moved.points.astype(np.float32)
-    places = _Places(moved)
+    places = Places(moved)
     opacities = places.of(field.opacities)
     if not preserve_opacity:
         own = field.opacities[moved.source].astype(np.float64)
@@ -116,18 +116,19 @@ _TURNED = 1e-6
 """Rotations by less than this, radians, are none."""
 
 
-class _Places:
+class Places:
     """Where moved splats are among those that are drawn: in their own rows, where each is shown once."""
 
     def __init__(self, moved: MovedSplats) -> None:
         self._rows: NDArray[np.int64] | None = None
-        self._moved = moved.source
+        self.moved = moved.source
+        """Rows of those that moved."""
         self.total = len(moved.left)
         """Splats that are drawn."""
         if not moved.is_whole:
             kept = np.flatnonzero(~moved.left)
             self._rows = np.concatenate([kept, moved.source])
-            self._moved = np.arange(len(kept), len(self._rows))
+            self.moved = np.arange(len(kept), len(self._rows))
             self.total = len(self._rows)
 
     def of(self, values: Float32) -> Float32:
@@ -137,7 +138,7 @@ class _Places:
     def put(self, values: Float32, moved: Float32) -> Float32:
         """Values of the splats that are drawn, with those of moved ones [M,...] in their places."""
         values = values.copy()
-        values[self._moved] = moved
+        values[self.moved] = moved
         return _frozen(values)
 
 

@@ -24,6 +24,7 @@ from cagefield.rendering.splat_rasterizer import (
     near_depth,
     project,
 )
+from cagefield.rendering.splat_splitting import split_for_edits
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:
@@ -54,7 +55,9 @@ class SplatRenderer:
         self.field = field
         self.edits = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
-        self.splats: DeformedSplats = deformed_splats(field, self.edits, preserve_opacity=preserve_opacity)
+        self.splats: DeformedSplats = deformed_splats(
+            split_for_edits(field, self.edits), self.edits, preserve_opacity=preserve_opacity
+        )
         self._buffers = Buffers()
         self._normals: Float32 | None = None
         self._arrays: SplatArrays | None = None
@@ -69,16 +72,17 @@ class SplatRenderer:
     ) -> SplatRenderer:
         """A renderer of the same field under other edits.
 
-        `coarse` integrates flow shells with long steps: ready sooner, slightly off. `proceed` is called now
-        and then, and gives the renderer up by raising.
+        `coarse` integrates flow shells with long steps and splits no splats: ready sooner, slightly off.
+        `proceed` is called now and then, and gives the renderer up by raising.
         """
         other = object.__new__(SplatRenderer)
         other.__dict__.update(self.__dict__)
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
+        field = self.field if coarse else split_for_edits(self.field, edits, proceed=proceed)
         other.splats = deformed_splats(
-            self.field, edits, preserve_opacity=other.preserve_opacity, coarse=coarse, proceed=proceed
+            field, edits, preserve_opacity=other.preserve_opacity, coarse=coarse, proceed=proceed
         )
         other._normals = other._arrays = None
         return other

@@ -1,0 +1,178 @@
+"""Splats that an edit bends or cuts, split: pictures stay, moments stay, and nothing hangs over."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from cagefield import Cage, Camera, Edit, EditStack
+from cagefield.fields.splat import SplatField
+from cagefield.quaternions import quaternions_of, rotation_matrices
+from cagefield.rendering import splat_splitting
+from cagefield.rendering.baked_splats import baked_splats
+from cagefield.rendering.deformed_splats import deformed_splats
+from cagefield.rendering.metrics import psnr
+from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splat_splitting import split_for_edits
+from splat_scenes import assert_same_splats, random_splats
+
+CAMERA = Camera.look_at((0.3, -4.5, 0.6), (0.1, 0, 0.1), width=100, height=120, fov_x=0.6)
+BENDS = {
+    "stretch": Edit(Cage.box((0, 0, 0.3), (0.6, 0.6, 0.5)), Cage.box((0, 0, 0.3), (2, 2, 3.6))).scale(
+        (1, 1, 4)
+    ),
+    "twist": Edit(Cage.box((0, 0, 0.9), (0.8, 0.8, 0.4)), Cage.box((0, 0, 0.2), (1.8, 1.8, 2.2))).rotate(
+        (0, 0, np.radians(150))
+    ),
+    "bend": Edit(Cage.box((0, 0, 0.8), 0.5), Cage.box((0.3, 0, 0.2), (2.4, 2.4, 2.6)))
+    .translate((0.55, 0, -0.1))
+    .rotate((0, np.radians(60), 0)),
+}
+INNER = Cage.box((0, 0, 0), 0.6)
+
+
+def rod(count: int = 7, opacity: float = 0.9) -> SplatField:
+    """Long splats one after the other along z, a thin part beside the axis."""
+    z = np.linspace(-0.8, 0.8, count)
+    colour = np.stack([1.0 + np.sin(6.0 * z), np.ones(count), 1.0 - np.sin(6.0 * z)], axis=1)
+    return SplatField(
+        np.stack([0.0 * z + 0.15, 0.0 * z, z], axis=1),
+        np.log(np.tile([0.04, 0.04, 0.9 / (count - 1)], (count, 1))),
+        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        np.full(count, opacity),
+        colour[:, None],
+        bounds=np.array([[-2.0] * 3, [2.0] * 3]),
+    )
+
+
+def covariances(field: SplatField) -> np.ndarray:
+    R = rotation_matrices(field.quaternions.astype(np.float64))
+    return R @ (np.exp(2.0 * field.log_scales.astype(np.float64))[:, :, None] * R.transpose(0, 2, 1))
+
+
+@pytest.mark.parametrize("name", BENDS)
+def test_what_is_split_looks_the_same_at_rest(name: str) -> None:
+    field = rod()
+    split = split_for_edits(field, EditStack([BENDS[name]]))
+    assert len(split) > 2 * len(field)
+    pictures = [SplatRenderer(each).render(CAMERA, background="black").rgb for each in (field, split)]
+    # Children that overlap across their row too multiply what each lets through: 1 to 2 % of what is opaque
+    assert psnr(*pictures) > 35.0
+
+
+@pytest.mark.parametrize("name", ["stretch", "bend"])
+def test_split_splats_follow_the_edit_more_closely(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    field, edits = rod(), EditStack([BENDS[name]])
+
+    def shown(parts: SplatField) -> np.ndarray:
+        renderer = SplatRenderer(parts)
+        renderer.splats = deformed_splats(parts, edits)
+        return renderer.render(CAMERA, background="black").rgb
+
+    whole, split = shown(field), shown(split_for_edits(field, edits))
+    monkeypatch.setattr(splat_splitting, "BEND", 0.04)
+    monkeypatch.setattr(splat_splitting, "ROUNDS", 6)
+    fine = shown(split_for_edits(dataclasses.replace(field), edits))
+    assert psnr(split, fine) > psnr(whole, fine) + 1.0
+
+
+def test_a_row_of_children_has_the_width_of_the_splat() -> None:
+    # Faint ones: optical depths add up, so the row is the splat but for its ripple and its ends, 1 %.
+    row = splat_splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([0.3]), np.array([1e-4]))
+    mass = row.opacity * row.r
+    assert np.sum(mass) == pytest.approx(1e-4, rel=0.01)
+    variance = np.sum(mass * (row.r**2 + row.x**2)) / np.sum(mass)
+    assert variance == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("offset", [-0.2, 0.0, 0.3])
+def test_a_cut_keeps_mass_mean_and_covariance(offset: float) -> None:
+    # A faint splat through the middle of the face +x, far from all others.
+    q = quaternions_of(np.linalg.qr(np.random.default_rng(0).normal(size=(1, 3, 3)))[0])
+    field = SplatField(
+        [[0.3 + 0.03 * offset, 0, 0]], np.log([[0.03, 0.02, 0.01]]), q, [1e-3], np.zeros((1, 1, 3))
+    )
+    edit = EditStack([Edit(INNER, adjustment="discrete").translate((0, 2, 0))])
+    rounds, splat_splitting.ROUNDS = splat_splitting.ROUNDS, 1
+    try:
+        parts = split_for_edits(field, edit)
+    finally:
+        splat_splitting.ROUNDS = rounds
+    assert len(parts) == 2 and sorted(parts.means[:, 0] > 0.3) == [False, True]
+    mass = parts.opacities * np.exp(parts.log_scales.sum(axis=1))
+    mass = mass.astype(np.float64) / mass.sum()
+    assert parts.opacities @ np.exp(parts.log_scales.sum(axis=1)) == pytest.approx(
+        1e-3 * np.exp(field.log_scales.sum()), rel=2e-3
+    )
+    mean = mass @ parts.means
+    np.testing.assert_allclose(mean, field.means[0], atol=1e-6)
+    spread = parts.means - mean
+    C = np.einsum("n,nij->ij", mass, covariances(parts)) + np.einsum("n,ni,nj->ij", mass, spread, spread)
+    np.testing.assert_allclose(C, covariances(field)[0], atol=2e-7)
+
+
+@pytest.mark.parametrize("delete", [False, True])
+def test_nothing_hangs_over_a_cut(delete: bool) -> None:
+    chance = np.random.default_rng(0)
+    count = 3000
+    field = SplatField(
+        chance.uniform(-0.6, 0.6, (count, 3)),
+        np.log(chance.uniform(0.02, 0.06, (count, 3))),
+        chance.normal(size=(count, 4)),
+        chance.uniform(0.2, 0.9, count),
+        np.zeros((count, 1, 3)),
+    )
+    edit = Edit.delete(INNER) if delete else Edit(INNER, adjustment="discrete").translate((3.0, 0, 0))
+
+    def over(parts: SplatField) -> float:
+        """The share of the mass that lies where the cage was, of splats that stay."""
+        shown = baked_splats(parts, EditStack([edit]), split=False)
+        shown = shown.take(shown.means[:, 0] < 1.5)
+        chosen = chance.integers(0, len(shown), 100_000)
+        z = chance.normal(size=(len(chosen), 3)) * np.exp(shown.log_scales[chosen])
+        points = shown.means[chosen] + np.einsum(
+            "nij,nj->ni", rotation_matrices(shown.quaternions)[chosen], z
+        )
+        weight = shown.opacities[chosen] * np.exp(shown.log_scales[chosen].sum(axis=1))
+        return float(weight[INNER.contains(points)].sum() / weight.sum())
+
+    whole, split = over(field), over(split_for_edits(field, EditStack([edit])))
+    assert whole > 0.01 and split < 0.3 * whole
+
+
+def test_edits_that_bend_nothing_split_nothing() -> None:
+    field = random_splats(200)
+    far = Edit(Cage.box((9, 0, 0), 0.5), Cage.box((9, 0, 0), 1.5)).translate((0.1, 0, 0))
+    assert split_for_edits(field, EditStack([far])) is field
+    assert split_for_edits(field, EditStack()) is field
+    moved = Edit(Cage.box((0, 0, 0), 50.0), adjustment="discrete").translate((100.0, 0, 0))
+    assert split_for_edits(field, EditStack([moved])) is field
+
+
+def test_there_are_never_many_times_as_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(splat_splitting, "MORE", 10)
+    field = rod(15)
+    assert len(field) < len(split_for_edits(field, EditStack([BENDS["bend"]]))) <= 3 * len(field) + 20
+
+
+@pytest.mark.parametrize("name", [*BENDS, "move"])
+def test_baked_splats_look_as_the_edited_ones(name: str) -> None:
+    field = dataclasses.replace(random_splats(150, degree=2), bounds=np.array([[-2.0] * 3, [2.0] * 3]))
+    moves = {**BENDS, "move": Edit(INNER, adjustment="discrete", keep_source=True).rotate((0.5, 1, 2))}
+    edits = EditStack([moves[name]])
+    edited = SplatRenderer(field, edits).render(CAMERA).rgb
+    baked = baked_splats(field, edits)
+    # Axes and scales of a covariance in float32, and the slack that keeps flat ones positive
+    assert psnr(SplatRenderer(baked).render(CAMERA).rgb, edited) > 60.0
+    assert baked_splats(field, EditStack()) is field
+
+
+def test_baking_leaves_what_no_edit_reaches_as_it_is() -> None:
+    field = random_splats(300, degree=1)
+    edits = EditStack([Edit(Cage.box((0.7, 0.7, 0.7), 0.5), adjustment="discrete").translate((3, 0, 0))])
+    baked = baked_splats(field, edits, split=False)
+    away = np.flatnonzero(~Cage.box((0.7, 0.7, 0.7), 0.5).contains(field.means))
+    assert len(away) < 300
+    assert_same_splats(baked.take(np.flatnonzero(baked.means[:, 0] < 1.5)), field.take(away))
