@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
+from cagefield.sh import MAX_DEGREE
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class SplatField:
         log_scales: [N,3] float32, natural logarithms of the standard deviations along the splats' axes.
         quaternions: [N,4] float32, (w, x, y, z), unit: those given are normalised.
         opacities: [N] float32, in [0, 1].
-        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to 3.
+        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to `sh.MAX_DEGREE`.
         antialiased: opacity is scaled so that what a splat adds to a picture does not grow with the filter of
             .3 pixels^2 that every splat gets (Mip-Splatting's 2D filter).
         bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
@@ -74,7 +75,10 @@ class SplatField:
             if getattr(self, name).shape != shape:
                 raise FieldError(f"{name} must be {list(shape)}, got {list(getattr(self, name).shape)}")
         if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1:] not in _SH_SHAPES:
-            raise FieldError(f"sh must be [{count}, 1|4|9|16, 3] (degree 0 to 3), got {list(self.sh.shape)}")
+            terms = "|".join(str(terms) for terms, _ in _SH_SHAPES)
+            raise FieldError(
+                f"sh must be [{count}, {terms}, 3] (degree 0 to {MAX_DEGREE}), got {list(self.sh.shape)}"
+            )
         for name in (*shapes, "sh"):
             values = getattr(self, name)
             finite = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
@@ -99,7 +103,7 @@ class SplatField:
 
     @property
     def sh_degree(self) -> int:
-        """Degree of the colour's spherical harmonics, 0 to 3."""
+        """Degree of the colour's spherical harmonics, 0 to `sh.MAX_DEGREE`."""
         return _SH_SHAPES.index(self.sh.shape[1:])
 
     @property
@@ -202,7 +206,7 @@ class SplatField:
 
 
 _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
-_SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
+_SH_SHAPES = tuple(((degree + 1) ** 2, 3) for degree in range(MAX_DEGREE + 1))
 
 
 def _box_of(means: Float32) -> NDArray[np.float64]:

@@ -1,9 +1,9 @@
 """Splat files in PLY: the layout of 3D Gaussian splatting's own code, and PlayCanvas' compressed one.
 
 3DGS: an element "vertex" with the columns x y z, f_dc_0..2, f_rest_0..(3K-1) (all of red, then green, then
-blue, K = 0, 3, 8 or 15), opacity (logit), scale_0..2 (natural logarithms), rot_0..3 (w x y z, of any length),
-in any order, beside others. A file of 2DGS has no scale_2: its splats are flat. red, green, blue (0 to 255)
-stand in for f_dc. A comment says where the splats were trained with the antialiased filter:
+blue, K = 0, 3, 8, 15 or 24), opacity (logit), scale_0..2 (natural logarithms), rot_0..3 (w x y z, of any
+length), in any order, beside others. A file of 2DGS has no scale_2: its splats are flat. red, green, blue (0
+to 255) stand in for f_dc. A comment says where the splats were trained with the antialiased filter:
 "SplatRenderMode: mip" (Brush) or "antialiased 1" (Postshot).
 
 Compressed: "chunk", one for each 256 splats, with min and max of x y z, of the logarithms of the scales and,
@@ -42,7 +42,8 @@ LEAST_LOG_SCALE, MOST_LOG_SCALE = -30.0, 30.0
 FLAT = 1e-3
 """Third scale of a splat of 2DGS, against the smaller of its two."""
 
-_REST = {0: 0, 9: 1, 24: 2, 45: 3}  # columns of harmonics above degree 0 -> degree
+_REST = tuple(3 * ((degree + 1) ** 2 - 1) for degree in range(spherical_harmonics.MAX_DEGREE + 1))
+"""Columns of harmonics above degree 0, by degree."""
 _SHAPE = ("x", "y", "z", "opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3")
 
 
@@ -140,7 +141,9 @@ def _harmonics(path: Path, dc: AnyArray, columns: Columns) -> AnyArray:
     """Coefficients [N,(degree+1)^2,3] of those of degree 0 [N,3] and the columns f_rest_*."""
     count = sum(name.startswith("f_rest_") for name in columns)
     if count not in _REST or any(name not in columns for name in _names("f_rest_", count)):
-        raise FieldError(f"{path}: it has {count} columns f_rest_*, expected 0, 9, 24 or 45; export it again")
+        raise FieldError(
+            f"{path}: it has {count} columns f_rest_*, expected 0, 9, 24, 45 or 72; export it again"
+        )
     if not count:
         return dc[:, None]
     rest = _stack(columns, _names("f_rest_", count)).reshape(len(dc), 3, count // 3)

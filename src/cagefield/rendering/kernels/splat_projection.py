@@ -51,6 +51,8 @@ MOST_VARIANCE = 1e30
 C0, C1 = harmonics.C0, harmonics.C1
 C20, C21, C22, C23, C24 = harmonics.C2
 C30, C31, C32, C33, C34, C35, C36 = harmonics.C3
+C40, C41, C42, C43, C44, C45, C46, C47, C48 = harmonics.C4
+MAX_TERMS = harmonics.MAX_TERMS
 
 
 @njit(inline="always", **FAST)
@@ -125,6 +127,18 @@ def harmonics_at(x, y, z, terms, basis):
         basis[13] = C34 * x * (4.0 * z * z - x * x - y * y)
         basis[14] = C35 * z * (x * x - y * y)
         basis[15] = C36 * x * (x * x - 3.0 * y * y)
+    if terms > 16:
+        s = x * x + y * y
+        t = z * z
+        basis[16] = C40 * x * y * (x * x - y * y)
+        basis[17] = C41 * y * z * (3.0 * x * x - y * y)
+        basis[18] = C42 * x * y * (6.0 * t - s)
+        basis[19] = C43 * y * z * (4.0 * t - 3.0 * s)
+        basis[20] = C44 * (8.0 * t * t - 24.0 * t * s + 3.0 * s * s)
+        basis[21] = C45 * x * z * (4.0 * t - 3.0 * s)
+        basis[22] = C46 * (x * x - y * y) * (6.0 * t - s)
+        basis[23] = C47 * x * z * (x * x - 3.0 * y * y)
+        basis[24] = C48 * (x * x * (x * x - 3.0 * y * y) - y * y * (3.0 * x * x - y * y))
 
 
 @njit(parallel=True, **FAST)
@@ -239,7 +253,7 @@ def project(
             ty = R[0, 1] * ex + R[1, 1] * ey + R[2, 1] * ez
             tz = R[0, 2] * ex + R[1, 2] * ey + R[2, 2] * ez
             ex, ey, ez = tx, ty, tz
-        basis = np.empty(16)
+        basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
             colour = 0.5
