@@ -105,3 +105,14 @@ def test_sample_spacing_is_what_most_splats_are_wide() -> None:
     larger = replace(field, log_scales=field.log_scales + np.log(100.0), means=field.means * 100.0,
                      bounds=field.bounds * 100.0)  # fmt: skip
     assert larger.sample_spacing == pytest.approx(100.0 * field.sample_spacing, rel=1e-4)
+
+
+def test_read_only_arrays_are_not_copied() -> None:
+    field = random_splats()
+    again = replace(field, antialiased=True)
+    for name in ("means", "log_scales", "opacities", "sh"):
+        assert np.shares_memory(getattr(again, name), getattr(field, name)), name
+    mine = field.means.copy()
+    taken = replace(field, means=mine)
+    mine[:] = 7.0
+    np.testing.assert_array_equal(taken.means, field.means)

@@ -12,6 +12,7 @@ Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Render
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,10 +32,15 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = "1"
 
+BLOCK = 1 << 18
+"""Splats that are checked at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class SplatField:
     """3D Gaussian splats (canonical space, world units).
+
+    Arrays that may be written to are copied; read-only ones are taken as they are, and must stay so.
 
     Attributes:
         means: [N,3] float32.
@@ -81,18 +87,23 @@ class SplatField:
             )
         for name in (*shapes, "sh"):
             values = getattr(self, name)
-            finite = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
-            if not finite.all():
-                bad = int(np.argmin(finite))
-                raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
+            for rows in _blocks(count):
+                finite = np.isfinite(values[rows]).all(axis=tuple(range(1, values.ndim)))
+                if not finite.all():
+                    bad = rows.start + int(np.argmin(finite))
+                    raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
         if count and not (self.opacities.min() >= 0.0 and self.opacities.max() <= 1.0):
             raise FieldError(
                 f"opacities must lie in [0, 1], got {self.opacities.min():g} to {self.opacities.max():g}"
             )
-        norm = np.linalg.norm(self.quaternions.astype(np.float64), axis=1, keepdims=True)
-        if count and not norm.min() > 0.0:
-            raise FieldError(f"quaternion {int(np.argmin(norm))} of {count} is 0; a rotation has length 1")
-        fix(self, "quaternions", _frozen(self.quaternions / np.maximum(norm, 1e-300), np.float32))
+        unit = np.empty((count, 4), np.float32)
+        for rows in _blocks(count):
+            norm = np.linalg.norm(self.quaternions[rows].astype(np.float64), axis=1, keepdims=True)
+            if not norm.min() > 0.0:
+                bad = rows.start + int(np.argmin(norm))
+                raise FieldError(f"quaternion {bad} of {count} is 0; a rotation has length 1")
+            unit[rows] = self.quaternions[rows] / norm
+        fix(self, "quaternions", _read_only(unit))
         bounds = _box_of(self.means) if self.bounds is None else np.asarray(self.bounds, np.float64)
         if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
             raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
@@ -161,11 +172,11 @@ class SplatField:
     def take(self, rows: NDArray[Any]) -> SplatField:
         """The splats of these rows, or where a mask is True, in the same box."""
         return SplatField(
-            self.means[rows],
-            self.log_scales[rows],
-            self.quaternions[rows],
-            self.opacities[rows],
-            self.sh[rows],
+            _read_only(self.means[rows]),
+            _read_only(self.log_scales[rows]),
+            _read_only(self.quaternions[rows]),
+            _read_only(self.opacities[rows]),
+            _read_only(self.sh[rows]),
             self.antialiased,
             self.bounds,
             self.unbounded,
@@ -196,7 +207,7 @@ class SplatField:
             raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")
         try:
             return cls(
-                **{name: tensors[name] for name in _TENSORS},
+                **{name: _read_only(tensors[name]) for name in _TENSORS},
                 antialiased=metadata.get("antialiased") == "1",
                 bounds=tensors["bounds"],
                 unbounded=metadata.get("unbounded") == "1",
@@ -213,13 +224,31 @@ def _box_of(means: Float32) -> NDArray[np.float64]:
     """The box of the middle 98 % of the means, never flat; the unit cube where there are none."""
     if not len(means):
         return np.array([[-1.0] * 3, [1.0] * 3])
-    low, high = np.quantile(means.astype(np.float64), (0.01, 0.99), axis=0)
+    # One axis at a time: large fields are not copied as a whole.
+    low, high = np.stack([np.quantile(axis.astype(np.float64), (0.01, 0.99)) for axis in means.T], axis=1)
     least = max(1e-3 * float((high - low).max()), 1e-6)
     flat = high - low < least
     return np.stack([np.where(flat, low - least, low), np.where(flat, high + least, high)])
 
 
+def _blocks(count: int) -> Iterator[slice]:
+    """Rows of `count`, so many at a time that what is worked out from them takes little memory."""
+    for start in range(0, count, BLOCK):
+        yield slice(start, min(start + BLOCK, count))
+
+
 def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
-    array = np.array(values, dtype=dtype, order="C")
-    array.setflags(write=False)
-    return array
+    """The values, read-only; copied unless they are that already."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == dtype
+        and values.flags.c_contiguous
+        and not values.flags.writeable
+    ):
+        return values
+    return _read_only(np.array(values, dtype=dtype, order="C"))
+
+
+def _read_only(values: NDArray[Any]) -> NDArray[Any]:
+    values.setflags(write=False)
+    return values

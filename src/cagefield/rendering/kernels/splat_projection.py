@@ -45,6 +45,9 @@ per pixel, 13-15 normal."""
 SLOPE_BLUR = 0.02
 """Variance, in pixels^2, with which the slope of the distance is found: BLUR would level slanted splats."""
 
+DEEPEST = 1.588625448
+"""Li2(ALPHA_MAX): the optical depth, over 2 pi times its area, of the most opaque splat there is."""
+
 MOST_VARIANCE = 1e30
 """Splats of larger variances, in world units^2, are not drawn."""
 
@@ -149,6 +152,9 @@ def project(
     sh,
     rotations,
     normals,
+    masses,
+    depths,
+    rows,
     W,
     origin,
     focal,
@@ -164,18 +170,25 @@ def project(
     keys,
     tiles,
 ):
-    """Packs every splat that the picture can show, with its sorting key (depth z) and box of tiles.
+    """Packs every splat of `rows` that the picture can show, with its sorting key (depth z) and box of tiles.
 
     `rotations` has no rows where no splat was turned, and `normals` none where none are wanted. Splats that
     are not shown get an empty box. tiles: [N,4] x0, x1, y0, y1, ends excluded.
+
+    `masses` [N,2] are those of representatives of many splats (`splat_clusters.merge`), or no rows: their
+    optical depth on the screen is that of the splats they stand for, each blurred on its own, and their
+    opacity the one whose Li2 is that depth over their own projected area. `depths` is the table of
+    o (Li2) in equal steps of Li2 from 0 to Li2(ALPHA_MAX).
     """
     across = (size[0] + TILE - 1) // TILE
     down = (size[1] + TILE - 1) // TILE
     fx, fy = focal[0], focal[1]
     turned = rotations.shape[0] > 0
     with_normals = normals.shape[0] > 0
+    merged = masses.shape[0] > 0
     terms = sh.shape[1]
-    for i in prange(means.shape[0]):
+    for q in prange(rows.size):
+        i = rows[q]
         tiles[i, 0] = 0
         tiles[i, 1] = 0
         dx = np.float64(means[i, 0]) - origin[0]
@@ -208,7 +221,12 @@ def project(
         det = sharp + BLUR * (a + c + BLUR)
         slope_det = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR)
         o = np.float64(opacities[i])
-        if antialiased:
+        if merged:
+            mass = masses[i, 0] * np.sqrt(sharp) + (0.0 if antialiased else BLUR * masses[i, 1])
+            place = min(1.0, mass / np.sqrt(det) / DEEPEST) * (depths.size - 1)
+            step = min(int(place), depths.size - 2)
+            o = depths[step] + (place - step) * (depths[step + 1] - depths[step])
+        elif antialiased:
             o *= max(LEAST_COMPENSATION, np.sqrt(sharp / det))
         reach = 2.0 * np.log(o / ALPHA_MIN)
         if not reach > 0.0:
