@@ -46,7 +46,7 @@ def write_columns(path: Path, columns: dict[str, np.ndarray], order: str = "<", 
     path.write_bytes(header(*lines, kind=kind) + body)
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@pytest.mark.parametrize("degree", [0, 1, 2, 3, 4])
 def test_what_is_written_is_read(tmp_path: Path, degree: int) -> None:
     field = random_splats(degree=degree)
     write_splats(field, tmp_path / "a.ply")

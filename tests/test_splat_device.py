@@ -36,6 +36,7 @@ def on_device(splats: DeformedSplats, view, **options) -> splat_device.DevicePro
         ("pinhole", True, 3, True),
         ("opencv", True, 1, False),
         ("opencv_fisheye", False, 2, True),
+        ("pinhole", False, 4, True),
     ],
 )
 def test_pictures_are_those_of_the_oracle(lens: str, antialiased: bool, degree: int, turned: bool) -> None:

@@ -13,7 +13,7 @@ from cagefield.fields.splat import SplatField
 from splat_scenes import assert_same_splats, random_splats
 
 
-@pytest.mark.parametrize("degree", [0, 3])
+@pytest.mark.parametrize("degree", [0, 3, 4])
 def test_files_hold_everything(tmp_path: Path, degree: int) -> None:
     box = np.array([[-1.0, -2.0, -3.0], [1.0, 2.0, 3.5]])
     field = replace(random_splats(degree=degree), antialiased=True, bounds=box, unbounded=True)
@@ -50,7 +50,11 @@ def spoil(name: str, value: float):
         (spoil("opacities", 1.5), {}, r"opacities must lie in \[0, 1\], got .* to 1.5"),
         (spoil("quaternions", 0.0), {}, "quaternion 3 of 40 is 0; a rotation has length 1"),
         (lambda tensors: tensors.pop("log_scales"), {}, "tensors missing: log_scales"),
-        (lambda tensors: tensors.update(sh=tensors["sh"][:, :3]), {}, r"sh must be \[40, 1|4|9|16, 3\]"),
+        (
+            lambda tensors: tensors.update(sh=tensors["sh"][:, :3]),
+            {},
+            r"sh must be \[40, 1\|4\|9\|16\|25, 3\]",
+        ),
         (lambda tensors: tensors.update(opacities=np.ones(39, np.float32)), {}, r"opacities must be \[40\]"),
         (lambda tensors: tensors.update(bounds=np.zeros((2, 3))), {}, "bounds must be 2 finite corners"),
         (lambda tensors: tensors.update(means=np.array(1.0)), {}, r"means must be \[0, 3\], got \[\]"),
@@ -101,3 +105,14 @@ def test_sample_spacing_is_what_most_splats_are_wide() -> None:
     larger = replace(field, log_scales=field.log_scales + np.log(100.0), means=field.means * 100.0,
                      bounds=field.bounds * 100.0)  # fmt: skip
     assert larger.sample_spacing == pytest.approx(100.0 * field.sample_spacing, rel=1e-4)
+
+
+def test_read_only_arrays_are_not_copied() -> None:
+    field = random_splats()
+    again = replace(field, antialiased=True)
+    for name in ("means", "log_scales", "opacities", "sh"):
+        assert np.shares_memory(getattr(again, name), getattr(field, name)), name
+    mine = field.means.copy()
+    taken = replace(field, means=mine)
+    mine[:] = 7.0
+    np.testing.assert_array_equal(taken.means, field.means)

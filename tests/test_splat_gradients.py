@@ -75,7 +75,7 @@ def scene(view: Camera, antialiased: bool, degree: int, seed: int) -> tuple[Valu
 
 @pytest.mark.parametrize("antialiased", [False, True])
 @pytest.mark.parametrize("lens", LENSES)
-@pytest.mark.parametrize("degree", [0, 2])
+@pytest.mark.parametrize("degree", [0, 2, 4])
 def test_gradients_are_those_of_the_oracle(lens: str, antialiased: bool, degree: int) -> None:
     view = camera(lens, 40, 27)
     values, target, background = scene(view, antialiased, degree, seed=degree + 5)

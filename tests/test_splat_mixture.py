@@ -40,7 +40,7 @@ def unit(values: np.ndarray) -> np.ndarray:
     return values / np.linalg.norm(values, axis=-1, keepdims=True)
 
 
-@pytest.mark.parametrize("degree", [0, 3])
+@pytest.mark.parametrize("degree", [0, 3, 4])
 def test_sums_over_all_splats(degree: int) -> None:
     chance = np.random.default_rng(1)
     field = random_splats(60, degree)

@@ -59,7 +59,7 @@ def test_pictures_of_all_kinds_of_splats(lens: str, antialiased: bool, size: tup
 
 
 @pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@pytest.mark.parametrize("degree", range(harmonics.MAX_DEGREE + 1))
 def test_colours_of_each_degree_and_of_turned_splats(degree: int, turned: bool) -> None:
     view = camera()
     splats = all_kinds(view.origin, degree, turned=turned)

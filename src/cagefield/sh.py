@@ -1,4 +1,4 @@
-"""Real spherical harmonics of degree 0 to 3, in the order and with the signs of 3DGS and Plenoxels.
+"""Real spherical harmonics of degree 0 to 4, in the order and with the signs of 3DGS and Plenoxels.
 
 With d = (x, y, z) a unit direction, the (L+1)^2 values are
   l=0   C0
@@ -6,10 +6,14 @@ With d = (x, y, z) a unit direction, the (L+1)^2 values are
   l=2   C2[0] xy, C2[1] yz, C2[2] (2 z^2 - x^2 - y^2), C2[3] xz, C2[4] (x^2 - y^2)
   l=3   C3[0] y (3 x^2 - y^2), C3[1] xyz, C3[2] y (4 z^2 - x^2 - y^2), C3[3] z (2 z^2 - 3 x^2 - 3 y^2),
         C3[4] x (4 z^2 - x^2 - y^2), C3[5] z (x^2 - y^2), C3[6] x (x^2 - 3 y^2)
+  l=4   C4[0] xy (x^2 - y^2), C4[1] yz (3 x^2 - y^2), C4[2] xy (6 z^2 - s), C4[3] yz (4 z^2 - 3 s),
+        C4[4] (8 z^4 - 24 z^2 s + 3 s^2), C4[5] xz (4 z^2 - 3 s), C4[6] (x^2 - y^2) (6 z^2 - s),
+        C4[7] xz (x^2 - 3 y^2), C4[8] (x^4 - 6 x^2 y^2 + y^4), with s = x^2 + y^2
 They are orthonormal over the sphere: the integral of Y_i Y_j is 1 for i = j, else 0. The order is
 m = -l..l; the Condon-Shortley phase is kept, so odd m have the opposite sign of tables without it.
 
-Source: Ramamoorthi and Hanrahan 2001; constants as in PlenOctrees (Yu et al. 2021), 3DGS (Kerbl et al. 2023).
+Source: Ramamoorthi and Hanrahan 2001; constants as in PlenOctrees (Yu et al. 2021), which has all five
+degrees, and 3DGS (Kerbl et al. 2023).
 """
 
 from __future__ import annotations
@@ -21,7 +25,10 @@ import numpy.typing as npt
 
 from cagefield.errors import FieldError
 
-MAX_DEGREE: Final = 3
+MAX_DEGREE: Final = 4
+"""The highest degree there is: that of .spz files."""
+MAX_TERMS: Final = (MAX_DEGREE + 1) ** 2
+"""Harmonics up to the highest degree."""
 C0: Final = 0.28209479177387814
 C1: Final = 0.4886025119029199
 C2: Final = (
@@ -40,6 +47,17 @@ C3: Final = (
     1.445305721320277,
     -0.5900435899266435,
 )
+C4: Final = (
+    2.5033429417967046,
+    -1.7701307697799304,
+    0.9461746957575601,
+    -0.6690465435572892,
+    0.10578554691520431,
+    -0.6690465435572892,
+    0.47308734787878004,
+    -1.7701307697799304,
+    0.6258357354491761,
+)
 
 
 def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[Any]]:
@@ -49,7 +67,7 @@ def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[An
 
     float32 in, float32 out; anything else gives float64. Directions are not normalised here.
 
-    Raises FieldError for a degree outside 0..3 or directions of another shape.
+    Raises FieldError for a degree outside 0..MAX_DEGREE or directions of another shape.
     """
     if degree not in range(MAX_DEGREE + 1):
         raise FieldError(f"degree of the spherical harmonics must be 0 to {MAX_DEGREE}, got {degree}")
@@ -79,4 +97,15 @@ def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[An
         values[:, 13] = C3[4] * x * (4 * z * z - x * x - y * y)
         values[:, 14] = C3[5] * z * (x * x - y * y)
         values[:, 15] = C3[6] * x * (x * x - 3 * y * y)
+    if degree >= 4:
+        s, t = x * x + y * y, z * z
+        values[:, 16] = C4[0] * x * y * (x * x - y * y)
+        values[:, 17] = C4[1] * y * z * (3 * x * x - y * y)
+        values[:, 18] = C4[2] * x * y * (6 * t - s)
+        values[:, 19] = C4[3] * y * z * (4 * t - 3 * s)
+        values[:, 20] = C4[4] * (8 * t * t - 24 * t * s + 3 * s * s)
+        values[:, 21] = C4[5] * x * z * (4 * t - 3 * s)
+        values[:, 22] = C4[6] * (x * x - y * y) * (6 * t - s)
+        values[:, 23] = C4[7] * x * z * (x * x - 3 * y * y)
+        values[:, 24] = C4[8] * (x * x * (x * x - 3 * y * y) - y * y * (3 * x * x - y * y))
     return values

@@ -12,6 +12,7 @@ Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Render
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
+from cagefield.sh import MAX_DEGREE
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:
@@ -30,17 +32,22 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = "1"
 
+BLOCK = 1 << 18
+"""Splats that are checked at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class SplatField:
     """3D Gaussian splats (canonical space, world units).
+
+    Arrays that may be written to are copied; read-only ones are taken as they are, and must stay so.
 
     Attributes:
         means: [N,3] float32.
         log_scales: [N,3] float32, natural logarithms of the standard deviations along the splats' axes.
         quaternions: [N,4] float32, (w, x, y, z), unit: those given are normalised.
         opacities: [N] float32, in [0, 1].
-        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to 3.
+        sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to `sh.MAX_DEGREE`.
         antialiased: opacity is scaled so that what a splat adds to a picture does not grow with the filter of
             .3 pixels^2 that every splat gets (Mip-Splatting's 2D filter).
         bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
@@ -74,21 +81,29 @@ class SplatField:
             if getattr(self, name).shape != shape:
                 raise FieldError(f"{name} must be {list(shape)}, got {list(getattr(self, name).shape)}")
         if self.sh.ndim != 3 or self.sh.shape[0] != count or self.sh.shape[1:] not in _SH_SHAPES:
-            raise FieldError(f"sh must be [{count}, 1|4|9|16, 3] (degree 0 to 3), got {list(self.sh.shape)}")
+            terms = "|".join(str(terms) for terms, _ in _SH_SHAPES)
+            raise FieldError(
+                f"sh must be [{count}, {terms}, 3] (degree 0 to {MAX_DEGREE}), got {list(self.sh.shape)}"
+            )
         for name in (*shapes, "sh"):
             values = getattr(self, name)
-            finite = np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
-            if not finite.all():
-                bad = int(np.argmin(finite))
-                raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
+            for rows in _blocks(count):
+                finite = np.isfinite(values[rows]).all(axis=tuple(range(1, values.ndim)))
+                if not finite.all():
+                    bad = rows.start + int(np.argmin(finite))
+                    raise FieldError(f"{name} must be finite, splat {bad} of {count} is not; remove it")
         if count and not (self.opacities.min() >= 0.0 and self.opacities.max() <= 1.0):
             raise FieldError(
                 f"opacities must lie in [0, 1], got {self.opacities.min():g} to {self.opacities.max():g}"
             )
-        norm = np.linalg.norm(self.quaternions.astype(np.float64), axis=1, keepdims=True)
-        if count and not norm.min() > 0.0:
-            raise FieldError(f"quaternion {int(np.argmin(norm))} of {count} is 0; a rotation has length 1")
-        fix(self, "quaternions", _frozen(self.quaternions / np.maximum(norm, 1e-300), np.float32))
+        unit = np.empty((count, 4), np.float32)
+        for rows in _blocks(count):
+            norm = np.linalg.norm(self.quaternions[rows].astype(np.float64), axis=1, keepdims=True)
+            if not norm.min() > 0.0:
+                bad = rows.start + int(np.argmin(norm))
+                raise FieldError(f"quaternion {bad} of {count} is 0; a rotation has length 1")
+            unit[rows] = self.quaternions[rows] / norm
+        fix(self, "quaternions", _read_only(unit))
         bounds = _box_of(self.means) if self.bounds is None else np.asarray(self.bounds, np.float64)
         if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
             raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
@@ -99,7 +114,7 @@ class SplatField:
 
     @property
     def sh_degree(self) -> int:
-        """Degree of the colour's spherical harmonics, 0 to 3."""
+        """Degree of the colour's spherical harmonics, 0 to `sh.MAX_DEGREE`."""
         return _SH_SHAPES.index(self.sh.shape[1:])
 
     @property
@@ -157,11 +172,11 @@ class SplatField:
     def take(self, rows: NDArray[Any]) -> SplatField:
         """The splats of these rows, or where a mask is True, in the same box."""
         return SplatField(
-            self.means[rows],
-            self.log_scales[rows],
-            self.quaternions[rows],
-            self.opacities[rows],
-            self.sh[rows],
+            _read_only(self.means[rows]),
+            _read_only(self.log_scales[rows]),
+            _read_only(self.quaternions[rows]),
+            _read_only(self.opacities[rows]),
+            _read_only(self.sh[rows]),
             self.antialiased,
             self.bounds,
             self.unbounded,
@@ -192,7 +207,7 @@ class SplatField:
             raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")
         try:
             return cls(
-                **{name: tensors[name] for name in _TENSORS},
+                **{name: _read_only(tensors[name]) for name in _TENSORS},
                 antialiased=metadata.get("antialiased") == "1",
                 bounds=tensors["bounds"],
                 unbounded=metadata.get("unbounded") == "1",
@@ -202,20 +217,38 @@ class SplatField:
 
 
 _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")
-_SH_SHAPES = ((1, 3), (4, 3), (9, 3), (16, 3))
+_SH_SHAPES = tuple(((degree + 1) ** 2, 3) for degree in range(MAX_DEGREE + 1))
 
 
 def _box_of(means: Float32) -> NDArray[np.float64]:
     """The box of the middle 98 % of the means, never flat; the unit cube where there are none."""
     if not len(means):
         return np.array([[-1.0] * 3, [1.0] * 3])
-    low, high = np.quantile(means.astype(np.float64), (0.01, 0.99), axis=0)
+    # One axis at a time: large fields are not copied as a whole.
+    low, high = np.stack([np.quantile(axis.astype(np.float64), (0.01, 0.99)) for axis in means.T], axis=1)
     least = max(1e-3 * float((high - low).max()), 1e-6)
     flat = high - low < least
     return np.stack([np.where(flat, low - least, low), np.where(flat, high + least, high)])
 
 
+def _blocks(count: int) -> Iterator[slice]:
+    """Rows of `count`, so many at a time that what is worked out from them takes little memory."""
+    for start in range(0, count, BLOCK):
+        yield slice(start, min(start + BLOCK, count))
+
+
 def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:
-    array = np.array(values, dtype=dtype, order="C")
-    array.setflags(write=False)
-    return array
+    """The values, read-only; copied unless they are that already."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == dtype
+        and values.flags.c_contiguous
+        and not values.flags.writeable
+    ):
+        return values
+    return _read_only(np.array(values, dtype=dtype, order="C"))
+
+
+def _read_only(values: NDArray[Any]) -> NDArray[Any]:
+    values.setflags(write=False)
+    return values

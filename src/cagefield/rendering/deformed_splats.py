@@ -149,8 +149,14 @@ def _frozen(values: Float32) -> Float32:
 
 def covariances_of(quaternions: Float32, log_scales: Float32) -> Float32:
     """R diag(s^2) R^T as [N,6] float32 (xx, xy, xz, yy, yz, zz)."""
-    axes = (
-        rotation_matrices(quaternions.astype(np.float64)) * np.exp(log_scales.astype(np.float64))[:, None, :]
-    )
-    full = axes @ axes.transpose(0, 2, 1)
-    return np.ascontiguousarray(full.reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]], np.float32)
+    out = np.empty((len(quaternions), 6), np.float32)
+    for start in range(0, len(out), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        scales = np.exp(log_scales[rows].astype(np.float64))
+        axes = rotation_matrices(quaternions[rows].astype(np.float64)) * scales[:, None, :]
+        out[rows] = (axes @ axes.transpose(0, 2, 1)).reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]]
+    return out
+
+
+_BLOCK = 1 << 16
+"""Splats whose covariances are worked out at a time, in float64."""

@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import spence
 
 from cagefield import devices, lenses
 from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.kernels import splat_blending, splat_projection
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
+from cagefield.rendering.splat_clusters import Clusters, View
 from cagefield.typing import Float32
 
 Region = tuple[int, int, int, int]
@@ -42,6 +44,16 @@ NEAR = 0.04
 
 NOWHERE: Float32 = np.zeros((2, 1, 1), np.float32)
 """Nothing is known to be empty."""
+
+_NO_MASSES: Float32 = np.empty((0, 2), np.float32)
+_NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
+_NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
+
+_SHARES = np.concatenate(
+    [np.linspace(0.0, 0.9, 1000), 0.9 + np.linspace(0.0, splat_projection.ALPHA_MAX - 0.9, 1000)]
+)
+_OPACITIES = np.interp(np.linspace(0.0, splat_projection.DEEPEST, 1024), spence(1.0 - _SHARES), _SHARES)
+"""Opacities o at equal steps of Li2(o); scipy's `spence(1 - o)` is Li2(o)."""
 
 COLOUR, DEPTH, NORMALS = 4, 5, 8
 """Channels of a picture: T and colour; depth as well; normals as well."""
@@ -137,6 +149,15 @@ class Projection:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class _Source:
+    """Splats of which `rows` are projected; masses [N,2] where they are representatives."""
+
+    splats: DeformedSplats
+    rows: NDArray[np.int32]
+    masses: Float32 | None = None
+
+
 class Buffers:
     """Memory that one owner's projections share; a projection is valid until its owner makes the next.
 
@@ -164,46 +185,75 @@ def project(
     region: Region | None = None,
     normals: Float32 | None = None,
     buffers: Buffers | None = None,
+    clusters: Clusters | None = None,
+    detail: float = 0.0,
 ) -> Projection:
     """The splats as `camera` sees them, in the part (x, y, width, height) of its picture.
 
     Splats nearer than the depth `near` are left out. `normals` [N,3] (world, unit, either sign) are needed
     where normals will be asked for.
+
+    With the splats' `clusters`, those out of sight cost nothing, and the picture is the same. A `detail`
+    above 0 has representatives drawn for splats that lie within so many pixels; they have no normals.
     """
     buffers = buffers or Buffers()
     x, y, width, height = region or (0, 0, camera.width, camera.height)
     lens = intrinsics(camera)
-    count = len(splats)
+    W, origin = world_to_camera(camera), camera.origin.astype(np.float64)
+    if clusters is None:
+        sources = [_Source(splats, np.arange(len(splats), dtype=np.int32))]
+    else:
+        view = View.of(
+            origin, W, lens.focal, lens.centre - (x, y), (width, height), lens.limits, near,
+            pinhole=lens.model == splat_projection.PINHOLE,
+        )  # fmt: skip
+        with kernels():
+            rows, *coarser = clusters.rows(view, detail)
+            levels = clusters.levels if coarser else ()
+        sources = [_Source(splats, rows)]
+        sources += [
+            _Source(level.splats, chosen, level.masses) for level, chosen in zip(levels, coarser, strict=True)
+        ]
+    count = sum(len(source.splats) for source in sources)
     packed = buffers.take("packed", (count, PACKED), np.float32)
     keys = buffers.take("keys", (count,), np.float32)
     tiles = buffers.take("tiles", (count, 4), np.int32)
     with kernels():
-        splat_projection.project(
-            splats.means,
-            splats.covariances,
-            splats.opacities,
-            splats.sh,
-            np.empty((0, 3, 3), np.float32) if splats.rotations is None else splats.rotations,
-            np.empty((0, 3), np.float32) if normals is None else normals,
-            world_to_camera(camera),
-            camera.origin.astype(np.float64),
-            lens.focal,
-            lens.centre - (x, y),
-            np.array((width, height)),
-            lens.limits,
-            lens.model,
-            lens.coefficients,
-            lens.radius_limit,
-            near,
-            splats.antialiased,
-            packed,
-            keys,
-            tiles,
-        )
-        shown = np.flatnonzero(tiles[:, 1] > tiles[:, 0])
-        order = shown[np.argsort(keys[shown])]
-        boxes = tiles[order].astype(np.int64)
-        most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum())
+        shown, begin = [], 0
+        for source in sources:
+            end = begin + len(source.splats)
+            splat_projection.project(
+                source.splats.means,
+                source.splats.covariances,
+                source.splats.opacities,
+                source.splats.sh,
+                _NO_ROTATIONS if source.splats.rotations is None else source.splats.rotations,
+                _NO_NORMALS if normals is None else normals,
+                _NO_MASSES if source.masses is None else source.masses,
+                _OPACITIES,
+                source.rows,
+                W,
+                origin,
+                lens.focal,
+                lens.centre - (x, y),
+                np.array((width, height)),
+                lens.limits,
+                lens.model,
+                lens.coefficients,
+                lens.radius_limit,
+                near,
+                splats.antialiased,
+                packed[begin:end],
+                keys[begin:end],
+                tiles[begin:end],
+            )
+            part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
+            shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
+            begin = end
+        every = np.concatenate(shown).astype(np.int64)
+        order = every[np.argsort(keys[every])]
+        boxes = tiles[every]
+        most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
         across, down = -(-width // TILE), -(-height // TILE)
         starts = np.empty(across * down + 1, np.int64)
         firsts = np.empty(len(order) + 1, np.int64)

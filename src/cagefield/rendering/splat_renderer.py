@@ -15,12 +15,14 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import DeformedSplats, deformed_splats
 from cagefield.rendering.render_result import Background, RenderResult
+from cagefield.rendering.splat_clusters import LEAST, Clusters
 from cagefield.rendering.splat_rasterizer import (
     DEPTH,
     NORMALS,
     Buffers,
     Projection,
     Region,
+    kernels,
     near_depth,
     project,
 )
@@ -29,6 +31,10 @@ from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_device import DeviceProjection, SplatArrays
+
+
+MOVING_DETAIL = 1.0
+"""Pixels within which splats are drawn as one while something moves (benchmarks/results/splat_speed.md)."""
 
 
 class SplatRenderer:
@@ -101,7 +107,8 @@ class SplatRenderer:
         """The frame seen by `camera`, or None where `should_stop` said so before or after it was projected.
 
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; nothing
-        nearer than `near` is drawn; `step` changes nothing here.
+        nearer than `near` is drawn; where a `step` is given, as while something moves, groups of splats
+        within MOVING_DETAIL pixels are drawn as one.
         """
         if region is not None:
             x, y, width, height = region
@@ -114,16 +121,26 @@ class SplatRenderer:
         if should_stop is not None and should_stop():
             return None
         with self._buffers.lock:
-            seen = self.project(camera, near=near, region=region, normals=normals)
+            detail = 0.0 if step is None else MOVING_DETAIL
+            seen = self.project(camera, near=near, region=region, normals=normals, detail=detail)
             if should_stop is not None and should_stop():
                 return None
             picture = seen.picture(NORMALS if normals else DEPTH)
         return _frame(picture, background, normals)
 
     def project(
-        self, camera: Camera, *, near: float = 0.0, region: Region | None = None, normals: bool = False
+        self,
+        camera: Camera,
+        *,
+        near: float = 0.0,
+        region: Region | None = None,
+        normals: bool = False,
+        detail: float = 0.0,
     ) -> Projection | DeviceProjection:
-        """The splats as the camera sees them; valid until this renderer projects again."""
+        """The splats as the camera sees them; valid until this renderer projects again.
+
+        `detail` as `splat_rasterizer.project`, on CPUs alone.
+        """
         if normals and self._normals is None:
             self._normals = flattest_axes(self.splats.covariances)
         near = max(near, near_depth(self.field.bounds))
@@ -140,7 +157,15 @@ class SplatRenderer:
             region=region,
             normals=self._normals if normals else None,
             buffers=self._buffers,
+            clusters=self._clusters() if len(self.splats) >= LEAST else None,
+            detail=0.0 if normals else detail,
         )
+
+    def _clusters(self) -> Clusters:
+        """The splats' clusters; those of edited splats lie in the order of the field's own."""
+        own = DeformedSplats.of_field(self.field)
+        with kernels():
+            return Clusters.of(self.splats, None if own is self.splats else Clusters.of(own))
 
     def opacity_before(self, camera: Camera, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixel positions [K,2] of a camera.

@@ -34,12 +34,12 @@ class GridArgs:
     half: vec3
 
 
-SH_C0, SH_C1, SH_C2, SH_C3 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics.C3
+SH_C0, SH_C1, SH_C2, SH_C3, SH_C4 = harmonics.C0, harmonics.C1, harmonics.C2, harmonics.C3, harmonics.C4
 
 
 @qd.func
 def sh_basis(d: vec3, K: qd.template()):
-    """The K real spherical harmonics of the unit direction d, degree 0 to 3 (as `cagefield.sh.sh_basis`)."""
+    """The K real spherical harmonics of the unit direction d, degree 0 to 4 (as `cagefield.sh.sh_basis`)."""
     b = qd.Vector.zero(qd.f32, K)
     b[0] = SH_C0
     if qd.static(K > 1):
@@ -60,6 +60,20 @@ def sh_basis(d: vec3, K: qd.template()):
         b[13] = SH_C3[4] * d.x * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)
         b[14] = SH_C3[5] * d.z * (d.x * d.x - d.y * d.y)
         b[15] = SH_C3[6] * d.x * (d.x * d.x - 3.0 * d.y * d.y)
+    if qd.static(K > 16):
+        x2 = d.x * d.x
+        y2 = d.y * d.y
+        z2 = d.z * d.z
+        s = x2 + y2
+        b[16] = SH_C4[0] * d.x * d.y * (x2 - y2)
+        b[17] = SH_C4[1] * d.y * d.z * (3.0 * x2 - y2)
+        b[18] = SH_C4[2] * d.x * d.y * (6.0 * z2 - s)
+        b[19] = SH_C4[3] * d.y * d.z * (4.0 * z2 - 3.0 * s)
+        b[20] = SH_C4[4] * (8.0 * z2 * z2 - 24.0 * z2 * s + 3.0 * s * s)
+        b[21] = SH_C4[5] * d.x * d.z * (4.0 * z2 - 3.0 * s)
+        b[22] = SH_C4[6] * (x2 - y2) * (6.0 * z2 - s)
+        b[23] = SH_C4[7] * d.x * d.z * (x2 - 3.0 * y2)
+        b[24] = SH_C4[8] * (x2 * (x2 - 3.0 * y2) - y2 * (3.0 * x2 - y2))
     return b
 
 

@@ -45,12 +45,17 @@ per pixel, 13-15 normal."""
 SLOPE_BLUR = 0.02
 """Variance, in pixels^2, with which the slope of the distance is found: BLUR would level slanted splats."""
 
+DEEPEST = 1.588625448
+"""Li2(ALPHA_MAX): the optical depth, over 2 pi times its area, of the most opaque splat there is."""
+
 MOST_VARIANCE = 1e30
 """Splats of larger variances, in world units^2, are not drawn."""
 
 C0, C1 = harmonics.C0, harmonics.C1
 C20, C21, C22, C23, C24 = harmonics.C2
 C30, C31, C32, C33, C34, C35, C36 = harmonics.C3
+C40, C41, C42, C43, C44, C45, C46, C47, C48 = harmonics.C4
+MAX_TERMS = harmonics.MAX_TERMS
 
 
 @njit(inline="always", **FAST)
@@ -125,6 +130,18 @@ def harmonics_at(x, y, z, terms, basis):
         basis[13] = C34 * x * (4.0 * z * z - x * x - y * y)
         basis[14] = C35 * z * (x * x - y * y)
         basis[15] = C36 * x * (x * x - 3.0 * y * y)
+    if terms > 16:
+        s = x * x + y * y
+        t = z * z
+        basis[16] = C40 * x * y * (x * x - y * y)
+        basis[17] = C41 * y * z * (3.0 * x * x - y * y)
+        basis[18] = C42 * x * y * (6.0 * t - s)
+        basis[19] = C43 * y * z * (4.0 * t - 3.0 * s)
+        basis[20] = C44 * (8.0 * t * t - 24.0 * t * s + 3.0 * s * s)
+        basis[21] = C45 * x * z * (4.0 * t - 3.0 * s)
+        basis[22] = C46 * (x * x - y * y) * (6.0 * t - s)
+        basis[23] = C47 * x * z * (x * x - 3.0 * y * y)
+        basis[24] = C48 * (x * x * (x * x - 3.0 * y * y) - y * y * (3.0 * x * x - y * y))
 
 
 @njit(parallel=True, **FAST)
@@ -135,6 +152,9 @@ def project(
     sh,
     rotations,
     normals,
+    masses,
+    depths,
+    rows,
     W,
     origin,
     focal,
@@ -150,18 +170,25 @@ def project(
     keys,
     tiles,
 ):
-    """Packs every splat that the picture can show, with its sorting key (depth z) and box of tiles.
+    """Packs every splat of `rows` that the picture can show, with its sorting key (depth z) and box of tiles.
 
     `rotations` has no rows where no splat was turned, and `normals` none where none are wanted. Splats that
     are not shown get an empty box. tiles: [N,4] x0, x1, y0, y1, ends excluded.
+
+    `masses` [N,2] are those of representatives of many splats (`splat_clusters.merge`), or no rows: their
+    optical depth on the screen is that of the splats they stand for, each blurred on its own, and their
+    opacity the one whose Li2 is that depth over their own projected area. `depths` is the table of
+    o (Li2) in equal steps of Li2 from 0 to Li2(ALPHA_MAX).
     """
     across = (size[0] + TILE - 1) // TILE
     down = (size[1] + TILE - 1) // TILE
     fx, fy = focal[0], focal[1]
     turned = rotations.shape[0] > 0
     with_normals = normals.shape[0] > 0
+    merged = masses.shape[0] > 0
     terms = sh.shape[1]
-    for i in prange(means.shape[0]):
+    for q in prange(rows.size):
+        i = rows[q]
         tiles[i, 0] = 0
         tiles[i, 1] = 0
         dx = np.float64(means[i, 0]) - origin[0]
@@ -194,7 +221,12 @@ def project(
         det = sharp + BLUR * (a + c + BLUR)
         slope_det = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR)
         o = np.float64(opacities[i])
-        if antialiased:
+        if merged:
+            mass = masses[i, 0] * np.sqrt(sharp) + (0.0 if antialiased else BLUR * masses[i, 1])
+            place = min(1.0, mass / np.sqrt(det) / DEEPEST) * (depths.size - 1)
+            step = min(int(place), depths.size - 2)
+            o = depths[step] + (place - step) * (depths[step + 1] - depths[step])
+        elif antialiased:
             o *= max(LEAST_COMPENSATION, np.sqrt(sharp / det))
         reach = 2.0 * np.log(o / ALPHA_MIN)
         if not reach > 0.0:
@@ -239,7 +271,7 @@ def project(
             ty = R[0, 1] * ex + R[1, 1] * ey + R[2, 1] * ez
             tz = R[0, 2] * ex + R[1, 2] * ey + R[2, 2] * ez
             ex, ey, ez = tx, ty, tz
-        basis = np.empty(16)
+        basis = np.empty(MAX_TERMS)
         harmonics_at(ex, ey, ez, terms, basis)
         for ch in range(3):
             colour = 0.5

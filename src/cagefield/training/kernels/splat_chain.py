@@ -27,6 +27,7 @@ from cagefield.compiling import FAST, njit
 from cagefield.rendering.kernels.splat_projection import (
     BLUR,
     LEAST_COMPENSATION,
+    MAX_TERMS,
     clamped,
     distort,
     harmonics_at,
@@ -264,8 +265,8 @@ def add_direction(i, dx, dy, dz, s, packed, sh, terms, G):
     """Adds the mean's gradient through the direction in which its colour is seen; central differences."""
     r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
     ex, ey, ez = dx * r, dy * r, dz * r
-    ahead = np.empty(16)
-    behind = np.empty(16)
+    ahead = np.empty(MAX_TERMS)
+    behind = np.empty(MAX_TERMS)
     slope = np.empty(3)
     h = 1e-3
     for axis in range(3):

@@ -20,7 +20,7 @@ import numpy as np
 from numba import prange
 
 from cagefield.compiling import FAST, njit
-from cagefield.rendering.kernels.splat_projection import AREA, TILE, harmonics_at
+from cagefield.rendering.kernels.splat_projection import AREA, MAX_TERMS, TILE, harmonics_at
 
 MOMENTS, RUNNING = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
@@ -184,7 +184,7 @@ def gauss_newton(
         dy = np.float64(means[i, 1]) - origin[1]
         dz = np.float64(means[i, 2]) - origin[2]
         r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
-        basis = np.empty(16)
+        basis = np.empty(MAX_TERMS)
         harmonics_at(dx * r, dy * r, dz * r, terms, basis)
         norm = 0.0
         for j in range(terms):
