@@ -219,7 +219,9 @@ def test_what_splat_transform_writes_is_read(tmp_path: Path, ending: str, splat_
     write_splats(field, tmp_path / "a.ply")
     convert_with(splat_transform, tmp_path / "a.ply", tmp_path / f"b{ending}")
     got = errors(read_splats(tmp_path / f"b{ending}"), field)
-    assert (np.array(got) <= np.array(BOUNDS[ending]) * (1, 1, 1, 2, 1, 1)).all(), got  # it cuts opacities
+    # It cuts opacities; its palette of harmonics is as small as it likes.
+    palette = np.inf if ending == ".sog" else 1.0
+    assert (np.array(got) <= np.array(BOUNDS[ending]) * (1, 1, 1, 2, 1, palette)).all(), got
 
 
 def convert_with(program: str, source: Path, target: Path) -> None:
