@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cagefield.edits.files import load_edits
 from cagefield.formats.splat_files import read_splats, write_splats
 from cagefield.kernel_cache import kernel_cache
+from cagefield.rendering.baked_splats import baked_splats
 from cagefield.scene import Scene
 from editor_cone import cone
 from editor_page import EditorPage, editor_page
@@ -72,7 +74,9 @@ def test_the_edited_splats_download_with_the_edits_in_them(editor: EditorPage, f
     assert download.suggested_filename == "ball.ply"
     download.save_as(folder.parent / "down.ply")
     means = read_splats(folder.parent / "down.ply").means
-    expected = ball_of_splats().means + np.array([0.25, 0.0, 0.0])
+    edits = load_edits(folder.parent / "ball.yaml")
+    expected = baked_splats(read_splats(folder / "ball.ply"), edits).means
+    assert expected[:, 0].mean() > 0.05
     np.testing.assert_allclose(np.sort(means, axis=0), np.sort(expected, axis=0), atol=1e-6)
     assert [entry.name for entry in folder.iterdir()] == ["ball.ply"]
 

@@ -198,7 +198,7 @@ def test_a_pickle_that_would_run_code_is_refused_and_not_run(tmp_path) -> None:
     ("content", "message"),
     [
         ({"weights": torch.zeros(1)}, "no nerf-pytorch checkpoint: it holds weights; expected"),
-        ([1, 2], "holds a list, expected the dict"),
+        ([1, 2], "holds a list, expected a dict"),
         ({"network_fn_state_dict": 3}, "network_fn_state_dict must be a dict of tensors, got int"),
         ({}, "it holds nothing"),
     ],

@@ -1,9 +1,9 @@
 """Pictures of 2DGS' discs as their authors draw them, in float64: the measure of how we draw flat splats.
 
 Notation: a disc has the mean p (camera axes, z forward) and the tangents a, b, each as long as its standard
-deviation. A pixel's ray meets its plane at p + u a + v b, and alpha = o exp(-min(u^2 + v^2, r^2 / 2 F) / 2), r
-the pixel's distance from the projected mean and F = 1/4 pixels^2 that of the filter: a disc is never thinner on
-the picture than a dot of the variance 2 F.
+deviation. A pixel's ray meets its plane at p + u a + v b, and alpha = o exp(-min(u^2 + v^2, r^2 / 2 F) / 2),
+r the pixel's distance from the projected mean and F = 1/4 pixels^2 that of the filter: a disc is never
+thinner on the picture than a dot of the variance 2 F.
 
 With the columns of T = K [a b p] and h_x = x T_3 - T_1, h_y = y T_3 - T_2 of its rows, (u, v, 1) is along
 h_x x h_y.

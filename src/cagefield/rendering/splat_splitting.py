@@ -209,11 +209,14 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
     """The splats that faces go through, in two parts each; of a splat that several cut, the deepest cut."""
     best = np.full(len(rows), np.inf)
     t, direction = np.zeros(len(rows)), np.zeros((len(rows), 3))
-    cages = [edit.inner] if edit.deleted else [edit.inner, edit.deformed]
-    for cage in cages:
+    cuts: list[tuple[Cage, Mask]] = [(edit.inner, np.ones(len(rows), bool))]
+    if not edit.deleted:
+        # What lands in the deformed cage hides what stays there, but not what leaves.
+        cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))
+    for cage, concerned in cuts:
         for face in FACES:
             at, h = _crossing(cage, face, points, A)
-            nearer = np.abs(at) < np.minimum(best, REACH)
+            nearer = concerned & (np.abs(at) < np.minimum(best, REACH))
             best[nearer], t[nearer], direction[nearer] = np.abs(at[nearer]), at[nearer], h[nearer]
     split = np.flatnonzero(best < REACH)
     t, parent, direction = t[split], rows[split], direction[split]
