@@ -131,10 +131,11 @@ def by_spark(
         page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
         page.on("pageerror", lambda error: print(f"page: {error}"))
         with served(root) as address:
-            page.goto(f"{address}/page.html")
-            page.wait_for_function("window.ready === true", timeout=60_000)
             pictures: list[list[Float32]] = []
             for camera in views:
+                # Anew for each view: on a busy machine Spark kept the order of the last one.
+                page.goto(f"{address}/page.html")
+                page.wait_for_function("window.ready === true", timeout=60_000)
                 pictures.append([])
                 for background in backgrounds:
                     wish = {

@@ -1,6 +1,7 @@
 """How long frames and training steps of splats take, and how that grows with splats and pixels.
 
     python benchmarks/splat_speed.py [--ply FILE] [--out benchmarks/results/splat_speed.md]
+    python benchmarks/splat_speed.py --landscape 10000000 [--out benchmarks/results/splat_millions.md]
 
 Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
 random
@@ -24,7 +25,8 @@ from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.fields.splat import SplatField
 from cagefield.formats.splat_files import read_splats
 from cagefield.rendering.images import write_png
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splat_renderer import MOVING_DETAIL, SplatRenderer
+from splat_landscape import landscape
 
 ROUNDS = 7
 
@@ -92,6 +94,47 @@ def training_row(count: int, width: int, height: int, folder: Path) -> tuple[str
     return f"{width}x{height}", str(len(run.state)), number(milliseconds, 1)
 
 
+def landscape_table(count: int) -> Table:
+    """Frames of a landscape of `count` splats: all of it, a part, next to nothing; at rest and in motion."""
+    import resource
+
+    def peak() -> float:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+    field = landscape(count)
+    size = sum(
+        v.nbytes for v in (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
+    )
+    renderer = SplatRenderer(field)
+    views = {
+        "all": camera_of(field, 400, 400),
+        "a tenth": Camera.look_at((0, 0, 3), (5, 3, 0.6), width=400, height=400, fov_x=0.9),
+        "a hundredth": Camera.look_at((0, 0, 1.9), (1, 0.6, 0.6), width=400, height=400, fov_x=0.5),
+    }
+    rows = []
+    for name, camera in views.items():
+        rest, moving = renderer.render(camera), renderer.render(camera, step=1.0)
+        assert rest is not None and moving is not None
+        shown = len(renderer.project(camera).order)
+        for way, frame, step in (("at rest", rest, None), ("moving", moving, 1.0)):
+            drawn = len(renderer.project(camera, detail=0.0 if step is None else MOVING_DETAIL).order)
+            times = []
+            for _ in range(3):
+                began = time.process_time()
+                renderer.render(camera, step=step)
+                times.append(time.process_time() - began)
+            error = float(np.mean(np.square(frame.rgb - rest.rgb)))
+            agrees = number(-10.0 * np.log10(error), 1) if error > 0.0 else "the same"
+            rows.append((name, way, str(shown), str(drawn), number(1e3 * min(times), 0), agrees))
+    notes = (
+        f"{count} splats, {size / 2**30:.2f} GiB; most memory of the process: {peak():.2f} GiB.",
+        "CPU time of both cores, the least of three. dB: against the picture at rest.",
+        f"Machine: {Machine.here()}",
+    )
+    columns = ("in view", "picture", "splats seen", "drawn", "CPU ms", "dB")
+    return Table("Frames of a landscape", columns, tuple(rows), notes, names=2)
+
+
 def main() -> None:
     """Measures and writes the tables."""
     import tempfile
@@ -99,7 +142,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ply", type=Path)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--landscape", type=int)
     options = parser.parse_args()
+    if options.landscape:
+        text = landscape_table(options.landscape).markdown()
+        print(text)
+        if options.out:
+            write_text(options.out, text)
+        return
     machine = f"Machine: {Machine.here()}"
     rows = []
     if options.ply:

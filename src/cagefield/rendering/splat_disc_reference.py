@@ -1,7 +1,8 @@
 """Pictures of 2DGS' discs as their authors draw them, in float64: the measure of how we draw flat splats.
 
 Notation: a disc has the mean p (camera axes, z forward) and the tangents a, b, each as long as its standard
-deviation. A pixel's ray meets its plane at p + u a + v b, and alpha = o exp(-min(u^2 + v^2, r^2 / 2 F) / 2),
+deviation. A pixel's ray meets its plane at p + u a + v b, and
+    alpha = o exp(-min(u^2 + v^2, r^2 / (2 F)) / 2),
 r the pixel's distance from the projected mean and F = 1/4 pixels^2 that of the filter: a disc is never
 thinner on the picture than a dot of the variance 2 F.
 
@@ -51,7 +52,7 @@ def render_discs(
         hit = np.cross(x[..., None] * T[n, 2] - T[n, 0], y[..., None] * T[n, 2] - T[n, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
             uv = hit[..., :2] / hit[..., 2:]
-            inside = np.nan_to_num((uv**2).sum(axis=-1), nan=np.inf)
+            inside = np.where(hit[..., 2] == 0.0, np.inf, (uv**2).sum(axis=-1))
         mean = T[n, :2, 2] / T[n, 2, 2]
         dot = ((x - mean[0]) ** 2 + (y - mean[1]) ** 2) / (2.0 * FILTER)
         z = np.where(inside <= dot, uv @ T[n, 2, :2] + T[n, 2, 2], T[n, 2, 2])
