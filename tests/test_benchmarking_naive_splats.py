@@ -42,7 +42,7 @@ def test_each_way_lacks_what_its_name_says(name: str) -> None:
     assert np.array_equal(ways["no turned SH"].covariances, whole.covariances)
     assert ways["means only"].rotations is None and ways["no turned SH"].rotations is None
     assert (ways["not split"].rotations is None) == (name == "delete")
-    # A turn by one angle leaves each splat as large as it is; its own covariance is one of the field's.
+    # Every splat has the covariance of one of the field's, and where it moved, not the one it should have.
     own = {row.tobytes() for row in deformed_splats(field, EditStack()).covariances}
     assert all(row.tobytes() in own for row in ways["means only"].covariances)
     assert np.array_equal(ways["means only"].covariances, whole.covariances) == (name == "delete")

@@ -48,8 +48,7 @@ _COLUMNS = (
     "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
     "there carried", "unseen", "lost, seen", "frame time", "min det J", "max stretch", "map time",
 )  # fmt: skip
-_LPIPS = ("LPIPS unedited", "LPIPS edited")
-_NAIVE = tuple(f"lost, {way}" for way in NAIVE)
+_LPIPS, _NAIVE = ("LPIPS unedited", "LPIPS edited"), tuple(f"lost, {way}" for way in NAIVE)
 _NAIVELY = (
     "Lost, means only: each splat moved with its mean, no more; no turned SH: its covariance follows the map "
     "too, its colours do not turn; not split: all but the splitting of splats that an edit bends or cuts."
