@@ -14,6 +14,7 @@ from cagefield.benchmarking.compare import MapTime, continuous, map_time, seen, 
 from cagefield.benchmarking.distortion import Distortion, distortion
 from cagefield.benchmarking.figures import Figures, compare, floats, mean_psnr, pooled_psnr
 from cagefield.benchmarking.figures import changed_pixels as changed
+from cagefield.benchmarking.naive_splats import NAIVE, seen_naively
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
@@ -21,6 +22,7 @@ from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural import procedural_scene
 from cagefield.datasets.procedural.writer import FOV_X
+from cagefield.fields.splat import SplatField
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
@@ -41,13 +43,16 @@ _EYES = {
 }
 """Where pictures are taken from, so that what the cases move is seen."""
 
-
 _COLUMNS = (
     "scene", "edit", "kind", "truth", "views", "PSNR unedited", "PSNR edited", "PSNR lost", "SSIM unedited",
     "SSIM edited", "changed pixels", "there unedited", "there edited", "there lost", "there if left",
     "there carried", "unseen", "lost, seen", "frame time", "min det J", "max stretch", "map time",
 )  # fmt: skip
-_LPIPS = ("LPIPS unedited", "LPIPS edited")
+_LPIPS, _NAIVE = ("LPIPS unedited", "LPIPS edited"), tuple(f"lost, {way}" for way in NAIVE)
+_NAIVELY = (
+    "Lost, means only: each splat moved with its mean, no more; no turned SH: its covariance follows the map "
+    "too, its colours do not turn; not split: all but the splitting of splats that an edit bends or cuts."
+)
 _SHOWN = (
     "scene", "edit", "PSNR unedited", "PSNR edited", "PSNR lost", "there unedited", "there edited",
     "there lost", "frame time",
@@ -61,7 +66,7 @@ class Score:
     `frame_ratio` is the time of an edited frame over that of an unedited one. Only a continuous edit has a
     distortion and a time of its map; `lpips` is that of the unedited and the edited pictures, where measured.
     Of a discrete edit, `visibility` is the share of pixels that show what no training photo showed, and
-    `lost_seen` the PSNR lost on the others.
+    `lost_seen` the PSNR lost on the others. Of splats, `naive` is the PSNR lost by each way of `NAIVE`.
     """
 
     case: Case
@@ -76,6 +81,7 @@ class Score:
     lpips: tuple[float, float] | None = None
     unseen: float = float("nan")
     lost_seen: float = float("nan")
+    naive: tuple[float, ...] = ()
 
 
 def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
@@ -114,6 +120,11 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             hidden = 1.0 - float(known.mean())
             lost_seen = mean_psnr(unedited[truth], before, known) - mean_psnr(pictures, after, known)
         figures = compare(unedited[truth], pictures, before, after)
+        naive: tuple[float, ...] = ()
+        if isinstance(scene.field, SplatField):
+            naive = tuple(
+                figures.unedited - mean_psnr(naively, after) for _, naively in seen_naively(edited, cameras)
+            )
         both = (perceived(unedited[truth], before), perceived(pictures, after)) if perceived else None
         yield Score(
             case,
@@ -128,6 +139,7 @@ def measure(cases: Sequence[Case], bench: Workbench) -> Iterator[Score]:
             both,
             hidden,
             lost_seen,
+            naive,
         )
 
 
@@ -172,10 +184,11 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
     ]
     perceived = any(score.lpips is not None for score in scores)
     explained += [] if perceived else [lpips()[1]]
+    explained += [_NAIVELY] if isinstance(config, SplatConfig) else []
     explained += _means(scores)
     return Table(
         "Edits against ground truth",
-        _COLUMNS + (_LPIPS if perceived else ()),
+        _COLUMNS + (_LPIPS if perceived else ()) + (_NAIVE if isinstance(config, SplatConfig) else ()),
         tuple(_row(score, perceived) for score in scores),
         (*explained, *notes),
         names=4,
@@ -220,6 +233,11 @@ def _means(scores: Sequence[Score]) -> Iterator[str]:
             text += (
                 f", {number(float(np.mean([score.lost_seen for score in chosen])))} dB on what photos showed"
             )
+        if all(score.naive for score in chosen):
+            naive = np.mean([score.naive for score in chosen], axis=0)
+            text += "; " + ", ".join(
+                f"{way}: {number(float(v))}" for way, v in zip(NAIVE, naive, strict=True)
+            )
         yield text + "."
 
 
@@ -250,6 +268,7 @@ def _row(score: Score, perceived: bool) -> tuple[str, ...]:
         "-" if measured is None else number(measured.stretch),
         "-" if taken is None else f"{taken.per_million:.0f} ms",
         *((number(value, 4) for value in pair) if perceived else ()),
+        *(number(value) for value in score.naive),
     )
 
 

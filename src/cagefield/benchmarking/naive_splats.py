@@ -1,0 +1,55 @@
+"""Edits on splats done more simply than `SplatRenderer` does them, for comparison.
+
+Notation as in `cagefield.rendering.deformed_splats`: an edit takes a splat's mean along, its covariance C
+to J C J^T, and its harmonics through R, J = R S. All ways here move, copy, hide and delete by the means, and
+keep opacity; none splits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from cagefield.benchmarking.figures import stacked
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
+from cagefield.rendering.deformed_splats import DeformedSplats, Places, deformed_splats
+from cagefield.rendering.moved_splats import moved_splats
+from cagefield.rendering.render_result import RenderResult
+from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.scene import Scene
+from cagefield.typing import AnyArray
+
+NAIVE = ("means only", "no turned SH", "not split")
+"""Means alone; means and covariances, colours unturned; everything but splitting."""
+
+
+def naive_splats(field: SplatField, edits: EditStack) -> Iterator[tuple[str, DeformedSplats]]:
+    """The splats that each of the `NAIVE` ways makes of a field, by their names, in that order.
+
+    Raises EditError for an edit that cannot be evaluated.
+    """
+    whole = deformed_splats(field, edits)
+    unturned = replace(whole, rotations=None)
+    own = Places(moved_splats(field, edits)).of(DeformedSplats.of_field(field).covariances)
+    yield from zip(NAIVE, (replace(unturned, covariances=own), unturned, whole), strict=True)
+
+
+def seen_naively(scene: Scene, cameras: Sequence[Camera]) -> Iterator[tuple[str, AnyArray]]:
+    """Pictures [V,H,W,3] over white of a scene of splats under its edits, by each of the `NAIVE` ways.
+
+    Raises EditError for an edit that cannot be evaluated.
+    """
+    field = scene.field
+    if not isinstance(field, SplatField):
+        raise CagefieldError(f"naive editing is that of splats, not of a {type(field).__name__}")
+    for name, splats in naive_splats(field, scene.edits):
+        renderer = SplatRenderer(field)
+        renderer.splats = splats
+        frames = [cast(RenderResult, renderer.render(camera, background="white")) for camera in cameras]
+        yield name, stacked([np.clip(frame.rgb, 0.0, 1.0) for frame in frames])
