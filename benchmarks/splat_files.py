@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from cagefield.errors import FieldError
 from cagefield.formats.splat_files import WRITABLE, read_splats, write_splats
 from cagefield.formats.splat_ply import write_splat_ply
-from cagefield.formats.splat_spz import write_spz
+from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import BATCH, FieldTable, SplatBatch
 
 PAIRS = (

@@ -22,7 +22,7 @@ from cagefield.formats import splat_table
 from cagefield.formats.splat_axes import AXES, with_axes
 from cagefield.formats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
 from cagefield.formats.splat_sog_writer import codebook
-from cagefield.formats.splat_spz import write_spz
+from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import FieldTable, SplatBatch
 from cagefield.quaternions import rotation_matrices
 from commands import printed, refused

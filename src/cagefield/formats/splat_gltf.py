@@ -105,9 +105,7 @@ def _source(
     degree = 0
     while degree < 4 and f"{EXTENSION}:SH_DEGREE_{degree + 1}_COEF_0" in names:
         degree += 1
-    sh = [
-        column(f"{EXTENSION}:SH_DEGREE_{l}_COEF_{n}", 3) for l in range(degree + 1) for n in range(2 * l + 1)
-    ]
+    sh = [column(name, 3) for name, _ in _harmonics(degree)]
     if any(part.count != mean.count for part in (rotation, scale, opacity, *sh)):
         raise ValueError("its attributes are of different lengths")
     shift, turn, factor = _transformation(node)
@@ -135,6 +133,13 @@ def _source(
             )
 
     return SplatSource(path, mean.count, degree, GLTF_AXES, batches)
+
+
+def _harmonics(degree: int) -> list[tuple[str, int]]:
+    """(names, widths) of the attributes of harmonics."""
+    return [
+        (f"{EXTENSION}:SH_DEGREE_{of}_COEF_{n}", 3) for of in range(degree + 1) for n in range(2 * of + 1)
+    ]
 
 
 def _transformation(node: dict[str, Any]) -> tuple[AnyArray, AnyArray, float]:
@@ -197,11 +202,7 @@ def write_splat_gltf(path: Path, table: SplatTable, on_progress: OnProgress = la
     count = table.count
     attributes = [("POSITION", 3), (f"{EXTENSION}:ROTATION", 4), (f"{EXTENSION}:SCALE", 3)]
     attributes += [(f"{EXTENSION}:OPACITY", 1)]
-    attributes += [
-        (f"{EXTENSION}:SH_DEGREE_{l}_COEF_{n}", 3)
-        for l in range(table.sh_degree + 1)
-        for n in range(2 * l + 1)
-    ]
+    attributes += _harmonics(table.sh_degree)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     with ExitStack() as stack:
         files = [stack.enter_context(tempfile.TemporaryFile()) for _ in attributes]
