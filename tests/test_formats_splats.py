@@ -19,7 +19,7 @@ from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats import splat_table
-from cagefield.formats.splat_axes import AXES, with_axes
+from cagefield.formats.splat_axes import AXES, Axes, with_axes
 from cagefield.formats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
 from cagefield.formats.splat_sog_writer import codebook
 from cagefield.formats.splat_spz_writer import write_spz
@@ -277,7 +277,9 @@ def test_what_splat_transform_writes_is_read(tmp_path: Path, ending: str, splat_
     bounds = np.array(BOUNDS[ending]) * (1, 1, 1, 2, 1, 1)  # it cuts opacities
     if ending == ".sog":
         bounds[5] = np.inf  # its palette begins at random; what it reads of its own is compared below
-    got = errors(read_splats(tmp_path / f"b{ending}"), field)
+    # Its glTF looks along z, not against it.
+    axes: Axes | None = "luf" if ending == ".glb" else None
+    got = errors(read_splats(tmp_path / f"b{ending}", axes=axes), field)
     assert (np.array(got) <= bounds).all(), got
     if ending != ".glb":  # it writes these alone
         assert_read_alike(splat_transform, tmp_path / f"b{ending}", tmp_path / "c.ply")
@@ -334,7 +336,8 @@ def test_genuine_files_pass_through_every_format(tmp_path: Path, name: str, endi
     assert len(got) == len(field)
     assert distance.max() <= {".ply": 1e-6, ".glb": 1e-6, ".splat": 1e-6}.get(ending, 2e-3) * size
     near = np.abs(got.sh[at][:, :1] - field.sh[:, :1]).max(axis=(1, 2))
-    assert np.median(near) <= BOUNDS[ending][4]
+    step = np.ptp(field.sh[:, 0], axis=0).max() / 510.0 if ending == ".compressed.ply" else 0.0
+    assert np.median(near) <= max(BOUNDS[ending][4], step)
     turned = 1.0 - np.abs((got.quaternions[at] * field.quaternions).sum(axis=1))
     assert np.median(turned) <= BOUNDS[ending][2]
     assert np.median(np.abs(got.opacities[at] - field.opacities)) <= BOUNDS[ending][3]
