@@ -9,12 +9,10 @@ Large: each conversion runs in a process of its own; its largest resident memory
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,11 +23,8 @@ import tyro
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from cagefield.errors import FieldError
-from cagefield.formats.splat_files import WRITABLE, read_splats, write_splats
 from cagefield.formats.splat_ply import write_splat_ply
-from cagefield.formats.splat_spz import write_spz
-from cagefield.formats.splat_table import BATCH, FieldTable, SplatBatch
+from cagefield.formats.splat_table import BATCH, SplatBatch
 
 PAIRS = (
     (".ply", ".spz"),
@@ -50,39 +45,19 @@ class Damage:
     """Files of each format."""
 
     def run(self) -> None:
+        from splat_damage import SLACK, attack, sample_files
         from splat_scenes import random_splats
-        from test_formats_splats import ksplat_of, mutated
 
-        field = random_splats(2000, degree=1)
-        print("| format | files | read all the same | refused in a line | memory grew by, MiB |")
+        print("| format | files | read all the same | refused in a line | most memory / honest memory |")
         print("| --- | --: | --: | --: | --: |")
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            for ending in (*WRITABLE, "-4.spz", ".ksplat"):
-                path = folder / f"a{ending}"
-                if ending == "-4.spz":
-                    write_spz(path, FieldTable(field), version=4)
-                elif ending == ".ksplat":
-                    path.write_bytes(ksplat_of(random_splats(2000, degree=1)))
-                else:
-                    write_splats(field, path)
-                whole, chance, refused = path.read_bytes(), np.random.default_rng(0), 0
-                before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-                for _ in range(self.count):
-                    path.write_bytes(mutated(whole, chance))
-                    with warnings.catch_warnings():
-                        warnings.simplefilter("ignore")
-                        try:
-                            read_splats(path)
-                        except FieldError as error:
-                            if "\n" in str(error):
-                                raise
-                            refused += 1
-                grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-                print(
-                    f"| {ending} | {self.count} | {self.count - refused} | {refused} | {grown:.0f} |",
-                    flush=True,
-                )
+            for ending, content in sample_files(random_splats(2000, degree=1), folder).items():
+                refused, most, honest = attack(folder / f"a{ending}", content, self.count)
+                assert most <= 2.0 * honest + SLACK, f"{ending}: {most / 1e6:.2f} MB, {honest / 1e6:.2f}"
+                read = self.count - refused
+                ratio = f"{most / 1e6:.2f} / {honest / 1e6:.2f} MB"
+                print(f"| {ending} | {self.count} | {read} | {refused} | {ratio} |", flush=True)
 
 
 @dataclass

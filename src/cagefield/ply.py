@@ -7,10 +7,12 @@ Source: Turk, "The PLY Polygon File Format" (1994).
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,7 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _HEADER = 1 << 20  # bytes that a header may take
+_LINES = 1 << 16  # rows of text that are held at a time
 
 
 @dataclass(frozen=True)
@@ -122,17 +125,31 @@ def _header(path: Path, file: BinaryIO) -> tuple[str, list[str], list[_Element]]
 
 
 def _text(path: Path, file: BinaryIO, element: _Element) -> Callable[[int, int], Columns]:
-    """The rows of an element in text, read at once from where the file stands."""
+    """The rows of an element in text, from where the file stands, in a temporary file as numbers."""
     names = [name for name, _ in element.properties]
-    lines = [file.readline().split() for _ in range(min(element.count, path.stat().st_size))]
-    try:
-        values = np.array(lines, np.float64).reshape(element.count, len(names))
-    except ValueError:
-        raise FieldError(
-            f"{path}: its {element.count} rows of {element.name} are not {len(names)} numbers each; the "
-            "file may be truncated, copy it again"
-        ) from None
-    return lambda first, last: {name: values[first:last, column] for column, name in enumerate(names)}
+    row = np.dtype((np.float64, (len(names),)))
+    spool = cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 26))  # noqa: SIM115 - it ends with `rows`
+    done = 0
+    while done < element.count:
+        lines = [line.split() for line in islice(file, min(_LINES, element.count - done))]
+        try:
+            if not lines:
+                raise ValueError
+            spool.write(np.array(lines, np.float64).reshape(len(lines), len(names)).tobytes())
+        except ValueError:
+            raise FieldError(
+                f"{path}: its {element.count} rows of {element.name} are not {len(names)} numbers each; the "
+                "file may be truncated, copy it again"
+            ) from None
+        done += len(lines)
+
+    def rows(first: int, last: int) -> Columns:
+        spool.seek(first * row.itemsize)
+        read = spool.read(max(0, min(last, element.count) - first) * row.itemsize)
+        values = np.frombuffer(read, np.float64).reshape(-1, len(names))
+        return {name: values[:, column] for column, name in enumerate(names)}
+
+    return rows
 
 
 def _binary(

@@ -33,7 +33,8 @@ from cagefield.formats.splat_ply import open_splat_ply, write_splat_ply
 from cagefield.formats.splat_rows import open_splat_rows, write_splat_rows
 from cagefield.formats.splat_sog import META, open_sog
 from cagefield.formats.splat_sog_writer import write_sog
-from cagefield.formats.splat_spz import SPZ_AXES, open_spz, write_spz
+from cagefield.formats.splat_spz import SPZ_AXES, open_spz
+from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import (
     FieldTable,
     OnProgress,
@@ -64,6 +65,9 @@ _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] =
     ".splat": (write_splat_rows, PLY),
     ".glb": (write_splat_gltf, GLTF_AXES),
 }
+
+_MOST_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
+"""Degree of the harmonics that a format can hold, where it is less than what a field can."""
 
 
 def ending_of(path: Path) -> str:
@@ -139,7 +143,7 @@ def convert_splats(
     with spooled(
         _batches(found, axes), degree, found.antialiased, found.count, lambda share: on_progress(0.4 * share)
     ) as table:
-        _write(table, Path(target), target_axes, lambda share: on_progress(0.4 + 0.6 * share))
+        degree = _write(table, Path(target), target_axes, lambda share: on_progress(0.4 + 0.6 * share))
         return table.count, degree
 
 
@@ -195,32 +199,41 @@ def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
         yield with_axes(cut, axes or source.axes, PLY)
 
 
-def _write(table: SplatTable, path: Path, axes: Axes | None, on_progress: OnProgress) -> None:
+def _write(table: SplatTable, path: Path, axes: Axes | None, on_progress: OnProgress) -> int:
+    """Writes the splats; the degree of the harmonics that the format could hold."""
     write, own = writer_of(path)
-    write(path, _Turned(table, axes or own), on_progress)
+    degree = min(table.sh_degree, _MOST_DEGREE.get(ending_of(path), table.sh_degree))
+    if degree < table.sh_degree:
+        warnings.warn(
+            f"{path}: {ending_of(path)} holds harmonics of degree {degree} at most; those above are left out",
+            stacklevel=3,
+        )
+    write(path, _Written(table, axes or own, degree), on_progress)
+    return degree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Turned:
-    """A table in other axes than PLY's."""
+class _Written:
+    """A table in a format's axes, with harmonics of the degree that it holds."""
 
     table: SplatTable
     axes: str
+    sh_degree: int
 
     @property
     def count(self) -> int:
         return self.table.count
 
     @property
-    def sh_degree(self) -> int:
-        return self.table.sh_degree
-
-    @property
     def antialiased(self) -> bool:
         return self.table.antialiased
 
     def batches(self) -> Iterator[SplatBatch]:
-        return (with_axes(batch, PLY, self.axes) for batch in self.table.batches())
+        return (self._of(batch) for batch in self.table.batches())
 
     def sorted_batches(self) -> Iterator[SplatBatch]:
-        return (with_axes(batch, PLY, self.axes) for batch in self.table.sorted_batches())
+        return (self._of(batch) for batch in self.table.sorted_batches())
+
+    def _of(self, batch: SplatBatch) -> SplatBatch:
+        kept = dataclasses.replace(batch, sh=batch.sh[:, : (self.sh_degree + 1) ** 2])
+        return with_axes(kept, PLY, self.axes)

@@ -37,6 +37,9 @@ PALETTE_WIDTH = 64
 """Centroids side by side."""
 
 _MOST_META = 1 << 24
+_MOST_CENTROIDS = (1 << 16) * 24
+"""Pixels of a palette: labels have 16 bits, a centroid at most 24 harmonics above degree 0."""
+
 _DEGREES = {3: 1, 8: 2, 15: 3, 24: 4}  # harmonics above degree 0 -> degree
 
 Images = Callable[[str], bytes]
@@ -106,8 +109,8 @@ def _source(path: Path, meta: dict[str, Any], content: Images) -> SplatSource:
     if count < 1:
         raise ValueError(f"it says that it holds {count} splats")
 
-    def image(name: str, channels: int, least: int = count) -> NDArray[np.uint8]:
-        return _pixels(content(name), name, channels, least)
+    def image(name: str, channels: int) -> NDArray[np.uint8]:
+        return _pixels(content(name), name, channels, count)
 
     low, high = (image(name, 3)[:count] for name in meta["means"]["files"])
     quats = image(meta["quats"]["files"][0], 4)[:count]
@@ -116,7 +119,7 @@ def _source(path: Path, meta: dict[str, Any], content: Images) -> SplatSource:
     mins, maxs = (np.array(meta["means"][end], np.float64).reshape(3) for end in ("mins", "maxs"))
     scale_of = _values(meta["scales"], old)
     colour_of = _values(meta["sh0"], old, 3)
-    palette, labels = _palette(meta["shN"], image, count, old) if meta.get("shN") else (None, None)
+    palette, labels = _palette(meta["shN"], content, count, old) if meta.get("shN") else (None, None)
     degree = 0 if palette is None else _DEGREES[palette.shape[1]]
 
     def batches() -> Iterator[SplatBatch]:
@@ -151,13 +154,13 @@ def _values(part: dict[str, Any], old: bool, channels: int = 3) -> Callable[[NDA
 
 
 def _palette(
-    part: dict[str, Any], image: Callable[..., NDArray[np.uint8]], count: int, old: bool
+    part: dict[str, Any], content: Images, count: int, old: bool
 ) -> tuple[AnyArray, NDArray[np.int64]]:
     """(harmonics [P,K,3] of the palette, labels [N] into it)."""
     centroids, labels = part["files"]
-    bytes_of = image(labels, 2)[:count].astype(np.int64)
+    bytes_of = _pixels(content(labels), labels, 2, count)[:count].astype(np.int64)
     label = bytes_of[:, 0] + 256 * bytes_of[:, 1]
-    pixels = image(centroids, -3, 1)
+    pixels = _pixels(content(centroids), centroids, -3, 1, _MOST_CENTROIDS)
     height, width = pixels.shape[:2]
     above = width // PALETTE_WIDTH
     if above not in _DEGREES or width % PALETTE_WIDTH:
@@ -168,11 +171,14 @@ def _palette(
     return palette.astype(np.float32), label
 
 
-def _pixels(content: bytes, name: str, channels: int, least: int) -> NDArray[np.uint8]:
+def _pixels(
+    content: bytes, name: str, channels: int, least: int, most: int | None = None
+) -> NDArray[np.uint8]:
     """The pixels [n,channels] of an image of at least so many; [height,width,3] where channels is -3."""
+    most = 2 * least + (1 << 16) if most is None else most
     with Image.open(io.BytesIO(content)) as image:
         size = image.width * image.height
-        if size < least or (channels > 0 and size > 2 * least + (1 << 16)):
+        if not least <= size <= most:
             raise ValueError(f"{name} has {size} pixels for {least} splats")
         mode = "RGBA" if channels == 4 else "RGB"
         if mode == "RGB" and image.mode == "RGBA":

@@ -12,7 +12,8 @@ table of contents, and one Zstandard frame a stream. Streams:
                 sign each, and the index of the largest (x y z w)
     harmonics   uint8, (u - 128) / 128, coefficient by coefficient, rgb inner
 
-Axes are "rub", unless the extension SPZ_ADBE_coordinate_system of a version 4 file says otherwise.
+Axes are "rub", unless the extension SPZ_ADOBE_coordinate_system says otherwise. Extensions lie behind the
+streams in versions 1 to 3, before the table of contents in version 4.
 
 Source: nianticlabs/spz, src/cc/load-spz.cc and README.md.
 """
@@ -24,34 +25,27 @@ import struct
 import tempfile
 import zlib
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
-from typing import IO, Any, BinaryIO, Literal, cast
+from typing import IO, Any, BinaryIO, cast
 
 import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import AXES, Axes
-from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
 from cagefield.typing import AnyArray
 
 SPZ_AXES: Axes = "rub"
-FRACTION = 12
-"""Bits of the fraction of positions in files that are written, where they fit."""
-
-_MAGIC = b"NGSP"
-_OLD, _NEW = struct.Struct("<4sIIBBBB"), struct.Struct("<4sIIBBBBI12s")
-_ANTIALIASED, _EXTENSIONS = 1, 2
+MAGIC = b"NGSP"
+OLD_HEADER, NEW_HEADER = struct.Struct("<4sIIBBBB"), struct.Struct("<4sIIBBBBI12s")
+ANTIALIASED, _EXTENSIONS = 1, 2
 _COORDINATES = 0xADBE0003
-_COLOUR = 0.15
+_MOST_EXTENSIONS = 1 << 20  # bytes of them that are looked at
+COLOUR = 0.15
 _MOST_RATIO = 1040
 """Deflate packs 1032 bytes into one at most; what claims to hold more is damaged."""
-
-_FIRST_STEP, _STEP = 8, 16
-"""Steps to which harmonics of degree 1 and above it are rounded, as Niantic's own writer does."""
 
 # Coordinate systems of the extension, by their number.
 _SYSTEMS = (None, "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf")
@@ -64,8 +58,8 @@ def open_spz(path: Path) -> SplatSource:
         FieldError: a file that is no SPZ, of a version that is not known, or damaged.
     """
     with path.open("rb") as file:
-        start = file.read(_NEW.size)
-        if start[:4] == _MAGIC:
+        start = file.read(NEW_HEADER.size)
+        if start[:4] == MAGIC:
             return _open_new(path, file, start)
         file.seek(0)
         try:
@@ -76,10 +70,10 @@ def open_spz(path: Path) -> SplatSource:
 
 
 def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
-    header = stream.read(_OLD.size)
-    if len(header) < _OLD.size or header[:4] != _MAGIC:
+    header = stream.read(OLD_HEADER.size)
+    if len(header) < OLD_HEADER.size or header[:4] != MAGIC:
         raise _damaged(path, "it does not begin as SPZ does")
-    _, version, count, degree, fraction, flags, _ = _OLD.unpack(header)
+    _, version, count, degree, fraction, flags, _ = OLD_HEADER.unpack(header)
     if not 1 <= version <= 3:
         raise FieldError(f"{path}: SPZ of version {version}; 1 to 4 are read")
     widths = _widths(path, version, count, degree)
@@ -91,13 +85,16 @@ def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
             raise _damaged(path, f"it ends {left} bytes early")
         spool.write(part)
         left -= len(part)
-    return _source(path, spool, widths, version, count, degree, fraction, flags, SPZ_AXES)
+    axes = SPZ_AXES
+    if flags & _EXTENSIONS:
+        axes = _axes_said(stream.read(_MOST_EXTENSIONS), axes)
+    return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
 
 
 def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
-    if len(start) < _NEW.size:
+    if len(start) < NEW_HEADER.size:
         raise _damaged(path, "its header is cut off")
-    _, version, count, degree, fraction, flags, streams, contents, _ = _NEW.unpack(start)
+    _, version, count, degree, fraction, flags, streams, contents, _ = NEW_HEADER.unpack(start)
     if version != 4:
         # Files of versions 1 to 3 that were left uncompressed.
         file.seek(0)
@@ -105,7 +102,7 @@ def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
     widths = _widths(path, version, count, degree)
     axes = SPZ_AXES
     if flags & _EXTENSIONS:
-        axes = _axes_said(file.read(max(0, contents - _NEW.size)), axes)
+        axes = _axes_said(file.read(min(max(0, contents - NEW_HEADER.size), _MOST_EXTENSIONS)), axes)
     file.seek(contents)
     table = file.read(16 * streams)
     expected = [width * count for width in widths if width]
@@ -197,7 +194,7 @@ def _source(
                 column(number, first, last) if widths[number] else np.zeros((last - first, 0), np.uint8)
                 for number in range(6)
             )
-            sh = np.concatenate([(colours / 255.0 - 0.5) / _COLOUR, (rest - 128.0) / 128.0], axis=1)
+            sh = np.concatenate([(colours / 255.0 - 0.5) / COLOUR, (rest - 128.0) / 128.0], axis=1)
             yield SplatBatch(
                 positions.view("<f2").astype(np.float64) if version == 1 else _fixed(positions, fraction),
                 scales / 16.0 - 10.0,
@@ -206,81 +203,7 @@ def _source(
                 sh.reshape(last - first, -1, 3),
             )
 
-    return SplatSource(path, count, degree, axes, batches, bool(flags & _ANTIALIASED))
-
-
-def write_spz(
-    path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Literal[3, 4] = 3
-) -> None:
-    """Writes splats in SPZ's axes, sorted through space: version 3, which every viewer reads, or 4.
-
-    Positions have 12 bits of fraction, fewer where they do not fit: half a step is 1.2e-4 units.
-    """
-    with ExitStack() as stack:
-        columns = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(6)]
-        fraction = _fraction_for(table)
-        done = 0
-        for batch in table.sorted_batches():
-            for file, values in zip(columns, _encoded(batch, fraction), strict=True):
-                file.write(values.tobytes())
-            done += len(batch)
-            on_progress(0.6 * done / table.count)
-        flags = _ANTIALIASED if table.antialiased else 0
-        sizes = [file.tell() for file in columns]
-        for file in columns:
-            file.seek(0)
-        with replaced_file(path) as temporary, temporary.open("wb") as out:
-            if version == 3:
-                with gzip.GzipFile(fileobj=out, mode="wb", filename="", mtime=0) as packed:
-                    packed.write(_OLD.pack(_MAGIC, 3, table.count, table.sh_degree, fraction, flags, 0))
-                    for number, file in enumerate(columns):
-                        _copy(file, packed)
-                        on_progress(0.6 + 0.4 * (number + 1) / 6)
-                return
-            used = [(file, size) for file, size in zip(columns, sizes, strict=True) if size]
-            head = (_MAGIC, 4, table.count, table.sh_degree, fraction, flags, len(used), _NEW.size, b"")
-            out.write(_NEW.pack(*head) + bytes(16 * len(used)))
-            entries = []
-            for number, (file, size) in enumerate(used):
-                begin = out.tell()
-                zstandard.ZstdCompressor(level=12).copy_stream(file, out, size=size)
-                entries.append((out.tell() - begin, size))
-                on_progress(0.6 + 0.4 * (number + 1) / len(used))
-            out.seek(_NEW.size)
-            out.write(b"".join(struct.pack("<QQ", *entry) for entry in entries))
-
-
-def _copy(source: IO[bytes], target: Any) -> None:
-    while part := source.read(1 << 22):
-        target.write(part)
-
-
-def _fraction_for(table: SplatTable) -> int:
-    most = max(float(np.abs(batch.means).max()) for batch in table.batches())
-    return int(np.clip(np.floor(np.log2((2**23 - 1) / max(most, 1e-30))), 0, FRACTION))
-
-
-def _encoded(batch: SplatBatch, fraction: int) -> tuple[AnyArray, ...]:
-    fixed = np.clip(np.round(batch.means.astype(np.float64) * 2.0**fraction), -(2**23), 2**23 - 1)
-    positions = fixed.astype("<i4").view(np.uint8).reshape(len(batch), 3, 4)[:, :, :3]
-    colours = batch.sh[:, 0].astype(np.float64) * (_COLOUR * 255.0) + 0.5 * 255.0
-    rest = batch.sh[:, 1:].astype(np.float64).reshape(len(batch), -1)
-    steps = np.full(rest.shape[1], _STEP)
-    steps[:9] = _FIRST_STEP
-    rest = np.round(rest * 128.0) + 128.0
-    rest = np.floor((rest + steps / 2) / steps) * steps
-    return (
-        positions,
-        _bytes(batch.opacities.astype(np.float64) * 255.0),
-        _bytes(colours),
-        _bytes((batch.log_scales.astype(np.float64) + 10.0) * 16.0),
-        _packed_rotations(batch.quaternions),
-        _bytes(rest),
-    )
-
-
-def _bytes(values: AnyArray) -> NDArray[np.uint8]:
-    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+    return SplatSource(path, count, degree, axes, batches, bool(flags & ANTIALIASED))
 
 
 def _fixed(positions: NDArray[np.uint8], fraction: int) -> AnyArray:
@@ -310,20 +233,6 @@ def _smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
         xyzw, largest[:, None], np.sqrt(np.maximum(0.0, 1.0 - (xyzw**2).sum(axis=1)))[:, None], axis=1
     )
     return xyzw[:, [3, 0, 1, 2]]
-
-
-def _packed_rotations(quaternions: AnyArray) -> NDArray[np.uint32]:
-    xyzw = quaternions.astype(np.float64)[:, [1, 2, 3, 0]]
-    largest = np.abs(xyzw).argmax(axis=1)
-    negated = np.take_along_axis(xyzw, largest[:, None], axis=1) < 0.0
-    xyzw = np.where(negated, -xyzw, xyzw)
-    packed = largest.astype(np.uint32)
-    for axis in range(4):
-        here = largest != axis
-        size = np.clip(np.round(np.abs(xyzw[:, axis]) * np.sqrt(2.0) * 511.0), 0, 511).astype(np.uint32)
-        value = size | (xyzw[:, axis] < 0.0).astype(np.uint32) << np.uint32(9)
-        packed = np.where(here, packed << np.uint32(10) | value, packed)
-    return packed.astype("<u4")
 
 
 def _damaged(path: Path, why: str) -> FieldError:

@@ -37,9 +37,10 @@ def read_tensors_of(path: Path) -> dict[str, Any]:
             f"{path}: holds Python objects beside tensors{what}, or is no checkpoint; unpickling those can "
             "run any code, so it is refused; save the two state dicts alone with torch.save and read that"
         ) from error
-    except (RuntimeError, EOFError, OSError, ValueError, KeyError, AttributeError) as error:
+    except (RuntimeError, EOFError, OSError, ValueError, LookupError, AttributeError, TypeError,
+            AssertionError, MemoryError) as error:  # fmt: skip
         # An end too early has no text, a wrong opcode is a KeyError of its number.
-        reason = "" if isinstance(error, KeyError) else " ".join(str(error).split())[:120]
+        reason = "" if isinstance(error, LookupError) else " ".join(str(error).split())[:120]
         raise FieldError(
             f"{path}: not a readable checkpoint ({reason or 'no file of torch.save'}); it may be truncated, "
             "copy it again"
