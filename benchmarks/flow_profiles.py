@@ -18,7 +18,7 @@ from cagefield.benchmarking.distortion import between
 from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.typing import Array
-from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_shell
+from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_velocity
 from cagefield.warps.extended_coordinates import Extended
 
 BOX, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -101,7 +101,7 @@ def measure(edit: Edit, weight: Weight | None) -> tuple[float, float]:
     if weight is None:
         shell = TrilinearShell(edit.inner, edit.deformed, edit.outer)
     else:
-        flow_shell.POWER = weight.power
+        flow_velocity.POWER = weight.power
         shell = FlowShell(edit.inner, edit.deformed, edit.outer, weight.falloff, strain=0.25)
         if weight.coefficients is not None:
             shell.__dict__["coefficients"] = weight.coefficients

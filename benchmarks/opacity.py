@@ -1,6 +1,8 @@
 """Whether stretched content should keep its opacity: both choices against scenes with parts really scaled.
 
     python benchmarks/opacity.py WORKDIR --steps 6000 [-o benchmarks/results/opacity.md]
+    python benchmarks/opacity.py WORKDIR --field splat --steps 600 --size 200 --no-continuous
+        -o benchmarks/results/opacity_splats.md
 
 WORKDIR is the work folder of `cagefield bench edits`; its fields of that many steps are used, or trained.
 Only edits that change lengths can tell: whole scenes and parts that stand free are scaled, alike on all axes
@@ -26,7 +28,11 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural import procedural_scene
 from cagefield.edits import Edit, EditStack
+from cagefield.fields.splat import SplatField
 from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.renderers import renderer_of
+from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.training.splat_config import SplatConfig
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.typing import AnyArray
 
@@ -54,40 +60,58 @@ STANDING: tuple[tuple[str, str, str, Factors], ...] = (
 CONTINUOUS = "Continuous edits: against the scene's model through the exact map, its density as it is."
 
 
+PRESERVED = {
+    "voxel": "Preserved: density times |J d|, which keeps the optical depth along a ray, however stretched.",
+    "splat": "Preserved: opacities o as they are; else 1 - (1 - o)^(|det J|^(1/3)). Gained, finer: of "
+    "pictures drawn with 4x4 pixels for each, where the pixels' blur does not widen splats.",
+}
+
+FINER = 4
+"""Pixels along the edge of one, for splats: blur widens those drawn smaller than they were trained."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("workdir", type=Path)
     parser.add_argument("-o", "--out", type=Path, default=Path("benchmarks/results/opacity.md"))
+    parser.add_argument("--field", choices=("voxel", "splat"), default="voxel")
+    parser.add_argument("--size", type=int, default=400, help="of the photos")
     parser.add_argument("--steps", type=int, default=6000, help="of the fields' training")
     parser.add_argument("--views", type=int, default=6)
     parser.add_argument("--scenes", nargs="*", default=("digger", "chair", "microphone", "plant"))
     parser.add_argument("--no-continuous", action="store_true", help="leave out the continuous edits")
     options = parser.parse_args()
     devices.start()
-    bench = Workbench(Settings(config=VoxelConfig(steps=options.steps)), options.workdir.resolve())
+    splats = options.field == "splat"
+    config = SplatConfig(steps=options.steps) if splats else VoxelConfig(steps=options.steps)
+    bench = Workbench(Settings(size=options.size, config=config), options.workdir.resolve())
     rows = [*scaled(bench, options.scenes, options.views)]
     discrete = len(rows)
     if not options.no_continuous:
         rows += continuous(bench, options.scenes)
-    gains = [float(row[-1]) for row in rows]
+    gains = [float(row[7]) for row in rows]
     means = [f"scaled parts and scenes: {np.mean(gains[:discrete]):.2f} dB"]
+    if splats:
+        means[0] += f", finer {np.mean([float(row[8]) for row in rows]):.2f} dB"
     means += [f"continuous edits: {np.mean(gains[discrete:]):.2f} dB"] if rows[discrete:] else []
     table = Table(
-        "Density as it is, or times |J d|",
-        ("scene", "what", "factors", "PSNR", "there", "PSNR preserved", "there preserved", "gained"),
+        "Opacity of splats, scaled or kept" if splats else "Density as it is, or times |J d|",
+        ("scene", "what", "factors", "PSNR", "there", "PSNR preserved", "there preserved", "gained")
+        + (("gained, finer",) if splats else ()),
         tuple(rows),
         (
-            "Preserved: density times |J d|, which keeps the optical depth along a ray however it is "
-            f"stretched. PSNR (dB): mean of {options.views} test views, against photos of the scene built "
-            "with its parts so scaled and lit as they were; there: on the pixels that the edit changes.",
+            f"{PRESERVED[options.field]} PSNR (dB): mean of {options.views} test views, against photos of "
+            "the scene built with its parts so scaled and lit as they were; there: on the pixels that the "
+            "edit changes.",
             *([] if options.no_continuous else [CONTINUOUS]),
             f"Gained on average by preserving: {'; '.join(means)}.",
-            f"Fields: {options.steps} steps.",
+            f"Fields: {options.field}s, {options.steps} steps, photos of {options.size}x{options.size}.",
             f"Machine: {Machine.here()}",
-            f"Command: `python benchmarks/opacity.py {options.workdir.name} --steps {options.steps} --views "
-            f"{options.views} --scenes {' '.join(options.scenes)}"
+            f"Command: `python benchmarks/opacity.py {options.workdir.name} --field {options.field} "
+            f"--steps {options.steps} --size {options.size} --views {options.views} "
+            f"--scenes {' '.join(options.scenes)}"
             f"{' --no-continuous' if options.no_continuous else ''}`",
         ),
         names=3,
@@ -158,14 +182,26 @@ def _row(
     truth: AnyArray,
 ) -> tuple[str, ...]:
     there = changed_pixels(before, truth)
-    figures = []
+    field, figures, finer = bench.scene(name).field, [], []
     for preserve in (False, True):
-        renderer = Renderer(bench.scene(name).field, edits, preserve_opacity=preserve)
-        shown = np.stack([renderer.render(camera, background="white").rgb8() for camera in cameras])
+        renderer = renderer_of(field, edits, preserve_opacity=preserve)
+        shown = np.stack([_shown(renderer, camera, 1) for camera in cameras])
         figures += [mean_psnr(shown, truth), pooled_psnr(shown, truth, there)]
+        if isinstance(field, SplatField):
+            finer.append(mean_psnr(np.stack([_shown(renderer, camera, FINER) for camera in cameras]), truth))
     row = (name, what, factors, *map(number, figures), number(figures[2] - figures[0]))
+    if finer:
+        row += (number(finer[1] - finer[0]),)
     print(*row, flush=True)
     return row
+
+
+def _shown(renderer: Renderer | SplatRenderer, camera: Camera, finer: int) -> AnyArray:
+    """A picture over white of 8 bits, drawn with `finer` x `finer` pixels for each."""
+    large = camera.resized(camera.width * finer, camera.height * finer)
+    rgb = renderer.render(large, background="white").rgb
+    rgb = rgb.reshape(camera.height, finer, camera.width, finer, 3).mean(axis=(1, 3))
+    return np.round(np.clip(rgb, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 if __name__ == "__main__":

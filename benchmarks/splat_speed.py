@@ -2,6 +2,7 @@
 
     python benchmarks/splat_speed.py [--ply FILE] [--out benchmarks/results/splat_speed.md]
     python benchmarks/splat_speed.py --landscape 10000000 [--out benchmarks/results/splat_millions.md]
+    python benchmarks/splat_speed.py --edits 1000000 [--out benchmarks/results/splat_edits_speed.md]
 
 Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
 random
@@ -20,12 +21,15 @@ import numpy as np
 
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
+from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.formats.splat_files import read_splats
 from cagefield.rendering.images import write_png
 from cagefield.rendering.splat_renderer import MOVING_DETAIL, SplatRenderer
+from cagefield.rendering.splat_splitting import split_of
 from splat_landscape import landscape
 
 ROUNDS = 7
@@ -135,6 +139,45 @@ def landscape_table(count: int) -> Table:
     return Table("Frames of a landscape", columns, tuple(rows), notes, names=2)
 
 
+def edits_table(count: int) -> Table:
+    """How long `count` splats take through a turn, a move and a discrete move, nothing known of them."""
+    from cagefield.rendering import moved_splats, splat_splitting
+    from cagefield.rendering.deformed_splats import deformed_splats
+
+    a, b, c = (
+        Cage.box(middle, half)
+        for middle, half in (((0, 0, 0.5), 0.4), ((0.5, -0.3, -0.2), 0.35), ((-0.5, 0.4, -0.1), 0.3))
+    )
+    edits = EditStack(
+        [
+            Edit(a, a.grown(0.35)).rotate((0, 0, 0.7)).scale((1.2, 1, 1)),
+            Edit(b, b.grown(0.35)).translate((0.1, -0.05, 0.05)),
+            Edit(c, adjustment="discrete").translate((-0.2, 0.3, 0.4)),
+        ]
+    )
+    field = random_splats(count)
+    SplatRenderer(field).render(camera_of(field, 64, 64))
+
+    def fresh(split: bool) -> int:
+        moved_splats.known_stacks.clear()
+        splat_splitting.known_splits.clear()
+        return len(deformed_splats(field, edits, split=split_of(field, edits) if split else None))
+
+    rows = []
+    for name, split in (("no", False), ("yes", True)):
+        milliseconds = least(lambda split=split: fresh(split))
+        moved = len(moved_splats.moved_splats(field, edits).source)
+        rows.append((name, str(count), str(moved), str(fresh(split)), number(milliseconds, 0)))
+    notes = (
+        "Three edits, one after the other: a turn and stretch, a move, both continuous; a discrete move.",
+        f"The least of {ROUNDS} rounds, by the wall, each from nothing.",
+        f"Machine: {Machine.here()}",
+    )
+    return Table(
+        "Splats through three edits", ("split", "splats", "moved", "drawn", "ms"), tuple(rows), notes, names=1
+    )
+
+
 def main() -> None:
     """Measures and writes the tables."""
     import tempfile
@@ -143,9 +186,11 @@ def main() -> None:
     parser.add_argument("--ply", type=Path)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--landscape", type=int)
+    parser.add_argument("--edits", type=int)
     options = parser.parse_args()
-    if options.landscape:
-        text = landscape_table(options.landscape).markdown()
+    if options.landscape or options.edits:
+        table = landscape_table(options.landscape) if options.landscape else edits_table(options.edits)
+        text = table.markdown()
         print(text)
         if options.out:
             write_text(options.out, text)

@@ -23,15 +23,19 @@ from cagefield.exporting import (
     inside,
     scene_mesh,
     scene_up,
+    upright_turn,
 )
 from cagefield.formats.splat_files import read_splats
+from cagefield.formats.splat_import import axis_of, import_splats, nearest_up
 from cagefield.ply import read_ply
 from cagefield.rendering.baked_splats import baked_splats
 from cagefield.rendering.edited_field import EditedField, edited_bounds
+from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.scene import Scene
+from cagefield.server.render_queue.exports import write_edited
 from commands import printed, refused
 from scenes import ball_field, ball_scene
-from splat_scenes import ball_of_splats, splat_scene
+from splat_scenes import ball_of_splats, random_splats, splat_scene
 
 INNER = Cage.box((0, 0, 0), 1.3)
 MOVED = Edit(INNER, adjustment="discrete", name="ball").translate((0.25, 0, 0))
@@ -55,7 +59,7 @@ def centre(file: Path) -> np.ndarray:
 
 def test_edits_are_baked_into_splats(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     scene = saved(splat_scene(), tmp_path / "scene", MOVED)
-    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply")
+    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply", "--up", "y-down")
     written, expected = read_splats(tmp_path / "out.ply"), baked_splats(ball_of_splats(), EditStack([MOVED]))
     assert f"{len(expected)} splats, SH degree 0; edits baked in" in said
     assert f"written to {tmp_path / 'out.ply'}" in said
@@ -70,7 +74,8 @@ def test_a_scene_without_edits_is_written_as_it_is(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     scene = saved(splat_scene(), tmp_path / "scene")
-    assert "without edits" in printed(capsys, "export", scene, "-o", tmp_path / "out.ply")
+    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply", "--up", "y-down")
+    assert "without edits" in said and "turned" not in said
     written, expected = read_splats(tmp_path / "out.ply"), ball_of_splats()
     for name in ("means", "log_scales", "quaternions", "sh"):
         np.testing.assert_allclose(getattr(written, name), getattr(expected, name), atol=1e-6)
@@ -84,7 +89,8 @@ def test_a_selection_is_what_a_cage_holds_after_the_edits(
     if selection == "file":
         selection = str(tmp_path / "copy.yaml")
         save_edits(EditStack([COPIED]), selection)
-    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply", "--selection", selection)
+    options = ("--selection", selection, "--up", "y-down")
+    said = printed(capsys, "export", scene, "-o", tmp_path / "out.ply", *options)
     assert said.startswith("600 splats")
     means = read_splats(tmp_path / "out.ply").means
     # Radius .5 around (0, 3, 0); without the selection there are 1200 splats.
@@ -106,6 +112,60 @@ def test_selections_that_mean_nothing_are_refused() -> None:
         inside((INNER,), np.full((3, 3), 5.0))
     far = Cage.box((5, 5, 5), 1.0)
     assert inside((INNER, far), np.array([[0, 0, 0], [5, 5, 5], [3, 3, 3]])).tolist() == [True, True, False]
+
+
+# ---- upright ----
+
+
+def test_quarter_turns_bring_every_axis_upright() -> None:
+    for name in ("y-down", "y-up", "z-up", "z-down", "x-up", "x-down"):
+        up = axis_of(name)
+        R = upright_turn(up)
+        np.testing.assert_array_equal(R @ up, (0, -1, 0))
+        np.testing.assert_array_equal(R @ R.T, np.eye(3))
+        assert np.linalg.det(R) == pytest.approx(1.0)
+        tilted = up + np.array([0.2, -0.3, 0.25])
+        np.testing.assert_array_equal(upright_turn(tilted), R)
+        assert nearest_up(tilted) == name
+    np.testing.assert_array_equal(upright_turn((0, -1, 0)), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("ending", "least"), [(".ply", 100.0), (".glb", 100.0), (".spz", 36.0), (".sog", 50.0)]
+)
+def test_a_scene_with_z_up_stands_upright_in_files(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, ending: str, least: float
+) -> None:
+    # Splats of all shapes and colours, more of them below: turned with their harmonics, or pictures differ.
+    # Harmonics that are not turned give 21 to 24 dB; what .spz and .sog round off comes to 40 and 60.
+    field = random_splats(60, degree=2)
+    field = field.take(np.argsort(field.means[:, 2])[:45])
+    scene = dataclasses.replace(splat_scene(), field=field)
+    folder, out = saved(scene, tmp_path / "scene"), tmp_path / f"out{ending}"
+    said = printed(capsys, "export", folder, "-o", out)
+    assert "turned upright from z-up; --up y-down keeps the scene's coordinates" in said
+    read = read_splats(out)
+    # The editor's download is the same file.
+    write_edited(str(folder), (), True, str(tmp_path / f"page{ending}"))
+    assert (tmp_path / f"page{ending}").read_bytes() == out.read_bytes()
+    R = np.eye(4)
+    R[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # (x, y, z) becomes (x, -z, y)
+    for camera in scene.cameras["train"]:
+        camera = camera.resized(96, 64)
+        got = SplatRenderer(read).render(camera.with_c2w(R @ camera.c2w))
+        expected = SplatRenderer(field).render(camera)
+        assert got is not None and expected is not None
+        assert -10.0 * np.log10(np.square(got.rgb - expected.rgb).mean() + 1e-12) > least
+    # Imported, it stands as before: what was low is low on the cameras' pictures.
+    imported = import_splats(read)
+    up = scene_up(dataclasses.replace(scene, cameras=imported.cameras))
+    np.testing.assert_allclose(up, (0, -1, 0), atol=1e-6)
+    assert read.means @ up == pytest.approx(-read.means[:, 1], abs=1e-5)
+    assert np.median(read.means @ up) == pytest.approx(np.median(field.means[:, 2]), abs=0.01)
+    # Again into a file: y is down now, and nothing is turned.
+    again = saved(dataclasses.replace(scene, field=read, cameras=imported.cameras), tmp_path / "again")
+    assert "turned" not in printed(capsys, "export", again, "-o", tmp_path / "again.ply")
+    np.testing.assert_array_equal(read_splats(tmp_path / "again.ply").means, read.means)
 
 
 # ---- splats of voxels ----
@@ -232,6 +292,8 @@ def test_up_is_the_cameras(tmp_path: Path) -> None:
         (("-o", "x.obj", "--as", "mesh"), "a mesh is written as .ply or .glb"),
         (("-o", "x.glb", "--as", "points"), "points are written as .ply"),
         (("-o", "x.xyz"), "x.xyz"),
+        (("-o", "x.ply", "--as", "points", "--up", "z-up"), "--axes, --up and --spz-version are for splats"),
+        (("-o", "x.ply", "--spz-version", "4"), "versions are for .spz files; leave --spz-version out"),
         (("-o", "x.ply", "--splats", "7"), "--splats is 7; it must be from 100 to 10000000"),
         (("-o", "x.ply", "--selection", "arm"), 'selection "arm" is no edit of the scene'),
     ],

@@ -93,7 +93,7 @@ def test_splats_are_those_of_the_oracle(name, preserve_opacity):
     got = sorted_rows(deformed_splats(field, edits, preserve_opacity=preserve_opacity))
     expected = sorted_rows(deformed_splats_reference(field, edits, preserve_opacity=preserve_opacity))
     assert got.shape == expected.shape
-    # float32, and 3e-8 of the scene by which the flow's two directions differ; in the Jacobian 1e-6, and 3e-5
+    # float32, 4e-7 of the scene; in the Jacobian 1e-5, and 3e-5
     # for a linear falloff, whose kinks cost the integration its order.
     np.testing.assert_allclose(got, expected, rtol=5e-5, atol=5e-5)
     np.testing.assert_allclose(got[:, :3], expected[:, :3], atol=2e-6)
@@ -339,13 +339,13 @@ def test_the_forward_flow_converges_with_the_fourth_order():
         finer = shell.with_strain(strain)
         return forward._ForwardFlow(finer, False).to_deformed(points)[0], len(finer.knots) - 1
 
-    truth, _ = ends(0.01)
-    errors, steps = zip(*((np.abs(got - truth).max(), n) for got, n in map(ends, (0.4, 0.1))), strict=True)
+    # The float64 reference: the inverse of its way back.
+    truth = shell.with_strain(0.03).to_deformed(points)[0]
+    errors, steps = zip(*((np.abs(got - truth).max(), n) for got, n in map(ends, (0.8, 0.3))), strict=True)
     order = np.log(errors[0] / errors[1]) / np.log(steps[1] / steps[0])
     assert 3.5 < order < 5.0
-    # And it is the flow of the reference: the inverse of its way back, by the same steps.
-    back = shell.with_strain(0.05).to_canonical(ends(0.05)[0])[0]
-    np.testing.assert_allclose(back, points, atol=1e-8)
+    # And it is the flow of the reference, up to float32.
+    np.testing.assert_allclose(ends(0.05)[0], truth, atol=4e-7)
 
 
 def test_points_whose_coordinates_are_lost_are_mapped_by_the_reference(monkeypatch):

@@ -155,7 +155,8 @@ def test_converting_many_batches_is_writing_the_field(
 def test_a_spool_sorts_as_memory_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(splat_table, "BATCH", 128)
     table = FieldTable(random_splats(1000, degree=0))
-    with splat_table.spooled(table.batches(), 0, False, 1000, lambda _: None) as spool:
+    source = splat_table.SplatSource(tmp_path, 1000, 0, "rdf", table.batches)
+    with splat_table.spooled(source, table.batches(), 0, lambda _: None) as spool:
         for _ in range(2):
             sorted_ = np.concatenate([batch.rows() for batch in spool.sorted_batches()])
             np.testing.assert_array_equal(
@@ -262,10 +263,12 @@ def splat_transform() -> str:
     return found or str(beside)
 
 
-@pytest.mark.parametrize("ending", [".compressed.ply", ".spz", ".splat", ".sog", ".ply"])
+@pytest.mark.parametrize("ending", [".compressed.ply", ".spz", "4.spz", ".splat", ".sog", ".ply"])
 def test_splat_transform_reads_what_is_written(tmp_path: Path, ending: str, splat_transform: str) -> None:
-    field = random_splats(500, degree=3)
-    write_splats(field, tmp_path / f"a{ending}")
+    field, version = random_splats(500, degree=3), None
+    if ending == "4.spz":
+        ending, version = ".spz", 4
+    write_splats(field, tmp_path / f"a{ending}", spz_version=version)
     convert_with(splat_transform, tmp_path / f"a{ending}", tmp_path / "b.ply")
     assert_within(read_splats(tmp_path / "b.ply"), field, ending)
     assert_read_alike(splat_transform, tmp_path / f"a{ending}", tmp_path / "c.ply")
@@ -486,3 +489,19 @@ def test_convert(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "no format of splats that is written" in refused(
         capsys, "convert", tmp_path / "a.ply", tmp_path / "c.ksplat"
     )
+    for version in (4, 3):
+        printed(capsys, "convert", tmp_path / "a.ply", tmp_path / f"{version}.spz", "--spz-version", version)
+        assert_within(read_splats(tmp_path / f"{version}.spz"), field, ".spz")
+        assert spz_version(tmp_path / f"{version}.spz") == version
+    assert spz_version(tmp_path / "b.spz") == 3
+    assert "versions are for .spz files; leave --spz-version out" in refused(
+        capsys, "convert", tmp_path / "a.ply", tmp_path / "c.sog", "--spz-version", 4
+    )
+    assert not (tmp_path / "c.sog").exists()
+
+
+def spz_version(path: Path) -> int:
+    """The version that a file's header has; those up to 3 are packed by gzip."""
+    content = path.read_bytes()
+    content = gzip.decompress(content) if content.startswith(b"\x1f\x8b") else content
+    return int(struct.unpack_from("<I", content, 4)[0])

@@ -20,7 +20,7 @@ from cagefield.errors import warnings_in_one_line
 with warnings_in_one_line():
     exec(sys.argv[1])
     import numpy as np
-    from cagefield.rendering.kernels.splat_projection import overlaps
+    from cagefield.rendering.kernels.splat_tiles import overlaps
 
     packed = np.zeros(16, np.float32)
     packed[:6] = 8.0, 8.0, 1.0, 0.0, 1.0, 1.0

@@ -17,6 +17,7 @@ from cagefield.rendering.grid import to_device  # noqa: E402
 from cagefield.rendering.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
 from cagefield.training.kernels.accumulators import HEAD  # noqa: E402
+from cagefield.training.kernels.gauss_newton_voxels import gauss_newton, laplacian  # noqa: E402
 from cagefield.training.kernels.march import (  # noqa: E402
     MOST_SAMPLES,
     SAMPLE,
@@ -26,7 +27,6 @@ from cagefield.training.kernels.march import (  # noqa: E402
     march_batch,
 )
 from cagefield.training.kernels.photos import PatchArgs  # noqa: E402
-from cagefield.training.kernels.update import gauss_newton, laplacian  # noqa: E402
 from cagefield.training.photos import Photos  # noqa: E402
 
 SIZE = 8

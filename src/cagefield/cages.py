@@ -149,7 +149,7 @@ class Cage:
         mask = np.zeros(len(p), dtype=bool)
         low, high = self.aabb
         slack = 1e-9 * (high - low)
-        near = np.flatnonzero(((p >= low - slack) & (p <= high + slack)).all(axis=1))
+        near = np.flatnonzero(trilinear_hex.all_three((p >= low - slack) & (p <= high + slack)))
         u[near], found = trilinear_hex.inverse(self.corners, p[near])
         mask[near] = trilinear_hex.inside(u[near], found)
         return u, mask

@@ -34,6 +34,16 @@ def rotated_sh(sh: AnyArray, rotations: AnyArray) -> NDArray[np.float32]:
     return turned
 
 
+def turned_sh(sh: AnyArray, rotation: AnyArray) -> NDArray[np.float32]:
+    """Coefficients [N,K,3] of functions that are all turned by one rotation [3,3]; exact to rounding."""
+    turned = np.array(sh, np.float32)
+    for l in range(1, int(np.sqrt(sh.shape[1]))):  # noqa: E741
+        rows = slice(l * l, (l + 1) ** 2)
+        matrix = wigner_matrices(np.asarray(rotation)[None], l)[0].astype(np.float32)
+        turned[:, rows] = np.einsum("jk,nkc->njc", matrix, turned[:, rows])
+    return turned
+
+
 def wigner_matrices(rotations: AnyArray, degree: int) -> Array:
     """M_l [N,2l+1,2l+1] of rotations [N,3,3]."""
     directions, inverse = _directions(degree)

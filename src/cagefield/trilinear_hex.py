@@ -80,7 +80,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     K = C[[3, 5, 6, 7]] @ W.T  # y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta
     if np.abs(K).max() < 1e-14:  # a parallelepiped up to rounding
         xi = np.where(np.abs(y) <= 1.0 + on_face, y.clip(-1.0, 1.0), y)
-        return 0.5 * (xi + 1.0), np.isfinite(y).all(axis=1)
+        return 0.5 * (xi + 1.0), all_three(np.isfinite(y))
     local = (corners - C[0]) @ W.T
     rows = np.flatnonzero(_in_hull(local, y))
     y = y[rows]
@@ -124,7 +124,12 @@ def invert(matrices: Array) -> Array:
 
 def inside(u: Array, found: Mask) -> Mask:
     """Mask [N] of the points whose u, as `inverse` returns it, lies in the closed unit cube."""
-    return found & np.asarray(((u >= 0.0) & (u <= 1.0)).all(axis=1))
+    return found & all_three((u >= 0.0) & (u <= 1.0))
+
+
+def all_three(mask: Mask) -> Mask:
+    """Where all of [N,3] are True: `all(axis=1)` takes ten times as long."""
+    return np.asarray(mask[:, 0] & mask[:, 1] & mask[:, 2])
 
 
 def _evaluate(C: Array, xi: Array) -> Array:

@@ -9,6 +9,7 @@ import { Grid } from "./grid";
 import { Handles } from "./handles";
 import { Latency } from "./latency";
 import { Lines } from "./lines";
+import { PageRenderer } from "./page_renderer";
 import { Pictures } from "./pictures";
 import { Player } from "./player";
 import { recallCamera, recallTools } from "./session_storage";
@@ -46,6 +47,7 @@ export class App {
   readonly camera: CameraFeed;
   readonly latency = new Latency();
   readonly player: Player;
+  readonly page: PageRenderer;
   drag: Drag | null = null;
   /** Called before a picture is asked for: what it should show is to be sent. */
   beforeAsking: (() => void)[] = [];
@@ -78,6 +80,8 @@ export class App {
     this.camera = new CameraFeed(this.viewport, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.viewport.invalidate());
     this.player = new Player(this);
+    this.page = new PageRenderer(this);
+    this.camera.drawnHere = () => this.page.draws;
     this.viewport.guessed.push(() => this.orbitGuessed());
     this.viewport.beforeFrame.push(() => this.arrange());
     this.viewport.beforeFrame.push(() => this.acknowledge());
@@ -282,7 +286,10 @@ export class App {
       try {
         const image = await decoding;
         const decoded = performance.now();
-        this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
+        // Of a view that the page draws itself, what the server sends comes too late.
+        if (this.page.draws && !this.camera.resting) {
+          if (image instanceof ImageBitmap) image.close();
+        } else this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
         this.orbitSeen(header.camera);
         this.lastPicture = header;
         this.lastNews = performance.now();
@@ -348,6 +355,7 @@ export class App {
       width: full_width,
       height: header.full_height,
       final,
+      page: false,
     };
     this.store.set({ figures });
   }

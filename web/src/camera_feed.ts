@@ -14,6 +14,8 @@ export class CameraFeed {
   private rest: ReturnType<typeof setTimeout> | undefined;
   /** Whether a button is held that turns the view: then it does not rest. */
   held = false;
+  /** Whether the page draws the moving view, so that the server need not know of it before it rests. */
+  drawnHere: () => boolean = () => false;
 
   constructor(
     private readonly viewport: Viewport,
@@ -25,7 +27,7 @@ export class CameraFeed {
       this.waitForRest();
     });
     viewport.beforeFrame.push(() => {
-      if (this.changed) this.tell();
+      if (this.changed && !(this.moving && this.drawnHere())) this.tell();
     });
   }
 

@@ -27,6 +27,13 @@ export class DepthImage {
     }
   }
 
+  /** Takes a whole picture's distances over, infinite where there is nothing. */
+  take(width: number, height: number, depth: Float32Array): void {
+    this.width = width;
+    this.height = height;
+    this.data = depth.map((distance) => (distance < NOTHING ? distance : NOTHING));
+  }
+
   /** The distance at (u, v) in [0,1], from the left and the top; null where there is nothing. */
   at(u: number, v: number): number | null {
     const i = Math.min(this.width - 1, Math.max(0, Math.floor(u * this.width)));

@@ -140,6 +140,28 @@ export class Pictures {
     this.viewport.invalidate();
   }
 
+  /** Shows a picture of the page's own, of the view as it is: `draw` puts it into a framebuffer of a size. */
+  showOwn(
+    width: number,
+    height: number,
+    depth: Float32Array,
+    draw: (framebuffer: WebGLFramebuffer | null, across: number, down: number) => void,
+  ): void {
+    this.fit();
+    const { renderer } = this.viewport;
+    const gl = renderer.getContext();
+    renderer.setRenderTarget(this.target);
+    const framebuffer = gl.getParameter(gl.FRAMEBUFFER_BINDING) as WebGLFramebuffer | null;
+    draw(framebuffer, this.target?.width ?? 1, this.target?.height ?? 1);
+    renderer.resetState();
+    renderer.setRenderTarget(null);
+    this.depth.take(width, height, depth);
+    this.uploadDepth();
+    this.viewpoint = { viewProjection: this.viewport.viewProjection, eye: this.viewport.camera.position.clone() };
+    this.surface.visible = true;
+    this.follow();
+  }
+
   private uploadDepth(): void {
     const { data, width, height } = this.depth;
     const image = this.depthTexture.image as { data: Float32Array; width: number; height: number };

@@ -20,6 +20,8 @@ export interface Figures {
   width: number;
   height: number;
   final: boolean;
+  /** Whether the page's own GPU drew it. */
+  page: boolean;
 }
 
 export interface Editor {
@@ -80,7 +82,7 @@ export const START: Editor = {
   jobs: [],
   upload: null,
   preview: null,
-  figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false },
+  figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false, page: false },
 };
 
 export type Listener = (now: Editor, before: Editor) => void;

@@ -12,6 +12,8 @@ export interface TestApi {
   readonly now: Editor;
   readonly picture: PictureHeader | null;
   readonly latency: Latency;
+  /** Pictures that the page's own GPU has drawn, and why the server draws where it does. */
+  readonly page: { drawn: number; why: string | null; draws: boolean };
   readonly camera: { c2w: number[]; seq: number };
   /** The drag that goes on: what the cages follow of it, and why not all. */
   readonly drag: { id: number; seq: number; ended: boolean; why: string | null; followed: Operation | null } | null;
@@ -49,6 +51,10 @@ export function testApi(app: App): TestApi {
       return app.lastPicture;
     },
     latency: app.latency,
+    get page() {
+      const { drawn, why, draws } = app.page;
+      return { drawn, why, draws };
+    },
     get camera() {
       return { c2w: viewport.c2w, seq: app.camera.seq };
     },

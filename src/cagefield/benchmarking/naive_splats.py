@@ -36,7 +36,7 @@ def naive_splats(field: SplatField, edits: EditStack) -> Iterator[tuple[str, Def
     """
     whole = deformed_splats(field, edits)
     unturned = replace(whole, rotations=None)
-    own = Places(moved_splats(field, edits)).of(DeformedSplats.of_field(field).covariances)
+    own = Places(moved_splats(field, edits)).put(DeformedSplats.of_field(field).covariances, None)
     yield from zip(NAIVE, (replace(unturned, covariances=own), unturned, whole), strict=True)
 
 

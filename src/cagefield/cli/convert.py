@@ -7,7 +7,7 @@ from pathlib import Path
 
 import tyro
 
-from cagefield.cli.options import Axes, Flag, progress_bar
+from cagefield.cli.options import Axes, Flag, SpzVersion, progress_bar
 from cagefield.errors import CagefieldError
 
 
@@ -26,6 +26,8 @@ class Convert:
     """Where x, y and z of the file point: right or left, up or down, front or back; as its format says."""
     out_axes: Axes | None = None
     """Axes to write; left out, those of the format."""
+    spz_version: SpzVersion | None = None
+    """Version of an .spz file to write; left out, 3, which Spark opens, too."""
     overwrite: Flag = False
     """Replace the file that is there."""
 
@@ -33,7 +35,7 @@ class Convert:
         """Converts; prints what was written."""
         from cagefield.formats.splat_files import convert_splats, writer_of
 
-        writer_of(self.out)
+        writer_of(self.out, self.spz_version)
         if self.out.exists() and not self.overwrite:
             raise CagefieldError(f"{self.out} exists; add --overwrite to replace it")
         if self.out.exists() and self.out.samefile(self.file):
@@ -44,6 +46,7 @@ class Convert:
                 self.out,
                 axes=self.axes,
                 target_axes=self.out_axes,
+                spz_version=self.spz_version,
                 on_progress=lambda share: move(share, 1.0, ""),
             )
         size = self.out.stat().st_size / 1e6

@@ -1,4 +1,4 @@
-"""`cagefield export`: a scene, its edits baked in, as a file that other programs read."""
+"""`cagefield export`: a scene, its edits baked in, as a file that other programs read, or as a page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from cagefield.cli.options import Axes, Device, Flag, Output, check_file, progress_bar, stages
+from cagefield.cli.options import (
+    Axes,
+    Device,
+    Flag,
+    Output,
+    SpzVersion,
+    Up,
+    check_file,
+    progress_bar,
+    stages,
+)
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -16,12 +26,12 @@ if TYPE_CHECKING:
     from cagefield.fields.splat import SplatField
     from cagefield.scene import Scene
 
-What = Literal["splats", "mesh", "points"]
+What = Literal["splats", "mesh", "points", "page"]
 
 
 @dataclass(frozen=True)
 class Export:
-    """Write a scene, its edits baked in, as splats, a mesh or points.
+    """Write a scene, its edits baked in, as splats, a mesh or points, or as a page that shows it.
 
     Splats of a scene of splats are its own; to voxels they are fitted, which takes --minutes.
     """
@@ -29,15 +39,21 @@ class Export:
     scene: tyro.conf.Positional[Path]
     """Scene folder."""
     out: Output
-    """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply."""
+    """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply; a page
+    of a scene of voxels, one file that any browser opens without a server: .html."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
-    """What to write."""
+    """What to write; a file that ends in .html is a page."""
     selection: str | None = None
     """Only what a cage holds: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
     axes: Axes | None = None
     """Axes of a file of splats: where x, y and z point, right or left, up or down, front or back; left out,
-    those of its format. Coordinates of the scene count as rdf, those of 3DGS' .ply."""
+    those of its format."""
+    up: Up | None = None
+    """Which way is up in the scene, where its cameras do not say: splats are turned to stand upright in the
+    file's axes. y-down turns nothing: coordinates of the scene count as those of 3DGS' .ply."""
+    spz_version: SpzVersion | None = None
+    """Version of an .spz file; left out, 3, which Spark opens, too."""
     splats: int | None = None
     """Most splats that are fitted, or points; left out, as many as the pictures' detail and the time allow,
     300,000 at most."""
@@ -53,6 +69,8 @@ class Export:
 
     def run(self) -> None:
         """Bakes or fits, writes; prints what is in the file."""
+        if self.out.suffix.lower() == ".html":
+            return self._page()
         self._check()
         from cagefield import devices
         from cagefield.exporting import cages_of
@@ -64,6 +82,31 @@ class Export:
         write = {"splats": self._splats, "mesh": self._mesh, "points": self._points}[self.what]
         print(f"{write(scene, cages)}\nwritten to {self.out}")
 
+    def _page(self) -> None:
+        """Writes a page; prints what is in it."""
+        from cagefield import devices
+        from cagefield.atomic_files import replaced_file
+        from cagefield.exporting.page import scene_page
+        from cagefield.keyframe_files import load_keys
+        from cagefield.scene import Scene
+
+        check_file(self.out, self.overwrite)
+        if self.what not in ("splats", "page"):
+            raise CagefieldError(f"{self.out}: {self.what} are not written as .html; give another name")
+        if self.selection is not None or self.axes is not None:
+            raise CagefieldError("a page shows the whole scene; leave out --selection and --axes")
+        scene = Scene.open(self.scene)
+        devices.start(self.device)
+        path = self.scene / "camera_path.json"
+        keys, loop = load_keys(path) if path.is_file() else ((), False)
+        text = scene_page(scene, self.scene.resolve().name, keys, loop=loop)
+        with replaced_file(self.out, parents=False) as draft:
+            draft.write_text(text, encoding="utf-8")
+        edits = len(scene.edits.active)
+        shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
+        way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
+        print(f"a page of {len(text) / 1e6:.1f} MB: {shown}{way}\nwritten to {self.out}")
+
     def _check(self) -> None:
         """Refuses what cannot be written before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
@@ -71,10 +114,14 @@ class Export:
 
         check_file(self.out, self.overwrite)
         suffix = self.out.suffix.lower()
+        if self.what == "page":
+            raise CagefieldError(f"{self.out}: a page is written as .html; give such a name")
         if self.what == "splats":
-            writer_of(self.out)
-        elif self.axes is not None:
-            raise CagefieldError("--axes are for splats; leave them out for a mesh or points")
+            writer_of(self.out, self.spz_version)
+        elif (self.axes, self.up, self.spz_version) != (None, None, None):
+            raise CagefieldError(
+                "--axes, --up and --spz-version are for splats; leave them out for a mesh or points"
+            )
         if self.what == "mesh" and suffix not in MESH_SUFFIXES:
             raise CagefieldError(f"{self.out}: a mesh is written as .ply or .glb; give such a name")
         if self.what == "points" and suffix != ".ply":
@@ -84,9 +131,10 @@ class Export:
 
     def _splats(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes splats; a line of figures."""
-        from cagefield.exporting import baked, inside
+        from cagefield.exporting import baked, inside, scene_up, upright
         from cagefield.fields.splat import SplatField
         from cagefield.formats.splat_files import write_splats
+        from cagefield.formats.splat_import import axis_of, nearest_up
 
         if isinstance(scene.field, SplatField):
             splats, figures = baked(scene), "edits baked in" if scene.edits.active else "without edits"
@@ -94,8 +142,13 @@ class Export:
             splats, figures = self._fitted(scene)
         if cages:
             splats = splats.take(inside(cages, splats.means))
-        write_splats(splats, self.out, self.axes)
-        return f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
+        up = scene_up(scene) if self.up is None else axis_of(self.up)
+        turned = upright(splats, up)
+        write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
+        line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
+        if turned is not splats:
+            line += f"\nturned upright from {nearest_up(up)}; --up y-down keeps the scene's coordinates"
+        return line
 
     def _fitted(self, scene: Scene) -> tuple[SplatField, str]:
         """Splats fitted to voxels, and how well."""

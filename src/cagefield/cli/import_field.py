@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from cagefield.cli.options import Axes, Baking, BakingOptions, Device, Flag, Output
+from cagefield.cli.options import Axes, Baking, BakingOptions, Device, Flag, Output, Up
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
     from cagefield.scene import Scene
 
-Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
 Unbounded = Literal["auto", "on", "off"]
 
 
@@ -82,7 +81,7 @@ class ImportField:
         splats = imported.field
         size = " x ".join(f"{edge:.4g}" for edge in splats.bounds[1] - splats.bounds[0])
         around = " and surroundings" if splats.unbounded else ""
-        trained = ", trained antialiased" if splats.antialiased else ""
+        trained = ", discs" if splats.discs else ", trained antialiased" if splats.antialiased else ""
         count = sum(len(group) for group in imported.cameras.values())
         cameras = f"{count} cameras" + ("" if self.data else f" all around, {self.up}")
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}{trained}; box {size}{around}; {cameras}"

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 Device = Annotated[
     Literal["auto", "cpu", "cuda", "metal", "vulkan"], tyro.conf.arg(help="Where kernels run.")
 ]
+SpzVersion = Literal[3, 4]
+Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
 Axes = Literal["rdf", "rub", "luf", "ruf", "ldb", "rdb", "ldf", "lub"]
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]

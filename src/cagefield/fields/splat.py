@@ -50,6 +50,8 @@ class SplatField:
         sh: [N, (degree+1)^2, 3] float32 colour coefficients, degree 0 to `sh.MAX_DEGREE`.
         antialiased: opacity is scaled so that what a splat adds to a picture does not grow with the filter of
             .3 pixels^2 that every splat gets (Mip-Splatting's 2D filter).
+        discs: splats are the discs of 2DGS, across their third axes, and pictures show each where the pixels'
+            rays meet it (`cagefield.rendering.splat_disc_reference`).
         bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
         unbounded: True where splats beyond `bounds` are the background.
 
@@ -65,6 +67,7 @@ class SplatField:
     antialiased: bool = False
     bounds: NDArray[np.float64] = None  # type: ignore[assignment]
     unbounded: bool = False
+    discs: bool = False
 
     def __post_init__(self) -> None:
         fix = object.__setattr__
@@ -180,6 +183,7 @@ class SplatField:
             self.antialiased,
             self.bounds,
             self.unbounded,
+            self.discs,
         )
 
     def save(self, path: str | Path) -> None:
@@ -190,6 +194,7 @@ class SplatField:
             "version": FORMAT_VERSION,
             "antialiased": str(int(self.antialiased)),
             "unbounded": str(int(self.unbounded)),
+            "discs": str(int(self.discs)),
         }
         write_tensors(path, tensors, header)
 
@@ -211,6 +216,7 @@ class SplatField:
                 antialiased=metadata.get("antialiased") == "1",
                 bounds=tensors["bounds"],
                 unbounded=metadata.get("unbounded") == "1",
+                discs=metadata.get("discs") == "1",
             )
         except FieldError as error:
             raise FieldError(f"{path}: {error}") from error

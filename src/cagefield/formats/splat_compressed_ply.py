@@ -22,7 +22,7 @@ from cagefield import sh as spherical_harmonics
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
-from cagefield.formats.splat_ply import degree_of, harmonics_of, names_of, says_antialiased, stack_of
+from cagefield.formats.splat_ply import degree_of, harmonics_of, mode_comment, names_of, said_of, stack_of
 from cagefield.formats.splat_table import (
     BATCH,
     LEAST_LOG_SCALE,
@@ -71,14 +71,14 @@ def open_compressed_ply(path: Path) -> SplatSource:
             chunks = chunk.rows(first // CHUNK, -(-last // CHUNK))
             yield _unpacked(vertex.rows(first, last), chunks, harmonics.rows(first, last), degree)
 
-    return SplatSource(path, vertex.count, degree, PLY, batches, says_antialiased(comments))
+    return SplatSource(path, vertex.count, degree, PLY, batches, *said_of(comments))
 
 
 def write_compressed_ply(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
     """Writes the splats, sorted through space, complete or not at all. Chunks have 18 columns."""
     above = 3 * ((table.sh_degree + 1) ** 2 - 1)
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
-    header += ["comment SplatRenderMode: mip"] if table.antialiased else []
+    header += mode_comment(table)
     header += [f"element chunk {-(-table.count // CHUNK)}", *(f"property float {name}" for name in _LIMITS)]
     header += [f"element vertex {table.count}", *(f"property uint {name}" for name in _PACKED)]
     if above:

@@ -4,7 +4,7 @@
 | --- | --- | --- | --- |
 | .ply | 3DGS, and what follows it | yes | yes |
 | .compressed.ply | PlayCanvas | yes | yes |
-| .spz | Niantic, versions 1 to 4 | yes | 3 |
+| .spz | Niantic, versions 1 to 4 | yes | 3, or 4 |
 | .sog, a folder with meta.json | PlayCanvas, versions 1 and 2 | yes | 2, as one file |
 | .splat | antimatter15 | yes | yes |
 | .ksplat | mkkellogg | yes | no |
@@ -17,6 +17,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,7 @@ from cagefield.formats.splat_rows import open_splat_rows, write_splat_rows
 from cagefield.formats.splat_sog import META, open_sog
 from cagefield.formats.splat_sog_writer import write_sog
 from cagefield.formats.splat_spz import SPZ_AXES, open_spz
+from cagefield.formats.splat_spz_writer import Version as SpzVersion
 from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import (
     FieldTable,
@@ -101,7 +103,9 @@ def read_splats(
         done += len(batch)
         on_progress(done / count)
     means, log_scales, quaternions, opacities, sh = (array[:done] for array in arrays)
-    return SplatField(means, log_scales, quaternions, opacities, sh, antialiased=source.antialiased)
+    return SplatField(
+        means, log_scales, quaternions, opacities, sh, antialiased=source.antialiased, discs=source.discs
+    )
 
 
 def write_splats(
@@ -109,17 +113,18 @@ def write_splats(
     path: str | Path,
     axes: Axes | None = None,
     on_progress: OnProgress = lambda _: None,
+    spz_version: SpzVersion | None = None,
 ) -> None:
     """Writes the splats of a field in PLY's axes as the format of the path's ending, whole or not at all.
 
-    `axes` are those to write in place of the format's own.
+    `axes` are those to write in place of the format's own; `spz_version` that of an .spz file, else 3.
 
     Raises:
-        FieldError: a format that cannot be written, or a field without splats.
+        FieldError: a format that cannot be written, a version for another format, a field without splats.
     """
     if not len(field):
         raise FieldError(f"{path}: there are no splats to write")
-    _write(FieldTable(field), Path(path), axes, on_progress)
+    _write(FieldTable(field), Path(path), axes, on_progress, spz_version)
 
 
 def convert_splats(
@@ -129,6 +134,7 @@ def convert_splats(
     axes: Axes | None = None,
     target_axes: Axes | None = None,
     on_progress: OnProgress = lambda _: None,
+    spz_version: SpzVersion | None = None,
 ) -> tuple[int, int]:
     """(number of splats, degree of their harmonics) that went from one file into another, by a temporary one.
 
@@ -137,14 +143,12 @@ def convert_splats(
     Raises:
         FieldError: as `read_splats` and `write_splats`.
     """
-    writer_of(Path(target))
+    writer_of(Path(target), spz_version)
     found = open_splats(Path(source))
     degree = min(found.sh_degree, spherical_harmonics.MAX_DEGREE)
-    with spooled(
-        _batches(found, axes), degree, found.antialiased, found.count, lambda share: on_progress(0.4 * share)
-    ) as table:
-        degree = _write(table, Path(target), target_axes, lambda share: on_progress(0.4 + 0.6 * share))
-        return table.count, degree
+    with spooled(found, _batches(found, axes), degree, lambda share: on_progress(0.4 * share)) as table:
+        rest: OnProgress = lambda share: on_progress(0.4 + 0.6 * share)  # noqa: E731
+        return table.count, _write(table, Path(target), target_axes, rest, spz_version)
 
 
 def open_splats(path: Path) -> SplatSource:
@@ -173,16 +177,22 @@ def holds_splats(path: Path) -> bool:
     return is_splatfacto(path) if ending == ".ckpt" else bool(ending)
 
 
-def writer_of(path: Path) -> tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]:
+def writer_of(
+    path: Path, spz_version: SpzVersion | None = None
+) -> tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]:
     """(what writes the format of a path's ending, its axes).
 
     Raises:
-        FieldError: a format that is not written.
+        FieldError: a format that is not written, or a version of .spz for another one.
     """
     ending = ending_of(path)
     if ending not in _WRITE:
         raise FieldError(f"{path}: no format of splats that is written; these are: {', '.join(WRITABLE)}")
-    return _WRITE[ending]
+    if spz_version is None:
+        return _WRITE[ending]
+    if ending != ".spz":
+        raise FieldError(f"{path}: versions are for .spz files; leave --spz-version out")
+    return partial(write_spz, version=spz_version), SPZ_AXES
 
 
 def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
@@ -199,13 +209,24 @@ def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
         yield with_axes(cut, axes or source.axes, PLY)
 
 
-def _write(table: SplatTable, path: Path, axes: Axes | None, on_progress: OnProgress) -> int:
+def _write(
+    table: SplatTable,
+    path: Path,
+    axes: Axes | None,
+    on_progress: OnProgress,
+    spz_version: SpzVersion | None,
+) -> int:
     """Writes the splats; the degree of the harmonics that the format could hold."""
-    write, own = writer_of(path)
+    write, own = writer_of(path, spz_version)
     degree = min(table.sh_degree, _MOST_DEGREE.get(ending_of(path), table.sh_degree))
     if degree < table.sh_degree:
         warnings.warn(
             f"{path}: {ending_of(path)} holds harmonics of degree {degree} at most; those above are left out",
+            stacklevel=3,
+        )
+    if table.discs and not ending_of(path).endswith(".ply"):
+        warnings.warn(
+            f"{path}: {ending_of(path)} cannot say that splats are discs (2DGS): they are written flat",
             stacklevel=3,
         )
     write(path, _Written(table, axes or own, degree), on_progress)
@@ -227,6 +248,10 @@ class _Written:
     @property
     def antialiased(self) -> bool:
         return self.table.antialiased
+
+    @property
+    def discs(self) -> bool:
+        return self.table.discs
 
     def batches(self) -> Iterator[SplatBatch]:
         return (self._of(batch) for batch in self.table.batches())

@@ -1,8 +1,9 @@
 """glTF with the extension KHR_gaussian_splatting, as one .glb file.
 
 A primitive of points with the attributes POSITION, KHR_gaussian_splatting:ROTATION (x y z w), :SCALE (not
-logarithms), :OPACITY (in [0, 1]) and :SH_DEGREE_l_COEF_n (n = 0 .. 2l); floats, or normalised integers. Axes
-are glTF's, y up ("rub"). Of a node's transformation the translation, rotation and uniform scale are applied.
+logarithms), :OPACITY (in [0, 1]) and :SH_DEGREE_l_COEF_n (n = 0 .. 2l); floats, or integers, normalised or
+not. Axes are glTF's, y up ("rub"). Of a node's transformation the translation, rotation and uniform scale are
+applied. Colours are sRGB values or, where `colorSpace` says so, linear light, which is converted.
 
 Source: KhronosGroup/glTF, extensions/2.0/Khronos/KHR_gaussian_splatting; glTF 2.0, "GLB File Format".
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 import json
 import struct
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,11 +25,14 @@ from scipy.spatial.transform import Rotation
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import Axes
+from cagefield.formats.splat_colour_space import srgb_harmonics
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+from cagefield.sh_rotation import turned_sh
 from cagefield.typing import AnyArray
 
 GLTF_AXES: Axes = "rub"
 EXTENSION = "KHR_gaussian_splatting"
+SRGB, LINEAR = "srgb_rec709_display", "lin_rec709_display"
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -111,8 +116,7 @@ def _source(
     shift, turn, factor = _transformation(node)
     matrix = Rotation.from_quat(turn).as_matrix()
     still = np.allclose(matrix, np.eye(3), atol=1e-6)
-    if degree and not still:
-        raise ValueError("a node turns splats whose colour depends on the direction; apply its rotation")
+    linear = _is_linear(path, primitive)
 
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, mean.count, BATCH):
@@ -124,15 +128,31 @@ def _source(
                 lengths = np.linalg.norm(quaternions, axis=1, keepdims=True)
                 quaternions = np.where(lengths > 0.0, quaternions, (0.0, 0.0, 0.0, 1.0))
                 quaternions = (Rotation.from_quat(turn) * Rotation.from_quat(quaternions)).as_quat()
+            colours = np.stack([part.rows(first, last) for part in sh], axis=1)
+            if degree and not still:
+                colours = turned_sh(colours, matrix)
             yield SplatBatch(
                 mean.rows(first, last) @ matrix.T * factor + shift,
                 log_scales,
                 quaternions[:, [3, 0, 1, 2]],
                 opacity.rows(first, last)[:, 0],
-                np.stack([part.rows(first, last) for part in sh], axis=1),
+                srgb_harmonics(colours) if linear else colours,
             )
 
     return SplatSource(path, mean.count, degree, GLTF_AXES, batches)
+
+
+def _is_linear(path: Path, primitive: dict[str, Any]) -> bool:
+    """Whether the colours are linear light; warns of that, and of a space that is not known."""
+    space = primitive.get("extensions", {}).get(EXTENSION, {}).get("colorSpace", SRGB)
+    if space == LINEAR:
+        warnings.warn(
+            f"{path}: its colours are linear light; they become sRGB splat by splat, and are blended as sRGB",
+            stacklevel=2,
+        )
+    elif space != SRGB:
+        warnings.warn(f"{path}: its colour space {space!r} is not known and taken as {SRGB}", stacklevel=2)
+    return bool(space == LINEAR)
 
 
 def _harmonics(degree: int) -> list[tuple[str, int]]:
@@ -161,9 +181,11 @@ def _transformation(node: dict[str, Any]) -> tuple[AnyArray, AnyArray, float]:
 class _Column:
     """An accessor: numbers [count,width] at places of the file."""
 
-    def __init__(self, path: Path, dtype: np.dtype[Any], begin: int, stride: int, count: int) -> None:
+    def __init__(
+        self, path: Path, dtype: np.dtype[Any], begin: int, stride: int, count: int, whole: bool
+    ) -> None:
         self._path, self._dtype, self._begin, self._stride = path, dtype, begin, stride
-        self.count = count
+        self.count, self._whole = count, whole
 
     @classmethod
     def of(
@@ -183,7 +205,7 @@ class _Column:
         end = begin + stride * max(count - 1, 0) + dtype.itemsize
         if count < 1 or begin < 0 or stride < dtype.itemsize or end > binary[1]:
             raise ValueError("an attribute ends after the file")
-        return cls(path, dtype, binary[0] + begin, stride, count)
+        return cls(path, dtype, binary[0] + begin, stride, count, not accessor.get("normalized", False))
 
     def rows(self, first: int, last: int) -> AnyArray:
         size = (last - first - 1) * self._stride + self._dtype.itemsize
@@ -192,7 +214,7 @@ class _Column:
         raw = raw.reshape(last - first, self._stride)[:, : self._dtype.itemsize]
         base, _ = self._dtype.subdtype or (self._dtype, ())
         values = np.ascontiguousarray(raw).view(base)
-        if base.kind == "f":
+        if base.kind == "f" or self._whole:
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(base).max), -1.0)
 
@@ -236,9 +258,7 @@ def write_splat_gltf(path: Path, table: SplatTable, on_progress: OnProgress = la
                         {
                             "mode": 0,
                             "attributes": {name: number for number, (name, _) in enumerate(attributes)},
-                            "extensions": {
-                                EXTENSION: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}
-                            },
+                            "extensions": {EXTENSION: {"kernel": "ellipse", "colorSpace": SRGB}},
                         }
                     ]
                 }

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets.views import Dataset
@@ -83,6 +83,16 @@ def import_splats(
     return ImportedSplats(field, cameras, (0.0,) * 3 if unbounded else (1.0,) * 3)
 
 
+def axis_of(up: Up) -> NDArray[np.float64]:
+    """The unit direction [3] that is up."""
+    return np.eye(3)["xyz".index(up[0])] * (1.0 if up.endswith("up") else -1.0)
+
+
+def nearest_up(up: ArrayLike) -> Up:
+    """The axis that is nearest to a direction [3] that is up."""
+    return max(get_args(Up), key=lambda name: float(axis_of(name) @ np.asarray(up)))
+
+
 def _whole(means: NDArray[np.float64]) -> NDArray[np.float64]:
     """The box of nearly all means, with room around it."""
     low, high = np.quantile(means, (0.001, 0.999), axis=0)
@@ -92,7 +102,7 @@ def _whole(means: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _rings(field: SplatField, up: Up) -> Cameras:
     """Cameras around the box that see all of it; of surroundings, from where such captures are taken."""
-    axis = np.eye(3)["xyz".index(up[0])] * (1.0 if up.endswith("up") else -1.0)
+    axis = axis_of(up)
     radius = float(np.linalg.norm(field.half_size)) / math.sin(0.5 * FOV_X)
     if field.unbounded:
         radius = 1.6 * float(field.half_size.max())

@@ -54,7 +54,10 @@ def open_splat_ply(path: Path) -> SplatSource:
         for first in range(0, vertex.count, BATCH):
             yield _batch(vertex.rows(first, first + BATCH), dc, degree)
 
-    return SplatSource(path, vertex.count, degree, PLY, batches, says_antialiased(comments))
+    antialiased, discs = said_of(comments)
+    if vertex.count and "scale_2" not in vertex.columns:
+        antialiased, discs = False, True
+    return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs)
 
 
 def write_splat_ply(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
@@ -63,7 +66,7 @@ def write_splat_ply(path: Path, table: SplatTable, on_progress: OnProgress = lam
     names = [*"xyz", "nx", "ny", "nz", *names_of("f_dc_", 3), *names_of("f_rest_", 3 * above), "opacity"]
     names += [*names_of("scale_", 3), *names_of("rot_", 4)]
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
-    header += ["comment SplatRenderMode: mip"] if table.antialiased else []
+    header += mode_comment(table)
     header += [f"element vertex {table.count}", *(f"property float {name}" for name in names), "end_header"]
     with replaced_file(path) as temporary, temporary.open("wb") as out:
         out.write("\n".join([*header, ""]).encode())
@@ -113,10 +116,17 @@ def harmonics_of(dc: AnyArray, columns: Columns, degree: int) -> AnyArray:
     return np.concatenate([dc[:, None], rest.transpose(0, 2, 1)], axis=1)
 
 
-def says_antialiased(comments: Iterable[str]) -> bool:
-    """Whether a comment says that the splats want the antialiased filter."""
-    said = {comment.lower().replace(":", " ").replace("=", " ").strip() for comment in comments}
-    return any(words.split() in (["splatrendermode", "mip"], ["antialiased", "1"]) for words in said)
+def said_of(comments: Iterable[str]) -> tuple[bool, bool]:
+    """Whether comments say that the splats want the antialiased filter, and that they are discs."""
+    said = [comment.lower().replace(":", " ").replace("=", " ").split() for comment in comments]
+    discs = ["splatrendermode", "2dgs"] in said
+    return not discs and (["splatrendermode", "mip"] in said or ["antialiased", "1"] in said), discs
+
+
+def mode_comment(table: SplatTable) -> list[str]:
+    """The header's line that says how the splats are drawn; none for 3DGS' own way."""
+    mode = "2dgs" if table.discs else "mip" if table.antialiased else ""
+    return [f"comment SplatRenderMode: {mode}"] if mode else []
 
 
 def _batch(columns: Columns, dc: Sequence[str], degree: int) -> SplatBatch:

@@ -18,6 +18,9 @@ from cagefield.formats.splat_spz import ANTIALIASED, COLOUR, MAGIC, NEW_HEADER, 
 from cagefield.formats.splat_table import OnProgress, SplatBatch, SplatTable
 from cagefield.typing import AnyArray
 
+Version = Literal[3, 4]
+"""Versions that are written. Spark 2.2 reads 3 and not 4; splat-transform reads both."""
+
 FRACTION = 12
 """Bits of the fraction of positions, where they fit."""
 
@@ -26,9 +29,9 @@ _FIRST_STEP, _STEP = 8, 16
 
 
 def write_spz(
-    path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Literal[3, 4] = 3
+    path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Version = 3
 ) -> None:
-    """Writes splats in SPZ's axes, sorted through space: version 3, which every viewer reads, or 4.
+    """Writes splats in SPZ's axes, sorted through space: version 3, packed by gzip, or 4, by Zstandard.
 
     Positions have 12 bits of fraction, fewer where they do not fit: half a step is 1.2e-4 units.
     """

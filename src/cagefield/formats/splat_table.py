@@ -79,6 +79,7 @@ class SplatSource:
     axes: str
     batches: Callable[[], Iterator[SplatBatch]]
     antialiased: bool = False
+    discs: bool = False
 
 
 class SplatTable(Protocol):
@@ -90,6 +91,8 @@ class SplatTable(Protocol):
     def sh_degree(self) -> int: ...
     @property
     def antialiased(self) -> bool: ...
+    @property
+    def discs(self) -> bool: ...
 
     def batches(self) -> Iterator[SplatBatch]:
         """The splats in their order."""
@@ -116,6 +119,10 @@ class FieldTable:
     def antialiased(self) -> bool:
         return self.field.antialiased
 
+    @property
+    def discs(self) -> bool:
+        return self.field.discs
+
     def batches(self) -> Iterator[SplatBatch]:
         return self._in_order(None)
 
@@ -134,8 +141,8 @@ class FieldTable:
 class Spool:
     """Splats in a temporary file, row by row: memory does not grow with them."""
 
-    def __init__(self, folder: Path, sh_degree: int, antialiased: bool) -> None:
-        self.sh_degree, self.antialiased = sh_degree, antialiased
+    def __init__(self, folder: Path, sh_degree: int, antialiased: bool, discs: bool = False) -> None:
+        self.sh_degree, self.antialiased, self.discs = sh_degree, antialiased, discs
         self.count = 0
         self._folder, self._path = folder, folder / "splats"
         self._width = _SHAPE + 3 * (sh_degree + 1) ** 2
@@ -194,15 +201,15 @@ class Spool:
 
 @contextmanager
 def spooled(
-    batches: Iterable[SplatBatch], sh_degree: int, antialiased: bool, count: int, on_progress: OnProgress
+    source: SplatSource, batches: Iterable[SplatBatch], sh_degree: int, on_progress: OnProgress
 ) -> Iterator[Spool]:
-    """The splats in a temporary file, which is removed at the end."""
+    """What a source's batches became in a temporary file, which is removed at the end."""
     with tempfile.TemporaryDirectory(prefix="cagefield-splats-") as folder:
-        spool = Spool(Path(folder), sh_degree, antialiased)
+        spool = Spool(Path(folder), sh_degree, source.antialiased, source.discs)
         try:
             for batch in batches:
                 spool.append(batch)
-                on_progress(spool.count / max(count, 1))
+                on_progress(spool.count / max(source.count, 1))
             yield spool
         finally:
             spool.close()

@@ -17,10 +17,10 @@ import numpy as np
 from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
-from cagefield.rendering.moved_splats import moved_splats
-from cagefield.rendering.splat_splitting import split_for_edits
+from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.splat_splitting import split_of
 from cagefield.sh_rotation import rotated_sh
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 
 
 def baked_splats(
@@ -35,32 +35,50 @@ def baked_splats(
     """
     if not edits.active:
         return field
-    if split:
-        field = split_for_edits(field, edits)
     moved = moved_splats(field, edits)
-    kept = ~moved.left
-    own = field.take(moved.source)
-    axes = (
-        rotation_matrices(own.quaternions.astype(np.float64))
-        * np.exp(own.log_scales.astype(np.float64))[:, None]
+    parts = []
+    found = split_of(field, edits) if split else None
+    if found is not None:
+        moved = moved.without(found.parents)
+        parts.append(_baked(found.children, moved_splats(found.children, edits), preserve_opacity))
+    parts.insert(0, _baked(field, moved, preserve_opacity))
+    boxes = np.concatenate([field.bounds[None], *(edit.boxes for edit in edits.active)])
+    means, log_scales, quaternions, opacities, sh = (
+        np.concatenate([part[n] for part in parts]) for n in range(5)
     )
+    return dataclasses.replace(
+        field,
+        means=means,
+        log_scales=log_scales,
+        quaternions=quaternions,
+        opacities=opacities,
+        sh=sh,
+        bounds=np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
+    )
+
+
+def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tuple[Float32, ...]:
+    """Means, log scales, quaternions, opacities and harmonics of a field's splats where they are."""
+    kept, source = ~moved.left, moved.source
+    axes = rotation_matrices(field.quaternions[source].astype(np.float64))
+    axes = axes * np.exp(field.log_scales[source].astype(np.float64))[:, None]
     turned, scales, _ = np.linalg.svd(moved.jacobian @ axes)
     turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
-    opacities = own.opacities.astype(np.float64)
+    opacities = field.opacities[source].astype(np.float64)
     if not preserve_opacity:
         growth = np.cbrt(np.abs(np.linalg.det(moved.jacobian)))
         opacities = 1.0 - (1.0 - opacities) ** growth
-    boxes = np.concatenate([field.bounds[None], *(edit.boxes for edit in edits.active)])
-    return dataclasses.replace(
-        field,
-        means=np.concatenate([field.means[kept], moved.points.astype(np.float32)]),
-        log_scales=np.concatenate(
-            [field.log_scales[kept], np.log(np.maximum(scales, 1e-30))], dtype=np.float32
-        ),
-        quaternions=np.concatenate([field.quaternions[kept], quaternions_of(turned)], dtype=np.float32),
-        opacities=np.concatenate([field.opacities[kept], opacities], dtype=np.float32),
-        sh=np.concatenate([field.sh[kept], rotated_sh(own.sh, _polar_rotations(moved.jacobian))]),
-        bounds=np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
+    elsewhere = (
+        moved.points,
+        np.log(np.maximum(scales, 1e-30)),
+        quaternions_of(turned),
+        opacities,
+        rotated_sh(field.sh[source], _polar_rotations(moved.jacobian)),
+    )
+    own = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
+    return tuple(
+        np.concatenate([values[kept], there], dtype=np.float32)
+        for values, there in zip(own, elsewhere, strict=True)
     )
 
 

@@ -41,4 +41,5 @@ def deformed_splats_reference(
         field.sh[source],
         (U @ Vt).astype(np.float32),
         field.antialiased,
+        axes[:, :, :2].transpose(0, 2, 1).reshape(-1, 6).astype(np.float32) if field.discs else None,
     )

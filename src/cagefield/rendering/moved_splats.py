@@ -65,11 +65,16 @@ class MovedSplats:
         elsewhere[self.source] = True
         return len(self.source) == np.count_nonzero(elsewhere) and np.array_equal(elsewhere, self.left)
 
+    def without(self, gone: Mask) -> MovedSplats:
+        """The same, those that are True in `gone` [N] shown nowhere."""
+        kept = ~gone[self.source]
+        return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept])
+
     def then(
         self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
         """What one more edit makes of these. Raises `EditError` where it cannot be evaluated."""
-        from cagefield.rendering.kernels.splat_deforming import in_boxes, times
+        from cagefield.rendering.kernels.splat_deforming import changes, in_boxes, times
 
         warp = edit.exact_warp
         cages = [edit.inner.aabb] if edit.outer is None else [edit.inner.aabb, edit.outer.aabb]
@@ -81,7 +86,8 @@ class MovedSplats:
         still, near = np.flatnonzero(at_rest & ~self.left), np.flatnonzero(elsewhere)
         points = np.concatenate([means[still].astype(np.float64), self.points[near]])
         mapped = to_deformed(warp, points, coarse=coarse, proceed=proceed)
-        moves = (mapped.points != points).any(axis=1) | (mapped.jacobian != np.eye(3)).any(axis=(1, 2))
+        moves = np.empty(len(points), bool)
+        changes(points, mapped.points, mapped.jacobian, moves)
         leaves = moves | mapped.lost
         if isinstance(warp, DiscreteWarp) and warp.keep_source and warp.inner is not None:
             leaves &= mapped.lost | warp.inner.deformed.contains(points)

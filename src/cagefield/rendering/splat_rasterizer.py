@@ -18,7 +18,7 @@ from scipy.special import spence
 from cagefield import devices, lenses
 from cagefield.cameras import Camera
 from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.kernels import splat_blending, splat_projection
+from cagefield.rendering.kernels import splat_blending, splat_projection, splat_tiles
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
 from cagefield.rendering.splat_clusters import Clusters, View
 from cagefield.typing import Float32
@@ -259,7 +259,7 @@ def project(
         firsts = np.empty(len(order) + 1, np.int64)
         ids = buffers.take("ids", (most,), np.int32)
         slots = buffers.take("slots", (most,), np.int32)
-        pairs = splat_projection.bin_pairs(order, tiles, packed, across, starts, ids, firsts, slots)
+        pairs = splat_tiles.bin_pairs(order, tiles, packed, False, across, starts, ids, firsts, slots)
     return Projection(packed, order, starts, ids, firsts, slots, pairs, width, height)
 
 

@@ -26,11 +26,12 @@ from cagefield.rendering.splat_rasterizer import (
     near_depth,
     project,
 )
-from cagefield.rendering.splat_splitting import split_for_edits
+from cagefield.rendering.splat_splitting import split_of
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_device import DeviceProjection, SplatArrays
+    from cagefield.rendering.splat_discs import DiscProjection
 
 
 MOVING_DETAIL = 1.0
@@ -62,7 +63,7 @@ class SplatRenderer:
         self.edits = edits if edits is not None else EditStack([])
         self.preserve_opacity = preserve_opacity
         self.splats: DeformedSplats = deformed_splats(
-            split_for_edits(field, self.edits), self.edits, preserve_opacity=preserve_opacity
+            field, self.edits, preserve_opacity=preserve_opacity, split=split_of(field, self.edits)
         )
         self._buffers = Buffers()
         self._normals: Float32 | None = None
@@ -86,9 +87,13 @@ class SplatRenderer:
         other.edits = edits
         if preserve_opacity is not None:
             other.preserve_opacity = preserve_opacity
-        field = self.field if coarse else split_for_edits(self.field, edits, proceed=proceed)
         other.splats = deformed_splats(
-            field, edits, preserve_opacity=other.preserve_opacity, coarse=coarse, proceed=proceed
+            self.field,
+            edits,
+            preserve_opacity=other.preserve_opacity,
+            coarse=coarse,
+            split=None if coarse else split_of(self.field, edits, proceed=proceed),
+            proceed=proceed,
         )
         other._normals = other._arrays = None
         return other
@@ -136,14 +141,25 @@ class SplatRenderer:
         region: Region | None = None,
         normals: bool = False,
         detail: float = 0.0,
-    ) -> Projection | DeviceProjection:
+    ) -> Projection | DeviceProjection | DiscProjection:
         """The splats as the camera sees them; valid until this renderer projects again.
 
-        `detail` as `splat_rasterizer.project`, on CPUs alone.
+        `detail` as `splat_rasterizer.project`, on CPUs alone. Discs are projected there in any case.
         """
         if normals and self._normals is None:
             self._normals = flattest_axes(self.splats.covariances)
         near = max(near, near_depth(self.field.bounds))
+        if self.splats.tangents is not None:
+            from cagefield.rendering.splat_discs import project_discs
+
+            return project_discs(
+                self.splats,
+                camera,
+                near=near,
+                region=region,
+                normals=self._normals if normals else None,
+                buffers=self._buffers,
+            )
         if devices.is_gpu():
             from cagefield.rendering import splat_device
 

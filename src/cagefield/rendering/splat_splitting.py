@@ -6,22 +6,31 @@ F(m) + J A z, which is right as far as F is affine over it. Two things are not:
 - Bending. Along the axis a_i of A the second-order term of F at two standard deviations, against the length
   of what the first-order term makes of them, is
 
-      b_i = |F(m + 2 a_i) + F(m - 2 a_i) - 2 F(m)| / (2 |F(m + 2 a_i) - F(m - 2 a_i)| / 2).
+      b_ii = |F(m + 2 a_i) + F(m - 2 a_i) - 2 F(m)| / |F(m + 2 a_i) - F(m - 2 a_i)|,
 
-  Where b_i > BEND the splat becomes a row of narrower ones along a_i: N(0, 1) is the convolution of N(0, r^2)
-  and N(0, 1 - r^2), so children of the standard deviation r at distances of SPACING r, weighted by
-  N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %. With r = BEND / b_i
-  they bend by BEND at most: b is proportional to the width. Opacities are such that the row lets the ray
-  through the middle of each child lose what the splat let it lose there.
+  and with another axis the mixed term, which a twist has where the axes themselves stay straight,
+
+      b_ij = |(J(m + 2 a_i) - J(m - 2 a_i)) a_j| / max over k = i, j of |F(m + 2 a_k) - F(m - 2 a_k)|.
+
+  b_i is the largest of them. Where b_i > BEND the splat becomes a row of narrower ones along a_i: N(0, 1) is
+  the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r at distances of
+  SPACING r, weighted by N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %.
+  With r = BEND / b_i they bend by BEND at most: b is proportional to the width. It is not where J jumps, on
+  the faces of cages, and what lies across these is split ROUNDS times. Opacities are such that the row lets
+  the ray through the middle of each child lose what the splat let it lose there. Optical depths add up, and
+  are flatter than the splat's opacity where that is large: children as wide as the splat across the row would
+  make it thicker, each round again. They are narrower, so that the depth on all the width is the splat's.
 - Cuts. A discrete edit takes what is inside a cage away. A splat through a face, at t standard deviations of
-  its own across it, becomes the parts of it on both sides: N(0, 1) cut off at t has the mean -+ phi / Phi and
-  the variance 1 -+ t phi / Phi - (phi / Phi)^2, and a child has these moments and its part of the mass.
+  its own across it, becomes the parts of it on both sides. A ray at u standard deviations from its middle has
+  the optical depth T(u) = -log(1 - a exp(-u^2 / 2)), a the opacity. A child has the integral, mean and
+  variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
+  plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits what those
 before it left.
 
-Source: second-order criterion and rows of children: ours. Moments of the truncated normal distribution:
-Johnson, Kotz and Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
+Source: ours. For faint splats a cut has the moments of the truncated normal distribution: Johnson, Kotz and
+Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
 """
 
 from __future__ import annotations
@@ -33,109 +42,173 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from cagefield.cages import FACES, Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
-from cagefield.rendering.moved_splats import moved_splats
+from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.splat_profile import ENDS, LEAST_OPAQUE, MOST_OPAQUE, mass_across, part_between
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
 
-BEND = 0.12
-"""Largest b of a splat that stays whole: a turn by 7 degrees from its middle to two standard deviations."""
+BEND = 0.08
+"""Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
+
+FAINT = 0.3
+"""Splats of less opacity than this may bend more, as much as they are fainter."""
+
+UNSEEN = 1.0 / 255.0
+"""Splats of at most this opacity are not drawn, and no children."""
 
 SPACING = 1.6
 """Distance of children, in their standard deviations."""
 
-LEAST_WIDTH = 0.15
+LEAST_WIDTH = 0.35
 """Least r of one splitting."""
 
 ROUNDS = 3
 """Times that what was split is looked through again."""
 
+CUTS = 2
+"""Times that what lies across a cut is cut."""
+
 REACH = 2.0
 """Standard deviations at which a splat ends, for cuts: 2 % of it may hang over."""
 
-SMALL = 0.004
-"""Splats whose largest standard deviation is below this share of an edit's size are not tried for bending."""
-
-MOST_OPAQUE = 0.9999
-"""Opacities are taken as at most this."""
+SMALL = 0.0035
+"""Splats whose largest standard deviation is below this share of an edit's size are not tried for bending:
+3 pixels where the edit fills a picture of 800."""
 
 MOST = 2.0
-"""Splats there may be after splitting, against those before, beside MORE."""
+"""Splats there may be after splitting, against those before, beside MORE; parents count."""
 
 MORE = 200_000
 
 
-def split_for_edits(
-    field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
-) -> SplatField:
+@dataclass(frozen=True, eq=False)
+class Split:
+    """What was split of a field: `parents` [N] are True where `children` stand for a splat."""
+
+    parents: Mask
+    children: SplatField
+
+
+def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
     """The field with those splats split that one Gaussian each does not show under the edits.
 
-    The field itself where none is. Known of a field while it lives, for the edits asked for last.
+    The field itself where none is; children come last. Raises as `split_of`.
+    """
+    split = split_of(field, edits)
+    return field if split is None else _joined([field.take(~split.parents), split.children])
+
+
+def split_of(
+    field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
+) -> Split | None:
+    """Which splats of a field one Gaussian each does not show under the edits, and their children, or None.
+
+    Known of a field while it lives, for the edits asked for last.
 
     Raises:
         EditError: an edit that cannot be evaluated.
     """
     active = edits.active
     if not active:
-        return field
-    known = _known.get(field)
+        return None
+    known = known_splits.get(field)
     if known is not None and known[0] == active:
         return known[1]
-    found = field
-    for count, edit in enumerate(active, start=1):
-        before = EditStack(active[: count - 1])
-        settled: list[SplatField] = []
-        for _ in range(ROUNDS):
-            split = _split_once(found, before, edit, MOST * len(field) + MORE, proceed)
-            if split is None:
-                break
-            # Children are looked through again; the others stay as they are.
-            stay, children = split
-            settled.append(found.take(stay))
-            found = children
-        if settled:
-            found = _joined([*settled, found])
-    _known[field] = (active, found)
-    return found
+    most = (MOST - 1.0) * len(field) + MORE
+    parents = np.zeros(len(field), bool)
+    children: SplatField | None = None
+    for count, edit in enumerate(active):
+        before = EditStack(active[:count])
+        parts = []
+        if children is not None:
+            stay, others = _settled(children, before, edit, None, most - len(children), proceed)
+            parts += [children.take(stay), *others]
+        stay, others = _settled(
+            field, before, edit, parents, most - sum(len(part) for part in parts), proceed
+        )
+        parents |= ~stay
+        parts += others
+        if parts:
+            children = _joined(parts)
+    split = None if children is None else Split(parents, children)
+    known_splits[field] = (active, split)
+    return split
 
 
-_known: WeakKeyDictionary[SplatField, tuple[tuple[Edit, ...], SplatField]] = WeakKeyDictionary()
+known_splits: WeakKeyDictionary[SplatField, tuple[tuple[Edit, ...], Split | None]] = WeakKeyDictionary()
+
+
+def _settled(
+    field: SplatField,
+    before: EditStack,
+    edit: Edit,
+    gone: Mask | None,
+    room: float,
+    proceed: Callable[[], None] | None,
+) -> tuple[Mask, list[SplatField]]:
+    """(which splats stay whole [N], children of the others), children split again where they must be."""
+    stay, done, found = np.ones(len(field), bool), [], field
+    for turn in range(CUTS if edit.adjustment == "discrete" else ROUNDS):
+        split = _split_once(found, before, edit, gone if turn == 0 else None, room, proceed)
+        if split is None:
+            break
+        if turn == 0:
+            stay = split[0]
+        else:
+            done.append(found.take(split[0]))
+        found = split[1]
+        room -= len(found)
+    return stay, done if found is field else [*done, found]
 
 
 @dataclass(frozen=True)
 class _Children:
-    """Children along one direction of z: of splat `parent` [C], at x [C], of width r [C], opacity [C]."""
+    """Children along one direction of z: of splat `parent` [C], at x [C], of width r [C], opacity [C].
+
+    Across that direction their width is `across` [C].
+    """
 
     parent: NDArray[np.int64]
     direction: Array
     x: Array
     r: Array
     opacity: Array
+    across: Array
+
+    def take(self, rows: NDArray[np.int64] | Mask) -> _Children:
+        """Some of them."""
+        return _Children(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def _split_once(
-    field: SplatField, before: EditStack, edit: Edit, most: float, proceed: Callable[[], None] | None
+    field: SplatField,
+    before: EditStack,
+    edit: Edit,
+    gone: Mask | None,
+    room: float,
+    proceed: Callable[[], None] | None,
 ) -> tuple[Mask, SplatField] | None:
-    """(which splats stay whole [N], the children of the others), or None where all do."""
+    """(which splats stay whole [N], the children of the others), or None where all do; none of those gone."""
     moved = moved_splats(field, before, proceed=proceed)
-    rows = np.concatenate([np.flatnonzero(~moved.left), moved.source])
-    points = np.concatenate([field.means[~moved.left].astype(np.float64), moved.points])
-    jacobian = np.concatenate([np.tile(np.eye(3), (len(rows) - len(moved.source), 1, 1)), moved.jacobian])
-    near = _near(edit, field, rows, points, jacobian)
-    rows, points, jacobian = rows[near], points[near], jacobian[near]
+    if gone is not None and gone.any():
+        moved = moved.without(gone)
+    rest, elsewhere = _near(edit, field, moved)
+    others = moved.source[elsewhere]
+    rows = np.concatenate([rest, others])
     if not len(rows):
         return None
-    A = jacobian @ _axes(field, rows)
+    points = np.concatenate([field.means[rest].astype(np.float64), moved.points[elsewhere]])
+    A = np.concatenate([_axes(field, rest), moved.jacobian[elsewhere] @ _axes(field, others)])
     if edit.adjustment == "discrete":
         children = _cut(edit, field, rows, points, A)
     else:
         children = _bent(edit, field, rows, points, A, proceed)
-    return _parted(field, children, most) if len(children.parent) else None
+    return _parted(field, children, room) if len(children.parent) else None
 
 
 def _axes(field: SplatField, rows: NDArray[np.int64]) -> Array:
@@ -144,19 +217,24 @@ def _axes(field: SplatField, rows: NDArray[np.int64]) -> Array:
     return np.asarray(turns * np.exp(field.log_scales[rows].astype(np.float64))[:, None, :])
 
 
-def _near(
-    edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, jacobian: Array
-) -> NDArray[np.int64]:
-    """Which of the splats an edit may have to split."""
+def _near(edit: Edit, field: SplatField, moved: MovedSplats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which splats in their own places [.], and which of those that moved [.], an edit may have to split."""
+    from cagefield.rendering.kernels.splat_deforming import within_reach, within_reach_at_rest
+
     boxes = np.concatenate([edit.boxes, edit.inner.aabb[None]])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    size = np.exp(field.log_scales.max(axis=1).astype(np.float64))[rows]
-    size = size * np.linalg.norm(jacobian, axis=(1, 2))
-    reach = REACH * size[:, None]
-    inside = ((points + reach >= low) & (points - reach <= high)).all(axis=1)
-    if edit.adjustment != "discrete":
-        inside &= size > SMALL * float(np.linalg.norm(high - low))
-    return np.flatnonzero(inside)
+    # Stretches are Frobenius' norms, that of nothing is sqrt(3).
+    least = 0.0 if edit.adjustment == "discrete" else _UNSTRETCHED * SMALL * float(np.linalg.norm(high - low))
+    rest, elsewhere = np.empty(len(field), bool), np.empty(len(moved.source), bool)
+    scales = field.log_scales
+    within_reach_at_rest(field.means, moved.left, scales, low, high, REACH, least, _UNSTRETCHED, rest)
+    if len(elsewhere):
+        stretch = np.linalg.norm(moved.jacobian, axis=(1, 2))
+        within_reach(moved.points, moved.source, scales, low, high, REACH, least, stretch, elsewhere)
+    return np.flatnonzero(rest), np.flatnonzero(elsewhere)
+
+
+_UNSTRETCHED = float(np.sqrt(3.0))
 
 
 def _bent(
@@ -175,12 +253,19 @@ def _bent(
     length = np.linalg.norm(F[:, 1:4] - F[:, 4:7], axis=2)
     second = np.linalg.norm(F[:, 1:4] + F[:, 4:7] - 2.0 * F[:, :1], axis=2)
     bend = np.where(length > 0.0, second / np.maximum(length, 1e-300), 0.0)
+    J = mapped.jacobian.reshape(count, 7, 3, 3)
+    shear = np.linalg.norm((J[:, 1:4] - J[:, 4:7]) @ A[:, None], axis=2)  # [M, i, j]
+    shear /= np.maximum(np.maximum(length[:, :, None], length[:, None, :]), 1e-300)
+    shear[:, [0, 1, 2], [0, 1, 2]] = 0.0
+    bend = np.maximum(bend, shear.max(axis=2))
     bend[lost[:, :1] | lost[:, 1:4] | lost[:, 4:7]] = 0.0
     axis = bend.argmax(axis=1)
     worst = bend.max(axis=1)
-    split = np.flatnonzero(worst > BEND)
+    opacity = field.opacities[rows].astype(np.float64)
+    split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > BEND) & (opacity > UNSEEN))
     r = np.maximum(BEND / worst[split], LEAST_WIDTH)
-    return _row(rows[split], np.eye(3)[axis[split]], r, field.opacities[rows[split]].astype(np.float64))
+    children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
+    return children.take(np.flatnonzero(children.opacity > UNSEEN))
 
 
 def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) -> _Children:
@@ -202,7 +287,15 @@ def _row(parent: NDArray[np.int64], direction: Array, r: Array, opacity: Array) 
             depth[step:] += np.where(same, beside[:-step], 0.0)
             depth[:-step] += np.where(same, beside[step:], 0.0)
         alpha = -np.expm1(np.log1p(-alpha) * wanted / np.maximum(depth, 1e-30))
-    return _Children(parent[owner], direction[owner], x, r[owner], alpha)
+    # What the row lets through beside its middle, on all the width across it, is what the splat does there.
+    own, mass = mass_across(-np.expm1(-wanted)), mass_across(alpha)
+    for step in (1, 2):
+        beside = mass_across(alpha * np.exp(-0.5 * (step * SPACING) ** 2))
+        same = owner[step:] == owner[:-step]
+        mass[step:] += np.where(same, beside[:-step], 0.0)
+        mass[:-step] += np.where(same, beside[step:], 0.0)
+    across = np.where(mass > 0.0, own / np.maximum(mass, 1e-300), 1.0)
+    return _Children(parent[owner], direction[owner], x, r[owner], alpha, across)
 
 
 def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array) -> _Children:
@@ -213,27 +306,31 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
     if not edit.deleted:
         # What lands in the deformed cage hides what stays there, but not what leaves.
         cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))
+    size = np.linalg.norm(A, axis=(1, 2))
     for cage, concerned in cuts:
         for face in FACES:
-            at, h = _crossing(cage, face, points, A)
-            nearer = concerned & (np.abs(at) < np.minimum(best, REACH))
-            best[nearer], t[nearer], direction[nearer] = np.abs(at[nearer]), at[nearer], h[nearer]
-    split = np.flatnonzero(best < REACH)
+            n, at, h = _crossing(cage, face, points, A, size)
+            nearer = concerned[n] & (np.abs(at) < np.minimum(best[n], REACH))
+            n, at = n[nearer], at[nearer]
+            best[n], t[n], direction[n] = np.abs(at), at, h[nearer]
+    split = np.flatnonzero((best < REACH) & (field.opacities[rows] > LEAST_OPAQUE))
     t, parent, direction = t[split], rows[split], direction[split]
     alpha = np.minimum(field.opacities[parent].astype(np.float64), MOST_OPAQUE)
-    density = np.exp(-0.5 * t * t) / np.sqrt(2.0 * np.pi)
-    parts = []
-    for sign, mass in ((-1.0, ndtr(t)), (1.0, ndtr(-t))):
-        mean = sign * density / mass
-        variance = 1.0 + sign * t * density / mass - mean * mean
-        r = np.sqrt(np.maximum(variance, 1e-3))
-        parts.append(_Children(parent, direction, mean, r, -np.expm1(np.log1p(-alpha) * mass / r)))
+    parts = [
+        _Children(parent, direction, *part_between(alpha, low, high))
+        for low, high in ((np.full(len(t), -ENDS), t), (t, np.full(len(t), ENDS)))
+    ]
     joint = [np.concatenate([getattr(part, n) for part in parts]) for n in _Children.__dataclass_fields__]
     return _Children(*joint)
 
 
-def _crossing(cage: Cage, face: str, points: Array, A: Array) -> tuple[Array, Array]:
-    """(t [M], unit direction [M,3] of z) of a face's plane; t is infinite where a splat does not cross it."""
+def _crossing(
+    cage: Cage, face: str, points: Array, A: Array, size: Array
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """(which splats [K] cross a face's plane in the face, t [K], unit directions [K,3] of z).
+
+    `size` [M] is no less than a standard deviation in any direction.
+    """
     corners = cage.corners[list(FACES[face])]
     middle = corners.mean(axis=0)
     normal = np.cross(corners[3] - corners[0], corners[2] - corners[1])
@@ -241,32 +338,37 @@ def _crossing(cage: Cage, face: str, points: Array, A: Array) -> tuple[Array, Ar
     inwards = cage.corners.mean(axis=0) - middle
     if normal @ inwards < 0.0:
         normal = -normal
-    h = A.transpose(0, 2, 1) @ normal
+    away = (points - middle) @ normal
+    n = np.flatnonzero(np.abs(away) < REACH * size)
+    h = A[n].transpose(0, 2, 1) @ normal
     width = np.maximum(np.linalg.norm(h, axis=1), 1e-300)
-    t = -((points - middle) @ normal) / width
-    # Where it is thickest on the plane, and a little inside.
-    on_plane = points + np.einsum("mij,mj->mi", A, h) * (t / width)[:, None]
+    t = -away[n] / width
     near = np.abs(t) < REACH
-    inside: Mask = np.zeros(len(points), bool)
-    inside[near] = cage.contains(on_plane[near] + 1e-6 * inwards)
-    return np.where(inside & near, t, np.inf), h / width[:, None]
+    n, h, width, t = n[near], h[near], width[near], t[near]
+    # Where it is thickest on the plane, and a little inside.
+    on_plane = points[n] + np.einsum("mij,mj->mi", A[n], h) * (t / width)[:, None]
+    inside = cage.contains(on_plane + 1e-6 * inwards)
+    return n[inside], t[inside], (h / width[:, None])[inside]
 
 
-def _parted(field: SplatField, children: _Children, most: float) -> tuple[Mask, SplatField] | None:
+def _parted(field: SplatField, children: _Children, room: float) -> tuple[Mask, SplatField] | None:
     """(which splats stay whole, the others' children); of too many, those of the most opaque parents."""
     parents = np.unique(children.parent)
-    if len(field) + len(children.parent) > most:
+    if len(children.parent) > room:
         order = np.argsort(-field.opacities[parents], kind="stable")
-        fits = int(len(parents) * max(0.0, most - len(field)) / len(children.parent))
+        fits = int(len(parents) * max(0.0, room) / len(children.parent))
         parents = parents[order[:fits]]
         kept = np.isin(children.parent, parents)
-        children = _Children(*(getattr(children, n)[kept] for n in _Children.__dataclass_fields__))
+        children = children.take(kept)
         if not len(children.parent):
             return None
     n, h = children.parent, children.direction
     A = _axes(field, n)
     along = np.einsum("cij,cj->ci", A, h)
-    U, s, _ = np.linalg.svd(A + ((children.r - 1.0)[:, None] * along)[:, :, None] * h[:, None, :])
+    across = children.across[:, None]
+    U, s, _ = np.linalg.svd(
+        across[:, None] * A + ((children.r[:, None] - across) * along)[:, :, None] * h[:, None, :]
+    )
     U[:, :, 2] *= np.linalg.det(U)[:, None]
     stay = np.ones(len(field), bool)
     stay[parents] = False
@@ -277,6 +379,7 @@ def _parted(field: SplatField, children: _Children, most: float) -> tuple[Mask, 
         children.opacity.astype(np.float32),
         field.sh[n],
         antialiased=field.antialiased,
+        discs=field.discs,
         bounds=field.bounds,
         unbounded=field.unbounded,
     )

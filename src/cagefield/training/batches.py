@@ -13,6 +13,7 @@ from cagefield.devices import floats, ints
 from cagefield.loops import deal_of
 from cagefield.training.exposure import Exposure
 from cagefield.training.grid_state import GridState
+from cagefield.training.kernels.gauss_newton_voxels import gauss_newton, laplacian
 from cagefield.training.kernels.march import (
     MOST_SAMPLES,
     SAMPLE,
@@ -22,7 +23,6 @@ from cagefield.training.kernels.march import (
     march_batch,
 )
 from cagefield.training.kernels.photos import PatchArgs
-from cagefield.training.kernels.update import gauss_newton, laplacian
 from cagefield.training.photos import Photos
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_defaults import Settings

@@ -36,7 +36,7 @@ class GridState:
         bounds: [2,3] as VoxelField. resolution: vertices per axis. vertices: [M] linear, in slot order.
         contracted: as VoxelField. degree: SH degree.
         density, sh, state, weight, accumulator, index, codes: device arrays; see
-            `kernels.march`, `kernels.update` and `kernels.accumulators`.
+            `kernels.march`, `kernels.gauss_newton_voxels` and `kernels.accumulators`.
         threads: of the CPU that may take part. workers: number of accumulators, at most as many.
     """
 

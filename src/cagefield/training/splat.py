@@ -3,8 +3,8 @@
 A run begins with splats at the data set's points and at points that the photos agree on (`splat_seeds`,
 `plane_sweep`). Each step takes one photo: the splats are drawn (`rendering.splat_rasterizer`), its error goes
 back to every splat that it shows (`kernels.splat_chain`), and each takes a Gauss-Newton step of its own
-(`kernels.splat_step`). Photos are small at first and grow, and so do the harmonics. Between steps, splats
-with much error are split and those that show nothing are taken out (`splat_growth`).
+(`kernels.gauss_newton_splats`). Photos are small at first and grow, and so do the harmonics. Between steps,
+splats with much error are split and those that show nothing are taken out (`splat_growth`).
 
 On a CPU a run of given `steps` gives the same field for the same seed.
 """

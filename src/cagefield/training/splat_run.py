@@ -28,8 +28,8 @@ from cagefield.rendering.splat_rasterizer import (
     world_to_camera,
 )
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.kernels.gauss_newton_splats import gauss_newton, residuals
 from cagefield.training.kernels.splat_chain import chain, shapes
-from cagefield.training.kernels.splat_step import gauss_newton, residuals
 from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, needles, split

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.splat import SplatField
+from cagefield.training.kernels.gauss_newton_splats import MOMENTS, RUNNING
 from cagefield.training.kernels.splat_chain import CURVATURES, GRADIENTS
-from cagefield.training.kernels.splat_step import MOMENTS, RUNNING
 from cagefield.typing import Float32
 
 

@@ -3,9 +3,9 @@
 A run is a sequence of stages (`schedule`). Each stage is a grid: the stored vertices of the stage before,
 pruned by the largest weight they got in any training ray, cropped to what is left (bounded scenes) and
 refined. Within a stage, batches of pixel patches are marched (`kernels.march`) and every voxel that they met
-is updated (`kernels.update`). Patches that meet no occupied block any more are left out of the batches: their
-gradients are zero. At the end, specks are taken out of a bounded scene's field, and what no photo showed of
-it is filled.
+is updated (`kernels.gauss_newton_voxels`). Patches that meet no occupied block any more are left out of the
+batches: their gradients are zero. At the end, specks are taken out of a bounded scene's field, and what no
+photo showed of it is filled.
 
 On a CPU a run of given `steps` gives the same field for the same seed and number of threads.
 """

@@ -13,11 +13,8 @@ from cagefield.typing import Array, Mask
 from cagefield.warps.cage_motion import TIMES, Motion, gaps, may_bend
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.falloff import Falloff
+from cagefield.warps.flow_velocity import Coordinates, FlowVelocity
 from cagefield.warps.newton_inverse import inverted
-from cagefield.warps.trilinear_bend import bend, bend_slope
-
-POWER = 4
-"""Exponent p of the distances' norm."""
 
 LEAST_GAP = 2e-3
 """The gap between the cages that a flow needs, as a share of the outer cage's half-width."""
@@ -180,20 +177,22 @@ class FlowShell:
         """(points [N,3], Jacobians [N,3,3]) at the last of the knots, of points at the first."""
         times = np.empty(2 * len(knots) - 1)
         times[::2], times[1::2] = knots, 0.5 * (knots[1:] + knots[:-1])
-        moments = self._moments(times)
+        velocities = self._velocities(times)
         parts = [slice(n, n + _CHUNK) for n in range(0, len(points), _CHUNK)]
         x, J = points.copy(), np.tile(np.eye(3), (len(points), 1, 1))
         for part in parts:
-            x[part], J[part] = self._runge_kutta(x[part], J[part], knots, moments)
+            x[part], J[part] = self._runge_kutta(x[part], J[part], knots, velocities)
         return x, J
 
-    def _runge_kutta(self, x: Array, J: Array, knots: Array, moments: list[_Moment]) -> tuple[Array, Array]:
-        at = _Coordinates(self._in_outer(x), None)
+    def _runge_kutta(
+        self, x: Array, J: Array, knots: Array, velocities: list[FlowVelocity]
+    ) -> tuple[Array, Array]:
+        at = Coordinates(self._in_outer(x), None)
         for n, h in enumerate(np.diff(knots)):
             dx, dJ = np.zeros_like(x), np.zeros_like(J)
             k, slope = dx, dJ
             for moment, share, weight in ((0, 0.0, 1.0), (1, 0.5, 2.0), (1, 0.5, 2.0), (2, 1.0, 1.0)):
-                k, G = self._velocity(x + (share * h) * k, moments[2 * n + moment], at)
+                k, G = velocities[2 * n + moment].at(x + (share * h) * k, at)
                 slope = G @ (J + (share * h) * slope)
                 dx, dJ = dx + weight * k, dJ + weight * slope
             x, J = x + (h / 6.0) * dx, J + (h / 6.0) * dJ
@@ -207,67 +206,13 @@ class FlowShell:
         affine = (x - self.motion.confines.centre) @ self.motion.confines.inverse.T
         return np.where(inside[:, None], 2.0 * u - 1.0, affine)
 
-    def _moments(self, times: Array) -> list[_Moment]:
+    def _velocities(self, times: Array) -> list[FlowVelocity]:
         c, F, dc, dF = self.motion.frames(times)
         rate = self.motion.end.bend - self.motion.start.bend
         return [
-            _Moment(Extended(c[n], F[n], self.motion.bend(t)), dc[n], dF[n], rate)
+            FlowVelocity(
+                Extended(c[n], F[n], self.motion.bend(t)), dc[n], dF[n], rate,
+                self.motion.confines, self.falloff, self.coefficients,
+            )
             for n, t in enumerate(times)
-        ]
-
-    def _velocity(self, x: Array, cage: _Moment, at: _Coordinates) -> tuple[Array, Array]:
-        """(v [N,3], dv/dx [N,3,3]) at points x; `at` holds their coordinates of the last call, then these."""
-        confines = self.motion.confines
-        at.outer, at.inner = confines.coordinates(x, at.outer), cage.place.coordinates(x, at.inner)
-        v, G = np.zeros_like(x), np.zeros((len(x), 3, 3))
-        rows: Mask = np.abs(at.outer).max(axis=1, initial=0.0) < 1.0
-        z, xi = at.outer[rows], at.inner[rows]
-        dz, dxi = confines.gradient(z), cage.place.gradient(xi)
-        D = 0.5 * confines.heights * (1.0 - z * z)
-        e = cage.place.heights * (np.abs(xi) - 1.0).clip(0.0)
-        p = float(POWER)
-        near, far = (e**p).sum(axis=1), (D**-p).sum(axis=1)  # d_i^p and d_o^-p
-        q = (near * far) ** (1.0 / p)
-        w, slope = self.falloff.weight(q, self.coefficients)
-        # d log q = (d near / near + d far / far) / p; at near = 0, q and its gradient's share vanish.
-        d_near = ((e ** (p - 1.0) * cage.place.heights * np.sign(xi))[:, None] @ dxi)[:, 0]
-        d_far = ((D ** (-p - 1.0) * confines.heights * z)[:, None] @ dz)[:, 0]
-        dq = q[:, None] * (d_near / np.maximum(near, 1e-300)[:, None] + d_far / far[:, None])
-        V, dV = cage.velocity(x[rows], xi, dxi)
-        v[rows] = w[:, None] * V
-        G[rows] = w[:, None, None] * dV + V[:, :, None] * (slope[:, None] * dq)[:, None]
-        return v, G
-
-
-@dataclass
-class _Coordinates:
-    """Coordinates [N,3] of the marching points in the outer and the inner cage: the next Newton's starts."""
-
-    outer: Array | None
-    inner: Array | None
-
-
-@dataclass(frozen=True)
-class _Moment:
-    """The inner cage at a time, and dc/dt [3], dF/dt [3,3], dK/dt [4,3]."""
-
-    place: Extended
-    centre_rate: Array
-    frame_rate: Array
-    bend_rate: Array
-
-    def velocity(self, x: Array, xi: Array, dxi: Array) -> tuple[Array, Array]:
-        """(V [N,3], dV/dx [N,3,3]) at points x [N,3] with coordinates xi [N,3] and dxi/dx [N,3,3].
-
-        V = dc/dt + dF/dt F^-1 (x - c) + F dB/dt(clamp(xi)): that of the cage on its faces, and not of what
-        the coordinates around it do.
-        """
-        clamped = xi.clip(-1.0, 1.0)
-        y = (x - self.place.centre) @ self.place.inverse.T
-        V = self.centre_rate + y @ self.frame_rate.T
-        dV = np.broadcast_to(self.frame_rate @ self.place.inverse, (len(xi), 3, 3))
-        if self.bend_rate.any():
-            inside = np.abs(xi) <= 1.0
-            V = V + bend(self.bend_rate, clamped) @ self.place.frame.T
-            dV = dV + self.place.frame @ (bend_slope(self.bend_rate, clamped) * inside[:, None]) @ dxi
-        return V, dV
+        ]  # fmt: skip

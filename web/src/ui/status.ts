@@ -37,7 +37,8 @@ export function status(app: App): HTMLElement {
   });
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
     const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
-    figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms` : "";
+    figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}` : "";
+    figures.title = f.page ? "" : (app.page.why ?? "");
     saved.textContent = state === null ? "" : state.saved ? "saved" : "not saved";
     saved.classList.toggle("due", state?.saved === false);
     connection.className = `connection ${c}`;

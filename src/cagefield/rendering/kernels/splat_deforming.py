@@ -42,6 +42,55 @@ def in_boxes(points, boxes, inside):
         inside[n] = found
 
 
+@njit(inline="always", **PLAIN)
+def reaches(x, y, z, log_scales, n, stretch, low, high, reach, least):
+    """Whether splat n at (x, y, z) is wider than `least`, and nearer to a box than `reach` of its width."""
+    width = stretch * np.exp(float(max(log_scales[n, 0], log_scales[n, 1], log_scales[n, 2])))
+    r = reach * width
+    found = low[0] - r <= x <= high[0] + r
+    found &= low[1] - r <= y <= high[1] + r
+    found &= low[2] - r <= z <= high[2] + r
+    return found and width > least
+
+
+@njit(parallel=True, **PLAIN)
+def within_reach(points, numbers, log_scales, low, high, reach, least, stretch, found):
+    """Writes which points [M,3] an edit in a box may bend or cut: splats `numbers` [M], stretched [M]."""
+    for m in prange(len(points)):
+        x, y, z = points[m, 0], points[m, 1], points[m, 2]
+        found[m] = reaches(x, y, z, log_scales, numbers[m], stretch[m], low, high, reach, least)
+
+
+@njit(parallel=True, **PLAIN)
+def within_reach_at_rest(means, left, log_scales, low, high, reach, least, stretch, found):
+    """The same for splats in their own places [N], but for those that have left them."""
+    for n in prange(len(means)):
+        x, y, z = float(means[n, 0]), float(means[n, 1]), float(means[n, 2])
+        found[n] = not left[n] and reaches(x, y, z, log_scales, n, stretch, low, high, reach, least)
+
+
+@njit(parallel=True, **PLAIN)
+def changes(points, ends, jacobian, moves):
+    """Writes which points [M,3] end elsewhere, or have a Jacobian [M,3,3] that is not 1."""
+    for m in prange(len(points)):
+        same = True
+        for a in range(3):
+            same &= points[m, a] == ends[m, a]
+            for b in range(3):
+                same &= jacobian[m, a, b] == (1.0 if a == b else 0.0)
+        moves[m] = not same
+
+
+@njit(parallel=True, **PLAIN)
+def gather(values, rows, out):
+    """Writes the rows of values [N,K] into out [M,K]."""
+    for block in prange((len(rows) + BLOCK - 1) // BLOCK):
+        for m in range(block * BLOCK, min(len(rows), (block + 1) * BLOCK)):
+            n = rows[m]
+            for k in range(values.shape[1]):
+                out[m, k] = values[n, k]
+
+
 @njit(**PLAIN)
 def polar_rotation(J, R):
     """Writes R of J = R S, by Newton's method X <- (g X + X^-T / g) / 2 from J; 1 for a singular J.

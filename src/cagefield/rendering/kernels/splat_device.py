@@ -190,7 +190,7 @@ def project(
 
 @qd.func
 def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
-    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_projection.overlaps`."""
+    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_tiles.overlaps`."""
     row = PACKED * i
     x0 = column * TILE - packed[row]
     y0 = line * TILE - packed[row + 1]

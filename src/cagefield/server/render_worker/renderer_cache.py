@@ -139,6 +139,25 @@ class RendererCache:
             )
             renderer.render(camera)
 
+    def page_field(self) -> bytes | None:
+        """The field as a page's GPU draws it; None for what pages cannot draw. Raises FieldError."""
+        from cagefield.formats.page_field import encode_page_field
+
+        field = self.scene.field
+        if not isinstance(field, VoxelField):
+            return None
+        return encode_page_field(field, step=self.plain.step, background=self.scene.background)
+
+    def page_edits(self, shown: Shown) -> bytes | None:
+        """The edits as a page's GPU evaluates them; None for what pages cannot draw. Raises EditError."""
+        from cagefield.formats.page_edits import encode_page_edits, for_pages
+        from cagefield.rendering.renderer import Renderer
+
+        if not isinstance(self.plain, Renderer):
+            return None
+        stack = for_pages(EditStack(self.edits(shown.edits)))
+        return encode_page_edits(self.plain.with_edits(stack, preserve_opacity=shown.preserve_opacity))
+
     def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
 

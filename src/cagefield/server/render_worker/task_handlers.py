@@ -26,6 +26,8 @@ from cagefield.server.render_worker.tasks import (
     FitTask,
     FrameTask,
     GridTask,
+    PageEditsTask,
+    PageFieldTask,
     PictureTask,
     Result,
     StillTask,
@@ -65,7 +67,17 @@ class TaskHandlers:
         """Drops what is half done."""
         self._files.close()
 
-    def _answer(self, task: StillTask | SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask) -> Any:
+    def _answer(
+        self,
+        task: StillTask
+        | SurfaceTask
+        | FitTask
+        | WarmTask
+        | GridTask
+        | EndJobTask
+        | PageFieldTask
+        | PageEditsTask,
+    ) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
         if isinstance(task, FitTask):
@@ -76,6 +88,10 @@ class TaskHandlers:
             return self._renderers.warm(task.stage)
         if isinstance(task, EndJobTask):
             return self._files.end(task.job, task.keep)
+        if isinstance(task, PageFieldTask):
+            return self._renderers.page_field()
+        if isinstance(task, PageEditsTask):
+            return self._renderers.page_edits(task.shown)
         return grid_lines(Edit(**task.edit))
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:

@@ -134,8 +134,33 @@ class EndJobTask:
     keep: bool
 
 
+@dataclass(frozen=True)
+class PageFieldTask:
+    """The field as a file that a page's GPU draws; None where pages cannot draw it."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class PageEditsTask:
+    """Edits as a page's GPU evaluates them; None where pages cannot draw the field."""
+
+    number: int
+    shown: Shown
+
+
 Task: TypeAlias = (
-    PictureTask | StillTask | SurfaceTask | FitTask | WarmTask | ErrorTask | GridTask | FrameTask | EndJobTask
+    PictureTask
+    | StillTask
+    | SurfaceTask
+    | FitTask
+    | WarmTask
+    | ErrorTask
+    | GridTask
+    | FrameTask
+    | EndJobTask
+    | PageFieldTask
+    | PageEditsTask
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
+from urllib.parse import urlencode
 
 from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
@@ -18,7 +19,7 @@ from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
-from cagefield.server.render_worker.tasks import StillTask
+from cagefield.server.render_worker.tasks import PageEditsTask, PageFieldTask, StillTask
 from cagefield.server.web.security import Guard
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
@@ -112,7 +113,27 @@ def application(
             return PlainTextResponse(str(error), 500)
         return _download(content, "screenshot.png", "image/png")
 
+    async def page_file(make: Callable[[int], PageFieldTask | PageEditsTask]) -> Response:
+        try:
+            content = await editor.coordinator.ask(make)
+        except CagefieldError as error:
+            return PlainTextResponse(str(error), 409)
+        if content is None:
+            return PlainTextResponse("the server draws this scene: only voxel fields are drawn by pages", 404)
+        return Response(content, media_type="application/octet-stream")
+
+    async def field(_: Request) -> Response:
+        return await page_file(PageFieldTask)
+
+    async def page_edits(_: Request) -> Response:
+        shown, revision = editor.coordinator.shown(), editor.coordinator.session.revision
+        answer = await page_file(lambda number: PageEditsTask(number, shown))
+        answer.headers["X-Revision"] = str(revision)
+        return answer
+
     routes = [
+        Route("/field", field),
+        Route("/edits", page_edits),
         WebSocketRoute("/socket", socket),
         Route("/edits.yaml", edits),
         Route("/camera_path.json", camera_path),
@@ -172,8 +193,9 @@ class _Guarded:
             await self._app(scope, receive, respond)
 
     async def _keep_token(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """The token moves from the address to a cookie."""
-        response = RedirectResponse(scope["path"], 303)
+        """The token moves from the address to a cookie; what else the address says stays."""
+        others = [(k, v) for k, v in HTTPConnection(scope).query_params.multi_items() if k != "token"]
+        response = RedirectResponse(scope["path"] + (f"?{urlencode(others)}" if others else ""), 303)
         response.set_cookie(
             self._guard.cookie, self._guard.token or "", httponly=True, samesite="strict", max_age=30 * 86400
         )

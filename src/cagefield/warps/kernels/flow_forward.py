@@ -1,4 +1,4 @@
-"""The flow of a shell for many points with their Jacobians, in float64, for CPUs (Numba).
+"""The flow of a shell for many points with their Jacobians, in float32, for CPUs (Numba).
 
 The march of `flow_shell.FlowShell`, in Z, the affine coordinates of the outer cage; `flow_table` says what
 the table holds, and its knots say where the flow goes: from 0 to 1 it takes canonical points to deformed
@@ -9,7 +9,7 @@ work on lies in one buffer at constant offsets, so that compilers use vector ins
 cages are followed by Newton's method from those of the last stage, `newton_steps` a stage; what these do not
 suffice for is marked as lost.
 
-The oracle is `FlowShell.to_deformed`.
+The oracle is `FlowShell.to_deformed`; of the velocity in it, `warps.flow_velocity`.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from numba import prange
 from cagefield.compiling import FAST, njit
 from cagefield.warps.flow_table import HEADER, MOMENT
 
-U = np.uint64
+f32, U = np.float32, np.uint64
 LANES = U(32)
 
 START_STEPS = 8
 """Newton's steps for the coordinates at the start of a way."""
 
-AT_REST = 1e-6
+AT_REST = f32(1e-6)
 """Points nearer than this to the outer cage's faces, as a share of its half-width, stay."""
 
 # Rows of the buffer, of LANES numbers each: the place Z and D by rows at the start of a step, the stage's Z,
@@ -39,21 +39,22 @@ _ROWS = 77
 
 
 @njit(parallel=True, **FAST)
-def march(points, table, bent_outer, bent_inner, newton_steps, followed, moved, jacobian, lost):
+def march(points, exact, bent_outer, bent_inner, newton_steps, followed, moved, jacobian, lost):
     """Writes the ends [N,3] of the ways of points [N,3], d(end)/d(point) [N,3,3], and where lost [N].
 
     `followed` is the largest residual of coordinates, in units of xi, before the last of a stage's steps.
     """
+    table = exact.astype(np.float32)
     blocks = (len(points) + 31) // 32
     for block in prange(blocks):
-        s = np.zeros(_ROWS * 32)
+        s = np.zeros(_ROWS * 32, np.float32)
         first = block * 32
         count = min(32, len(points) - first)
-        _begin(points, first, count, table, s)
+        _begin(points, first, count, exact, s)
         if bent_outer:
             for l in range(LANES):
                 for a in range(3):
-                    s[_OUTER + U(32 * a) + l] = min(max(s[_Z + U(32 * a) + l], -1.0), 1.0)
+                    s[_OUTER + U(32 * a) + l] = min(max(s[_Z + U(32 * a) + l], -f32(1.0)), f32(1.0))
             for _ in range(START_STEPS):
                 _follow(s, _OUTER, _Z, table, U(10))
         if bent_inner:
@@ -64,20 +65,27 @@ def march(points, table, bent_outer, bent_inner, newton_steps, followed, moved, 
             for _ in range(START_STEPS):
                 _follow(s, _INNER, _V, table, U(HEADER + 10))
         for l in range(LANES):
-            s[_LOST + l] = 0.0
+            s[_LOST + l] = f32(0.0)
         steps = int(table[8, 0])
         for n in range(steps):
             start = HEADER + 2 * MOMENT * n
             h = table[start + 9, 0]
             for stage in range(4):
-                share = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+                share = f32(0.0) if stage == 0 else (h if stage == 3 else f32(0.5) * h)
                 moment = U(start + ((stage + 1) // 2) * MOMENT)
                 _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps)
-                _slopes(s, share, 2.0 if 0 < stage < 3 else 1.0, 0.0 if stage == 0 else 1.0, table, moment)
-            sixth = h / 6.0
+                _slopes(
+                    s,
+                    share,
+                    f32(2.0) if 0 < stage < 3 else f32(1.0),
+                    f32(0.0) if stage == 0 else f32(1.0),
+                    table,
+                    moment,
+                )
+            sixth = h / f32(6.0)
             for i in range(U(12 * 32)):
                 s[_Z + i] += sixth * s[_SUM_Z + i]
-        _end(s, first, count, table, followed, moved, jacobian, lost)
+        _end(s, first, count, exact, followed, moved, jacobian, lost)
 
 
 @njit(**FAST)
@@ -102,7 +110,7 @@ def _end(s, first, count, table, followed, moved, jacobian, lost):
                 p += table[4 + a, c] * s[_Z + U(32 * c + l)]
             moved[first + l, a] = p
             for b in range(3):
-                slope = 0.0
+                slope = f32(0.0)
                 for c in range(3):
                     slope += table[4 + a, c] * s[_D + U(32 * (3 * c + b) + l)]
                 jacobian[first + l, a, b] = slope
@@ -161,7 +169,7 @@ def _stage(s, share, table, moment, bent_outer, bent_inner, newton_steps):
             s[_OUTER + i] = s[_X + i]
         for a in range(U(3)):
             for b in range(U(3)):
-                value = 1.0 if a == b else 0.0
+                value = f32(1.0) if a == b else f32(0.0)
                 for l in range(LANES):
                     s[_DZ + U(32) * (U(3) * a + b) + l] = value
     _affine(s, _X, _V, table, moment + U(4))
@@ -186,11 +194,15 @@ def _add_bend(s, table, rows):
         w3 = table[rows + a, 0] * k[3, 0] + table[rows + a, 1] * k[3, 1] + table[rows + a, 2] * k[3, 2]
         for l in range(LANES):
             x, y, z = s[_INNER + l], s[_INNER + U(32) + l], s[_INNER + U(64) + l]
-            cx, cy, cz = min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0), min(max(z, -1.0), 1.0)
+            cx, cy, cz = (
+                min(max(x, -f32(1.0)), f32(1.0)),
+                min(max(y, -f32(1.0)), f32(1.0)),
+                min(max(z, -f32(1.0)), f32(1.0)),
+            )
             s[_V + U(32) * a + l] += cx * cy * w0 + cx * cz * w1 + cy * cz * w2 + cx * cy * cz * w3
-            gx = (cy * w0 + cz * w1 + cy * cz * w3) if abs(x) <= 1.0 else 0.0
-            gy = (cx * w0 + cz * w2 + cx * cz * w3) if abs(y) <= 1.0 else 0.0
-            gz = (cx * w1 + cy * w2 + cx * cy * w3) if abs(z) <= 1.0 else 0.0
+            gx = (cy * w0 + cz * w1 + cy * cz * w3) if abs(x) <= f32(1.0) else f32(0.0)
+            gy = (cx * w0 + cz * w2 + cx * cz * w3) if abs(y) <= f32(1.0) else f32(0.0)
+            gz = (cx * w1 + cy * w2 + cx * cy * w3) if abs(z) <= f32(1.0) else f32(0.0)
             for b in range(U(3)):
                 s[_G + U(32) * (U(3) * a + b) + l] += (
                     gx * s[_DXI + U(32) * b + l]
@@ -205,35 +217,35 @@ def _slopes(s, share, weight, kept, table, moment):
     H0, H1, H2 = table[7, 0], table[7, 1], table[7, 2]
     h0, h1, h2 = table[moment + U(8), 0], table[moment + U(8), 1], table[moment + U(8), 2]
     per_width, end, middle = table[8, 2], table[9, 0], table[9, 2]
-    last = 1.0 - end - middle
+    last = f32(1.0) - end - middle
     for l in range(LANES):
         z0, z1, z2 = s[_OUTER + l], s[_OUTER + U(32) + l], s[_OUTER + U(64) + l]
         x0, x1, x2 = s[_INNER + l], s[_INNER + U(32) + l], s[_INNER + U(64) + l]
-        f0, f1, f2 = H0 * (1.0 - z0 * z0), H1 * (1.0 - z1 * z1), H2 * (1.0 - z2 * z2)
-        moves = 1.0 if min(f0, f1, f2) > AT_REST else 0.0
-        i0, i1, i2 = 1.0 / max(f0, AT_REST), 1.0 / max(f1, AT_REST), 1.0 / max(f2, AT_REST)
+        f0, f1, f2 = H0 * (f32(1.0) - z0 * z0), H1 * (f32(1.0) - z1 * z1), H2 * (f32(1.0) - z2 * z2)
+        moves = f32(1.0) if min(f0, f1, f2) > AT_REST else f32(0.0)
+        i0, i1, i2 = f32(1.0) / max(f0, AT_REST), f32(1.0) / max(f1, AT_REST), f32(1.0) / max(f2, AT_REST)
         e0, e1, e2 = (
-            h0 * max(abs(x0) - 1.0, 0.0),
-            h1 * max(abs(x1) - 1.0, 0.0),
-            h2 * max(abs(x2) - 1.0, 0.0),
+            h0 * max(abs(x0) - f32(1.0), f32(0.0)),
+            h1 * max(abs(x1) - f32(1.0), f32(0.0)),
+            h2 * max(abs(x2) - f32(1.0), f32(0.0)),
         )
         E = e0 * e0 * e0 * e0 + e1 * e1 * e1 * e1 + e2 * e2 * e2 * e2
         F = i0 * i0 * i0 * i0 + i1 * i1 * i1 * i1 + i2 * i2 * i2 * i2
         q = np.sqrt(np.sqrt(E * F))
-        r = 1.0 / (1.0 + q)
-        g = max((r - 1.0) * per_width + 1.0, 0.0)
-        u = max(2.0 * g - 1.0, 0.0)
+        r = f32(1.0) / (f32(1.0) + q)
+        g = max((r - f32(1.0)) * per_width + f32(1.0), f32(0.0))
+        u = max(f32(2.0) * g - f32(1.0), f32(0.0))
         u8 = u * u
         u8 *= u8
         u8 *= u8
-        w = moves * (g * (end + middle * g * (3.0 - 2.0 * g)) + last * u8 * u)
-        slope = end + 6.0 * middle * g * (1.0 - g) + 18.0 * last * u8
-        slope *= (moves if g > 0.0 else 0.0) * (-r * r * per_width * q)
-        per_E, per_F = slope / max(E, 1e-200), 2.0 * slope / F
+        w = moves * (g * (end + middle * g * (f32(3.0) - f32(2.0) * g)) + last * u8 * u)
+        slope = end + f32(6.0) * middle * g * (f32(1.0) - g) + f32(18.0) * last * u8
+        slope *= (moves if g > f32(0.0) else f32(0.0)) * (-r * r * per_width * q)
+        per_E, per_F = slope / max(E, f32(1e-30)), f32(2.0) * slope / F
         # The weight's gradient in xi, and in z.
-        e0 = per_E * h0 * e0 * e0 * e0 * (1.0 if x0 > 0.0 else -1.0)
-        e1 = per_E * h1 * e1 * e1 * e1 * (1.0 if x1 > 0.0 else -1.0)
-        e2 = per_E * h2 * e2 * e2 * e2 * (1.0 if x2 > 0.0 else -1.0)
+        e0 = per_E * h0 * e0 * e0 * e0 * (f32(1.0) if x0 > f32(0.0) else -f32(1.0))
+        e1 = per_E * h1 * e1 * e1 * e1 * (f32(1.0) if x1 > f32(0.0) else -f32(1.0))
+        e2 = per_E * h2 * e2 * e2 * e2 * (f32(1.0) if x2 > f32(0.0) else -f32(1.0))
         f0 = per_F * H0 * z0 * i0 * i0 * i0 * i0 * i0
         f1 = per_F * H1 * z1 * i1 * i1 * i1 * i1 * i1
         f2 = per_F * H2 * z2 * i2 * i2 * i2 * i2 * i2
@@ -276,21 +288,49 @@ def _slopes(s, share, weight, kept, table, moment):
 @njit(inline="always", **FAST)
 def _columns(x, y, z, table, K):
     """The columns of dy/dxi at xi = (x, y, z), for the form at a row of the table; see `trilinear_bend`."""
-    cx, cy, cz = min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0), min(max(z, -1.0), 1.0)
-    in_x, in_y, in_z = abs(x) <= 1.0, abs(y) <= 1.0, abs(z) <= 1.0
+    cx, cy, cz = (
+        min(max(x, -f32(1.0)), f32(1.0)),
+        min(max(y, -f32(1.0)), f32(1.0)),
+        min(max(z, -f32(1.0)), f32(1.0)),
+    )
+    in_x, in_y, in_z = abs(x) <= f32(1.0), abs(y) <= f32(1.0), abs(z) <= f32(1.0)
     a0, a1, a2 = table[K, 0], table[K, 1], table[K, 2]
     b0, b1, b2 = table[K + U(1), 0], table[K + U(1), 1], table[K + U(1), 2]
     c0, c1, c2 = table[K + U(2), 0], table[K + U(2), 1], table[K + U(2), 2]
     g0, g1, g2 = table[K + U(3), 0], table[K + U(3), 1], table[K + U(3), 2]
-    u0 = 1.0 + (cy * a0 + cz * b0 + cy * cz * g0 if in_x else 0.0)
-    u1 = cy * a1 + cz * b1 + cy * cz * g1 if in_x else (table[K + U(5), 1] if x > 0.0 else table[K + U(4), 1])
-    u2 = cy * a2 + cz * b2 + cy * cz * g2 if in_x else (table[K + U(5), 2] if x > 0.0 else table[K + U(4), 2])
-    v0 = cx * a0 + cz * c0 + cx * cz * g0 if in_y else (table[K + U(7), 0] if y > 0.0 else table[K + U(6), 0])
-    v1 = 1.0 + (cx * a1 + cz * c1 + cx * cz * g1 if in_y else 0.0)
-    v2 = cx * a2 + cz * c2 + cx * cz * g2 if in_y else (table[K + U(7), 2] if y > 0.0 else table[K + U(6), 2])
-    w0 = cx * b0 + cy * c0 + cx * cy * g0 if in_z else (table[K + U(9), 0] if z > 0.0 else table[K + U(8), 0])
-    w1 = cx * b1 + cy * c1 + cx * cy * g1 if in_z else (table[K + U(9), 1] if z > 0.0 else table[K + U(8), 1])
-    w2 = 1.0 + (cx * b2 + cy * c2 + cx * cy * g2 if in_z else 0.0)
+    u0 = f32(1.0) + (cy * a0 + cz * b0 + cy * cz * g0 if in_x else f32(0.0))
+    u1 = (
+        cy * a1 + cz * b1 + cy * cz * g1
+        if in_x
+        else (table[K + U(5), 1] if x > f32(0.0) else table[K + U(4), 1])
+    )
+    u2 = (
+        cy * a2 + cz * b2 + cy * cz * g2
+        if in_x
+        else (table[K + U(5), 2] if x > f32(0.0) else table[K + U(4), 2])
+    )
+    v0 = (
+        cx * a0 + cz * c0 + cx * cz * g0
+        if in_y
+        else (table[K + U(7), 0] if y > f32(0.0) else table[K + U(6), 0])
+    )
+    v1 = f32(1.0) + (cx * a1 + cz * c1 + cx * cz * g1 if in_y else f32(0.0))
+    v2 = (
+        cx * a2 + cz * c2 + cx * cz * g2
+        if in_y
+        else (table[K + U(7), 2] if y > f32(0.0) else table[K + U(6), 2])
+    )
+    w0 = (
+        cx * b0 + cy * c0 + cx * cy * g0
+        if in_z
+        else (table[K + U(9), 0] if z > f32(0.0) else table[K + U(8), 0])
+    )
+    w1 = (
+        cx * b1 + cy * c1 + cx * cy * g1
+        if in_z
+        else (table[K + U(9), 1] if z > f32(0.0) else table[K + U(8), 1])
+    )
+    w2 = f32(1.0) + (cx * b2 + cy * c2 + cx * cy * g2 if in_z else f32(0.0))
     return u0, u1, u2, v0, v1, v2, w0, w1, w2
 
 
@@ -298,7 +338,7 @@ def _columns(x, y, z, table, K):
 def _rows(u0, u1, u2, v0, v1, v2, w0, w1, w2):
     """The rows of [u v w]^-1, by Cramer's rule; a determinant under 1e-6 is held there."""
     p0, p1, p2 = v1 * w2 - v2 * w1, v2 * w0 - v0 * w2, v0 * w1 - v1 * w0
-    scale = 1.0 / max(u0 * p0 + u1 * p1 + u2 * p2, 1e-6)
+    scale = f32(1.0) / max(u0 * p0 + u1 * p1 + u2 * p2, f32(1e-6))
     return (
         p0 * scale,
         p1 * scale,
@@ -330,7 +370,11 @@ def _follow(s, xi, target, table, K):
     k = table[K : K + U(10)]
     for l in range(LANES):
         x, y, z = s[xi + l], s[xi + U(32) + l], s[xi + U(64) + l]
-        cx, cy, cz = min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0), min(max(z, -1.0), 1.0)
+        cx, cy, cz = (
+            min(max(x, -f32(1.0)), f32(1.0)),
+            min(max(y, -f32(1.0)), f32(1.0)),
+            min(max(z, -f32(1.0)), f32(1.0)),
+        )
         u0, u1, u2, v0, v1, v2, w0, w1, w2 = _columns(x, y, z, table, K)
         xy, xz, yz, xyz = cx * cy, cx * cz, cy * cz, cx * cy * cz
         fx, fy, fz = x - cx, y - cy, z - cz

@@ -7,7 +7,7 @@ import quadrants as qd
 from cagefield.loops import Deal, dealt, turns
 from cagefield.warps.flow_table import HEADER, MOMENT
 from cagefield.warps.kernels.flow_shell import flow_point
-from cagefield.warps.kernels.flow_simd import bend, inverse, newton, newton_twice, times, weight_at
+from cagefield.warps.kernels.flow_velocity_simd import bend, inverse, newton, newton_twice, times, weight_at
 
 LANES = 64
 lanes = qd.types.vector(LANES, qd.f32)
@@ -25,7 +25,7 @@ LOST = 1e30
 AT_REST = 1.0 - 3e-6
 """Nodes farther out than this, in coordinates of the outer cage, stay: those on its faces, after rounding.
 
-`kernels.flow_simd.NEAR` would let them drift.
+`kernels.flow_velocity_simd.NEAR` would let them drift.
 """
 
 FOLLOWED = 0.05

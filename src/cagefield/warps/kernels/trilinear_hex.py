@@ -8,7 +8,7 @@ The records, and what xi, the bend and the image are, are those of `packing`. Th
 
 import quadrants as qd
 
-from cagefield.warps.kernels.flow_shell import solve_columns
+from cagefield.warps.kernels.flow_velocity import solve_columns
 from cagefield.warps.packing import AFFINE, BEND, CENTRE, IMAGE, LOW, MATRIX
 
 vec3 = qd.math.vec3

@@ -12,7 +12,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from cagefield.cages import Cage
 from cagefield.camera_paths import shared_up
@@ -26,6 +27,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.rendering.baked_splats import baked_splats
 from cagefield.rendering.edited_field import EditedField, edited_bounds
 from cagefield.scene import Scene
+from cagefield.sh_rotation import turned_sh
 from cagefield.training.splat_config import SplatConfig
 
 if TYPE_CHECKING:
@@ -104,6 +106,38 @@ def scene_up(scene: Scene) -> NDArray[np.float64]:
     """The unit direction [3] that is up for a scene's cameras; z where it has none."""
     poses = [camera.c2w for group in scene.cameras.values() for camera in group]
     return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+
+def upright(splats: SplatField, up: ArrayLike) -> SplatField:
+    """The splats by quarter turns as files have them, y down, where `up` [3] is most nearly up.
+
+    Their bounds and harmonics turn with them. Exact but for rounding of the harmonics; the splats themselves
+    where y is down already.
+    """
+    turn = upright_turn(up)
+    if (turn == np.eye(3)).all():
+        return splats
+    x, y, z, w = Rotation.from_matrix(turn).as_quat()
+    product = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    corners = splats.bounds @ turn.T
+    return replace(
+        splats,
+        means=splats.means @ turn.T.astype(np.float32),
+        quaternions=splats.quaternions @ product.T.astype(np.float32),
+        sh=turned_sh(splats.sh, turn),
+        bounds=np.stack([corners.min(axis=0), corners.max(axis=0)]),
+    )
+
+
+def upright_turn(up: ArrayLike) -> NDArray[np.float64]:
+    """The rotation [3,3] by quarter turns that takes the axis nearest to `up` [3] to -y."""
+    up = np.asarray(up, np.float64)
+    k = int(np.abs(up).argmax())
+    axis = np.sign(up[k]) * np.eye(3)[k]
+    down = np.array([0.0, 1.0, 0.0])
+    # About axis x (-y), by a quarter turn; by none or two about x where the axis is y itself.
+    turn = 0.5 * np.pi * np.cross(down, axis) if k != 1 else np.pi * max(axis[1], 0.0) * np.eye(3)[0]
+    return np.round(Rotation.from_rotvec(turn).as_matrix()) + 0.0
 
 
 def scene_mesh(

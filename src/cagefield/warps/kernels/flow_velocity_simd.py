@@ -1,7 +1,8 @@
 """The flow shell's velocity in plain numbers and without branches, for loops that compilers vectorise.
 
 Vectors are three numbers (x, y, z); z are the coordinates of the outer cage, xi those of the inner one. The
-tables are those of `flow_table`; the same mathematics for one sample, in vectors, is in `kernels.flow_shell`.
+tables are those of `flow_table`; the same mathematics for one sample, in vectors, is in
+`kernels.flow_velocity`. The oracle of both is `warps.flow_velocity`.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.

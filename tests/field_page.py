@@ -1,0 +1,127 @@
+"""A bare page in headless Chromium that draws fields with its own GPU, as exported scenes do."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import cagefield
+from cagefield.cameras import Camera
+from editor_page import CHROMIUM, FLAGS
+
+VIEWER = Path(cagefield.__file__).parent / "exporting" / "viewer" / "viewer.js"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A picture of the page: colour [h,w,3] and opacity [h,w] in [0,1], depth [h,w], unit normals [h,w,3]."""
+
+    rgb: NDArray[np.float64]
+    opacity: NDArray[np.float64]
+    depth: NDArray[np.float32]
+    normals: NDArray[np.float64]
+    seconds: float
+
+
+@dataclass
+class FieldPage:
+    """An open page with one renderer, `r`."""
+
+    page: Any
+
+    def load(self, field: bytes) -> dict[str, Any]:
+        """Loads a field; figures of it."""
+        return dict(
+            self.page.evaluate(
+                """async (text) => {
+                    const began = performance.now();
+                    const seen = [];
+                    await r.load(bytes(text), { onLevel: (n, of) => seen.push([n, of]) });
+                    return { levels: seen, bytes: r.bytes, ms: performance.now() - began };
+                }""",
+                base64.b64encode(field).decode(),
+            )
+        )
+
+    def edit(self, edits: bytes | None) -> None:
+        """Puts edits in the place of those before."""
+        text = None if edits is None else base64.b64encode(edits).decode()
+        self.page.evaluate(
+            "async (text) => r.setEdits(text && await cagefieldViewer.readEdits(bytes(text)))", text
+        )
+
+    def draw(self, camera: Camera, *, normals: bool = True, count: bool = False, repeat: int = 1) -> Drawn:
+        """The picture of a camera, the last of `repeat`; counts in place of depth where they are wanted."""
+        answer = self.page.evaluate(
+            """([camera, normals, count, repeat]) => {
+                r.setSize(camera.width, camera.height);
+                r.setCamera(camera);
+                r.render({ normals, count });
+                const got0 = r.read(normals);
+                const began = performance.now();
+                for (let n = 1; n < repeat; n++) { r.render({ normals, count }); r.read(false); }
+                const seconds = (performance.now() - began) / 1000 / Math.max(1, repeat - 1);
+                const got = repeat > 1 ? r.read(normals) : got0;
+                const text = (array) => array && base64(new Uint8Array(array.buffer));
+                return { rgba: text(got.rgba), depth: text(got.depth), normals: text(got.normals), seconds };
+            }""",
+            [{**camera.to_dict(), "c2w": camera.c2w.ravel().tolist()}, normals, count, repeat],
+        )
+        shape = (camera.height, camera.width)
+        rgba = _array(answer["rgba"], np.uint8).reshape(*shape, 4) / 255.0
+        turned = np.zeros((*shape, 3))
+        if normals:
+            raw = _array(answer["normals"], np.uint8).reshape(*shape, 4)[..., :3] / 127.5 - 1.0
+            length = np.linalg.norm(raw, axis=-1, keepdims=True)
+            turned = np.where(length > 0.1, raw / np.maximum(length, 0.1), 0.0)
+        depth = _array(answer["depth"], np.uint32 if count else np.float32).reshape(shape)
+        return Drawn(rgba[..., :3], rgba[..., 3], depth, turned, float(answer["seconds"]))
+
+
+@contextlib.contextmanager
+def field_page() -> Iterator[FieldPage]:
+    """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine")
+    complaints: list[str] = []
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": 200, "height": 150})
+        page.set_default_timeout(300_000)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda said: complaints.append(said.text))
+        page.set_content("<canvas></canvas>")
+        page.add_script_tag(content=VIEWER.read_text())
+        page.evaluate(_START)
+        yield FieldPage(page)
+        browser.close()
+    # Chromium's own words where a test reads pictures back, and takes the context away.
+    usual = ("ReadPixels", "CONTEXT_LOST")
+    assert [said for said in complaints if not any(word in said for word in usual)] == []
+
+
+def _array(text: str, kind: Any) -> NDArray[Any]:
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+_START = """() => {
+    window.gl = document.querySelector("canvas").getContext("webgl2", { antialias: false });
+    window.r = new cagefieldViewer.FieldRenderer(gl);
+    window.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+    window.base64 = (array) => {
+        let text = "";
+        const part = 32768;
+        for (let n = 0; n < array.length; n += part)
+            text += String.fromCharCode(...array.subarray(n, n + part));
+        return btoa(text);
+    };
+}"""

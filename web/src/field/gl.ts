@@ -1,0 +1,74 @@
+/** WebGL2 in few words. */
+
+type GL = WebGL2RenderingContext;
+
+/** A linked program, its uniforms' places, and how long it took until it could draw. */
+export interface Program {
+  program: WebGLProgram;
+  uniform: (name: string) => WebGLUniformLocation | null;
+  milliseconds: number;
+}
+
+export function programOf(gl: GL, vertex: string, fragment: string): Program {
+  const began = performance.now();
+  const program = gl.createProgram();
+  for (const [type, source] of [
+    [gl.VERTEX_SHADER, vertex],
+    [gl.FRAGMENT_SHADER, fragment],
+  ] as const) {
+    const shader = gl.createShader(type);
+    if (shader === null) throw new Error("the GPU's context is lost");
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+    gl.deleteShader(shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    const shaders = gl.getAttachedShaders(program) ?? [];
+    const logs = shaders.map((shader) => gl.getShaderInfoLog(shader) ?? "");
+    throw new Error(`a shader does not compile: ${logs.join(" ")} ${gl.getProgramInfoLog(program) ?? ""}`);
+  }
+  const places = new Map<string, WebGLUniformLocation | null>();
+  const uniform = (name: string): WebGLUniformLocation | null => {
+    const known = places.get(name);
+    if (known !== undefined) return known;
+    const place = gl.getUniformLocation(program, name);
+    places.set(name, place);
+    return place;
+  };
+  return { program, uniform, milliseconds: performance.now() - began };
+}
+
+/** An empty 3D texture; throws where the GPU has no memory for it. */
+export function texture3D(gl: GL, format: number, size: readonly number[], filter: number): WebGLTexture {
+  while (gl.getError() !== gl.NO_ERROR);
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_3D, texture);
+  gl.texStorage3D(gl.TEXTURE_3D, 1, format, size[0], size[1], size[2]);
+  setFilter(gl, gl.TEXTURE_3D, filter);
+  if (gl.getError() === gl.OUT_OF_MEMORY) {
+    gl.deleteTexture(texture);
+    throw new Error("the GPU has not enough memory for the field");
+  }
+  return texture;
+}
+
+/** Textures are read without mipmaps, and end at their edges. */
+export function setFilter(gl: GL, target: number, filter: number): void {
+  gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, filter);
+  gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, filter);
+  for (const axis of target === gl.TEXTURE_3D ? [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R] : [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
+    gl.texParameteri(target, axis, gl.CLAMP_TO_EDGE);
+}
+
+/** How pixels are unpacked: others that draw with the context may have set it otherwise. */
+export function plainUnpacking(gl: GL): void {
+  gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
+  gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+  gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+  for (const name of [gl.UNPACK_ROW_LENGTH, gl.UNPACK_IMAGE_HEIGHT, gl.UNPACK_SKIP_PIXELS, gl.UNPACK_SKIP_ROWS, gl.UNPACK_SKIP_IMAGES])
+    gl.pixelStorei(name, 0);
+}

@@ -1,0 +1,31 @@
+/** Colour from spherical harmonics in RGBA textures of 8 bits: coefficient k of channel c is number 3 k + c. */
+
+/** The real spherical harmonics of the unit direction d, as `cagefield.sh.sh_basis`. */
+const BASIS = [
+  "0.28209479177387814",
+  "-0.4886025119029199 * d.y",
+  "0.4886025119029199 * d.z",
+  "-0.4886025119029199 * d.x",
+  "1.0925484305920792 * d.x * d.y",
+  "-1.0925484305920792 * d.y * d.z",
+  "0.31539156525252005 * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
+  "-1.0925484305920792 * d.x * d.z",
+  "0.5462742152960396 * (d.x * d.x - d.y * d.y)",
+];
+
+/** The function colourAt(place in the atlas, unit direction), before the clamp, and how many textures it reads. */
+export function harmonics(K: number): { source: string; colours: number } {
+  const colours = Math.ceil((3 * K) / 4);
+  const lines = [
+    `uniform float coefficientSteps[${K}];`,
+    ...Array.from({ length: colours }, (_, n) => `uniform sampler3D colourAtlas${n};`),
+    "vec3 colourAt(vec3 at, vec3 d) {",
+    "  vec3 rgb = vec3(0.5);",
+    ...Array.from({ length: colours }, (_, n) => `  vec4 s${n} = 255.0 * textureLod(colourAtlas${n}, at, 0.0) - 128.0;`),
+  ];
+  for (let k = 0; k < K; k++) {
+    const channels = [0, 1, 2].map((c) => `s${(3 * k + c) >> 2}.${"xyzw"[(3 * k + c) & 3]}`);
+    lines.push(`  rgb += (coefficientSteps[${k}] * (${BASIS[k]})) * vec3(${channels.join(", ")});`);
+  }
+  return { source: [...lines, "  return rgb;", "}"].join("\n"), colours };
+}

@@ -1,0 +1,96 @@
+/** A level of a field as it comes over the wire (see `cagefield.formats.page_field`), unpacked. */
+import { ByteReader, PageFile } from "./page_file";
+import type { OnArrival, Bytes } from "./page_file";
+
+export type Vec3 = [number, number, number];
+
+/** A grid of codes that rays leap by (see `cagefield.rendering.occupancy`), z fastest. */
+export interface Occupancy {
+  origin: Vec3;
+  dims: Vec3;
+  codes: Uint16Array;
+}
+
+export interface LevelHeader {
+  resolution: Vec3;
+  vertices: number;
+  /** Density of 1 in world units. */
+  unit: number;
+  /** Colour coefficient of one step of 8 bits, for each of the K. */
+  steps: number[];
+  dims: Vec3;
+}
+
+export interface FieldHeader {
+  bounds: [Vec3, Vec3];
+  contracted: boolean;
+  step: number;
+  background: Vec3 | null;
+  brick: number;
+  levels: LevelHeader[];
+}
+
+/** One level: M vertices, brick by brick. */
+export interface Level {
+  field: FieldHeader;
+  header: LevelHeader;
+  /** Whether it is the full one. */
+  last: boolean;
+  bricks: Uint8Array;
+  masks: Uint8Array;
+  /** [M] halves. */
+  density: Uint16Array;
+  /** [K, 3, M], 128 is 0. */
+  sh: Uint8Array;
+  occupancy: Occupancy;
+}
+
+const MAGIC = "cagepage";
+const VERSION = 1;
+
+/** The levels of a field's file as they arrive, coarse ones first. */
+export async function* readLevels(
+  source: ReadableStream<Bytes> | ArrayBuffer,
+  onArrival?: OnArrival,
+): AsyncGenerator<Level> {
+  const reader = new ByteReader(source, onArrival);
+  try {
+    const file = await PageFile.open<FieldHeader>(reader, MAGIC, VERSION);
+    for (const [number, header] of file.header.levels.entries()) {
+      const bricks = (await file.read(`${number}.bricks`)) as Uint8Array;
+      const masks = (await file.read(`${number}.masks`)) as Uint8Array;
+      const codes = (await file.read(`${number}.occupancy`)) as Uint16Array;
+      const density = (await file.read(`${number}.density`)) as Uint8Array;
+      const sh = (await file.read(`${number}.sh`)) as Uint8Array;
+      yield {
+        field: file.header,
+        header,
+        last: number === file.header.levels.length - 1,
+        bricks,
+        masks,
+        density: joined(density),
+        sh: summed(sh, header.vertices),
+        occupancy: { origin: [0, 0, 0], dims: header.dims, codes },
+      };
+    }
+  } finally {
+    reader.cancel();
+  }
+}
+
+/** Numbers of 16 bits whose low bytes come first, then their high ones. */
+export function joined(planes: Uint8Array): Uint16Array {
+  const count = planes.length / 2;
+  const out = new Uint16Array(count);
+  for (let n = 0; n < count; n++) out[n] = planes[n] | (planes[count + n] << 8);
+  return out;
+}
+
+/** Rows of `count` bytes from their differences, in place. */
+export function summed(rows: Uint8Array, count: number): Uint8Array {
+  for (let first = 0; first < rows.length; first += count) {
+    let value = 128;
+    for (let n = first; n < first + count; n++) rows[n] = value = (value + rows[n]) & 255;
+  }
+  return rows;
+}

@@ -1,0 +1,32 @@
+/** The scene's camera path: close stills, and what lies between two of them. */
+import { column, cross, matrix, minus, plus, dot, unit } from "./vectors";
+
+export interface View {
+  c2w: number[];
+  fov_y_deg: number;
+}
+
+export interface Path {
+  stills: View[];
+  seconds: number;
+  loop: boolean;
+}
+
+/** The view at a time; past the end of a path that is no loop, its last one. */
+export function viewAt({ stills, seconds, loop }: Path, time: number): View {
+  const share = seconds > 0 ? time / seconds : 1;
+  const last = stills.length - 1;
+  const at = loop ? (share % 1) * stills.length : Math.min(share, 1) * last;
+  const one = stills[Math.min(Math.floor(at), last)];
+  const other = stills[loop ? (Math.floor(at) + 1) % stills.length : Math.min(Math.floor(at) + 1, last)];
+  const t = at - Math.floor(at);
+  const mixed = (n: number): [number, number, number] =>
+    plus(column(one.c2w, n), minus(column(other.c2w, n), column(one.c2w, n)), t);
+  const back = unit(mixed(2));
+  const up = mixed(1);
+  const level = unit(minus(up, [back[0] * dot(up, back), back[1] * dot(up, back), back[2] * dot(up, back)]));
+  return {
+    c2w: matrix(cross(level, back), level, back, mixed(3)),
+    fov_y_deg: one.fov_y_deg + t * (other.fov_y_deg - one.fov_y_deg),
+  };
+}

@@ -1,0 +1,140 @@
+import { describe, expect, it } from "vitest";
+import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
+import { joined, summed } from "../src/field/level";
+import type { Level, Vec3 } from "../src/field/level";
+import { Pacing } from "../src/field/pacing";
+import { ByteReader, PageFile } from "../src/field/page_file";
+import { Orbit } from "../src/viewer/orbit";
+import { viewAt } from "../src/viewer/path";
+
+/** A field of 10 x 9 x 9 vertices, all stored, whose vertex (x, y, z) has the density 100 x + 10 y + z. */
+function level(): Level {
+  const resolution: Vec3 = [10, 9, 9];
+  const bricks = [2, 2, 2];
+  const masks: number[] = [];
+  const density: number[] = [];
+  for (let b = 0; b < 8; b++) {
+    const at = [(b >> 2) * 8, ((b >> 1) & 1) * 8, (b & 1) * 8];
+    for (let byte = 0; byte < 64; byte++) {
+      let mask = 0;
+      for (let bit = 0; bit < 8; bit++) {
+        const v = 8 * byte + bit;
+        const [x, y, z] = [at[0] + (v >> 6), at[1] + ((v >> 3) & 7), at[2] + (v & 7)];
+        if (x >= resolution[0] || y >= resolution[1] || z >= resolution[2]) continue;
+        mask |= 1 << bit;
+        density.push(100 * x + 10 * y + z);
+      }
+      masks.push(mask);
+    }
+  }
+  const count = density.length;
+  return {
+    field: { bounds: [[0, 0, 0], [1, 1, 1]], contracted: false, step: 0.5, background: null, brick: 8, levels: [] },
+    header: { resolution, vertices: count, unit: 1, steps: [1], dims: [3, 2, 2] },
+    last: true,
+    bricks: new Uint8Array(bricks[0] * bricks[1] * bricks[2]).fill(1),
+    masks: Uint8Array.from(masks),
+    density: Uint16Array.from(density),
+    sh: Uint8Array.from({ length: 3 * count }, (_, n) => (n < count ? density[n] & 255 : 7)),
+    occupancy: { origin: [0, 0, 0], dims: [3, 2, 2], codes: new Uint16Array(12).fill(255) },
+  };
+} // prettier-ignore
+
+describe("bricks in textures", () => {
+  it("repeat the vertices of the bricks behind them", () => {
+    const layout = layoutOf(level(), 256);
+    expect(layout.dims).toEqual([2, 1, 1]);
+    expect(layout.count).toBe(2);
+    const filler = new Filler(level(), layout);
+    const width = layout.across[0] * 9;
+    const plane = width * layout.across[1] * 9;
+    for (let n = 0; n < 2; n++) {
+      const [i, j, k] = layout.index.subarray(4 * layout.bricks[n]);
+      const layer = filler.layer(k);
+      const at = (x: number, y: number, z: number): number => x * plane + (j * 9 + y) * width + i * 9 + z;
+      for (const [x, y, z] of [[0, 0, 0], [1, 8, 3], [1, 2, 8]] as Vec3[]) {
+        const value = 100 * (8 * n + x) + 10 * y + z;
+        expect(layer.density[at(x, y, z)]).toBe(value);
+        expect(layer.colours[0][4 * at(x, y, z)]).toBe(value & 255);
+        expect(layer.colours[0][4 * at(x, y, z) + 1]).toBe(7);
+      }
+      // Beyond the grid there is nothing: grey without density.
+      if (n === 1) expect([layer.density[at(5, 0, 0)], layer.colours[0][4 * at(5, 0, 0)]]).toEqual([0, 128]);
+      else expect(layer.density[at(8, 1, 1)]).toBe(811);
+    }
+    expect(bytesOf(layout)).toBe(layout.across.reduce((a, b) => a * b) * 729 * 6 + 8);
+  }); // prettier-ignore
+
+  it("are refused where textures are too small", () => {
+    expect(() => layoutOf(level(), 9)).toThrow(TooLarge);
+  });
+});
+
+describe("files for pages", () => {
+  it("are read however they are cut, and refused where they end early", async () => {
+    const text = new TextEncoder().encode('{"arrays":[]}');
+    const bytes = new Uint8Array([...new TextEncoder().encode("somefile"), 1, 0, 0, 0, text.length, 0, 0, 0, ...text]);
+    const cut = (end: number): ReadableStream<Uint8Array<ArrayBuffer>> =>
+      new ReadableStream({
+        start(controller): void {
+          for (let n = 0; n < end; n += 5) controller.enqueue(bytes.slice(n, Math.min(end, n + 5)));
+          controller.close();
+        },
+      });
+    const open = (end: number): Promise<unknown> => PageFile.open(new ByteReader(cut(end)), "somefile", 1);
+    await expect(open(bytes.length)).resolves.toMatchObject({ left: 0 });
+    await expect(open(20)).rejects.toThrow("truncated");
+    await expect(PageFile.open(new ByteReader(cut(29)), "somefile", 2)).rejects.toThrow("of version 1, this page reads 2");
+    await expect(PageFile.open(new ByteReader(cut(29)), "otherone", 1)).rejects.toThrow("not a file of the kind");
+  });
+
+  it("have differences and split bytes", () => {
+    expect([...joined(Uint8Array.from([1, 2, 3, 4]))]).toEqual([0x301, 0x402]);
+    expect([...summed(Uint8Array.from([1, 2, 250, 3]), 2)]).toEqual([129, 131, 122, 125]);
+  });
+});
+
+describe("pacing", () => {
+  it("draws smaller pictures where they take longer, and whole ones in parts", () => {
+    const pacing = new Pacing(20, 40);
+    pacing.took(10_000, 1);
+    expect(pacing.scale(200, 100)).toBe(1);
+    expect(pacing.scale(1000, 800)).toBe(0.5);
+    expect(pacing.rows(1000, 800)).toBe(400);
+  });
+});
+
+describe("the viewer's camera", () => {
+  const start = [1, 0, 0, 0, 0, 0, -1, -4, 0, 1, 0, 1, 0, 0, 0, 1];
+
+  it("turns about the centre and keeps its distance, to the pole and no farther", () => {
+    const orbit = new Orbit(start, [0, 0, 1], [0, 0, 1]);
+    expect(orbit.target).toEqual([0, 0, 1]);
+    orbit.turn(Math.PI / 2, 0);
+    expect(orbit.eye[0]).toBeCloseTo(-4);
+    orbit.turn(0, 10);
+    expect(orbit.eye[2]).toBeGreaterThan(4.9);
+    expect(Math.hypot(orbit.eye[0], orbit.eye[1], orbit.eye[2] - 1)).toBeCloseTo(4);
+    orbit.zoom(0.5);
+    expect(Math.hypot(orbit.eye[0], orbit.eye[1], orbit.eye[2] - 1)).toBeCloseTo(2);
+  });
+
+  it("shifts by what the picture shows", () => {
+    const orbit = new Orbit(start, [0, 0, 1], [0, 0, 1]);
+    orbit.shift(0.25, 0, 0.5);
+    expect(orbit.target[0]).toBeCloseTo(-1);
+    orbit.shift(0, 0.25, 0.5);
+    expect(orbit.target[2]).toBeCloseTo(2);
+  });
+
+  it("goes along a path, round where it is a loop", () => {
+    const other = [...start];
+    other[3] = 2;
+    const stills = [{ c2w: start, fov_y_deg: 40 }, { c2w: other, fov_y_deg: 50 }];
+    const path = { stills, seconds: 4, loop: false };
+    expect(viewAt(path, 2)).toMatchObject({ fov_y_deg: 45 });
+    expect(viewAt(path, 2).c2w[3]).toBeCloseTo(1);
+    expect(viewAt(path, 9).c2w[3]).toBeCloseTo(2);
+    expect(viewAt({ ...path, loop: true }, 3).c2w[3]).toBeCloseTo(1);
+  }); // prettier-ignore
+});
