@@ -65,7 +65,8 @@ def triangulate(
 ) -> SparsePoints | None:
     """Points that at least two of the posed `views` see; None where there are none.
 
-    `errors` are in pixels of the whole photos. The same views and seed give the same points.
+    `errors` are in pixels of the whole photos. The same views and seed give the same points
+    nearly always: seldom, COLMAP's threads give some percent more or fewer.
 
     Raises DatasetError where pycolmap is missing, or a photo cannot be read.
     """
