@@ -15,7 +15,7 @@ from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.kernels import splat_discs, splat_tiles
+from cagefield.rendering.kernels import splat_discs
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
 from cagefield.rendering.splat_rasterizer import (
     DEPTH,
@@ -23,6 +23,7 @@ from cagefield.rendering.splat_rasterizer import (
     Region,
     intrinsics,
     kernels,
+    pairs_of_tiles,
     untiled,
     world_to_camera,
 )
@@ -131,12 +132,5 @@ def project_discs(
             tiles,
         )
         shown = np.flatnonzero(tiles[:, 1] > tiles[:, 0])
-        order = shown[np.argsort(keys[shown])]
-        boxes = tiles[order]
-        most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
-        across, down = -(-width // TILE), -(-height // TILE)
-        starts = np.empty(across * down + 1, np.int64)
-        firsts = np.empty(len(order) + 1, np.int64)
-        ids, slots = buffers.take("ids", (most,), np.int32), buffers.take("slots", (most,), np.int32)
-        splat_tiles.bin_pairs(order, tiles, packed, True, across, starts, ids, firsts, slots)
+        _, starts, ids, *_ = pairs_of_tiles(shown, keys, tiles, packed, True, width, height, buffers)
     return DiscProjection(packed, starts, ids, camera, region, near)

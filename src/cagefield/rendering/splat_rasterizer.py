@@ -250,17 +250,36 @@ def project(
             part = tiles[begin:end] if len(source.rows) == end - begin else tiles[begin:end][source.rows]
             shown.append(source.rows[part[:, 1] > part[:, 0]] + np.int32(begin))
             begin = end
-        every = np.concatenate(shown).astype(np.int64)
-        order = every[np.argsort(keys[every])]
-        boxes = tiles[every]
-        most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
-        across, down = -(-width // TILE), -(-height // TILE)
-        starts = np.empty(across * down + 1, np.int64)
-        firsts = np.empty(len(order) + 1, np.int64)
-        ids = buffers.take("ids", (most,), np.int32)
-        slots = buffers.take("slots", (most,), np.int32)
-        pairs = splat_tiles.bin_pairs(order, tiles, packed, False, across, starts, ids, firsts, slots)
-    return Projection(packed, order, starts, ids, firsts, slots, pairs, width, height)
+        tiled = pairs_of_tiles(np.concatenate(shown), keys, tiles, packed, False, width, height, buffers)
+    return Projection(packed, *tiled, width, height)
+
+
+def pairs_of_tiles(
+    shown: NDArray[np.integer],
+    keys: Float32,
+    tiles: NDArray[np.int32],
+    packed: Float32,
+    discs: bool,
+    width: int,
+    height: int,
+    buffers: Buffers,
+) -> tuple[
+    NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], NDArray[np.int64], NDArray[np.int32], int
+]:
+    """(order, starts, ids, firsts, slots, pairs): the splats or discs `shown`, near to far in each tile.
+
+    `keys` [N] sort them, `tiles` [N,4] are their boxes of tiles; see `splat_tiles.bin_pairs` for the results.
+    """
+    every = shown.astype(np.int64)
+    order = every[np.argsort(keys[every])]
+    boxes = tiles[every]
+    most = int(((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2])).sum(dtype=np.int64))
+    across, down = -(-width // TILE), -(-height // TILE)
+    starts = np.empty(across * down + 1, np.int64)
+    firsts = np.empty(len(order) + 1, np.int64)
+    ids, slots = buffers.take("ids", (most,), np.int32), buffers.take("slots", (most,), np.int32)
+    pairs = splat_tiles.bin_pairs(order, tiles, packed, discs, across, starts, ids, firsts, slots)
+    return order, starts, ids, firsts, slots, pairs
 
 
 def world_to_camera(camera: Camera) -> NDArray[np.float64]:
