@@ -31,7 +31,6 @@ _FATAL = 3  # glog's level that only ends the process
 # pycolmap's own in one process would break each other's locks (sqlite.org, "How To Corrupt An SQLite
 # Database File", 2.2).
 _PHOTOS_AT_ONCE = 8
-_TILE = 12  # pairs are matched in tiles of so many photos each way, whose descriptors are read once
 
 
 @dataclass(frozen=True)
@@ -160,43 +159,6 @@ def extract(
         if on_progress is not None:
             done = start + len(batch)
             on_progress(done / len(names), f"features of {done} of {len(names)} photos")
-
-
-def match(
-    database: Path,
-    names: Sequence[str],
-    pairs: Pairs,
-    *,
-    verify: bool,
-    seed: int = 0,
-    on_progress: OnProgress | None = None,
-) -> None:
-    """Matches the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
-
-    Those that are matched already are left. `verify` fits epipolar geometry to each pair.
-    """
-    pycolmap = engine()
-    options = pycolmap.FeatureMatchingOptions(use_gpu=False, skip_geometric_verification=not verify)
-    verification = pycolmap.TwoViewGeometryOptions()
-    verification.ransac.random_seed = seed
-    listing = database.with_name(database.name + ".pairs.txt")
-    pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing))
-    ordered = sorted(pairs, key=lambda pair: (pair[0] // _TILE, pair[1] // _TILE, pair))
-    for start in range(0, len(ordered), _TILE**2):
-        batch = ordered[start : start + _TILE**2]
-        listing.write_text("".join(f"{names[i]} {names[j]}\n" for i, j in batch), encoding="utf-8")
-        call(
-            pycolmap.match_image_pairs,
-            database,
-            matching_options=options,
-            pairing_options=pairing,
-            verification_options=verification,
-            device=pycolmap.Device.cpu,
-        )
-        if on_progress is not None:
-            done = start + len(batch)
-            on_progress(done / len(pairs), f"matches of {done} of {len(pairs)} pairs")
-    listing.unlink(missing_ok=True)
 
 
 def all_pairs(count: int) -> list[tuple[int, int]]:

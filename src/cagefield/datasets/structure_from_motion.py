@@ -24,6 +24,7 @@ from PIL import Image
 from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.datasets import features, repeated_views
 from cagefield.datasets.features import OnProgress, Photo
+from cagefield.datasets.matching import match
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError
 
@@ -110,9 +111,7 @@ def make_poses(
     )
     few = len(photos) <= MOST_FOR_ALL_PAIRS
     pairs = features.all_pairs(len(photos)) if few else features.likely_pairs(database, len(photos))
-    features.match(
-        database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7)
-    )
+    match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
     shared_matches = _matches(database, len(photos))
     models = unfolded_models(work, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
     if not models:

@@ -27,6 +27,7 @@ from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.datasets import features
 from cagefield.datasets.features import OnProgress, Photo
+from cagefield.datasets.matching import match
 from cagefield.datasets.photos import read_photo
 from cagefield.datasets.views import SparsePoints, View
 
@@ -65,8 +66,7 @@ def triangulate(
 ) -> SparsePoints | None:
     """Points that at least two of the posed `views` see; None where there are none.
 
-    `errors` are in pixels of the whole photos. The same views and seed give the same points
-    nearly always: seldom, COLMAP's threads give some percent more or fewer.
+    `errors` are in pixels of the whole photos. The same views and seed give the same points.
 
     Raises DatasetError where pycolmap is missing, or a photo cannot be read.
     """
@@ -96,7 +96,7 @@ def triangulate(
             on_progress=features.share(on_progress, 0.05, 0.45),
         )
         pairs = nearest_pairs([one.camera for one in shrunk])
-        features.match(
+        match(
             database,
             names,
             pairs,
