@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -15,21 +16,60 @@ from pathlib import Path
 def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
     """A temporary file beside `path`, same suffix: becomes `path` on success, is removed on failure.
 
-    The folder is made where it is missing and `parents` is True.
+    The folder is made where it is missing and `parents` is True. An OSError about the temporary file, or
+    about none (a full disk), names `path`.
     """
     if parents:
         path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    with _naming(path, path.parent):
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
+        with _naming(path, temporary):
+            yield temporary
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
+            temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _naming(path: Path, hidden: Path) -> Iterator[None]:
+    """An OSError that names nothing, or `hidden` or what lies in it, names `path` instead."""
+    try:
+        yield
+    except OSError as error:
+        name = error.filename
+        if name is None or (isinstance(name, (str, Path)) and Path(name).is_relative_to(hidden)):
+            error.filename, error.filename2 = str(path), None
+            if error.errno is None:  # pillow's, which has words alone
+                error.errno, error.strerror = errno.EIO, str(error.args[0]) if error.args else "failed"
+        raise
+
+
+@contextmanager
+def merged_folder(target: Path) -> Iterator[Path]:
+    """A folder to be filled with files that come into `target` together.
+
+    Where `target` holds something already, that is a hidden folder in it: on success its files take their
+    places, on failure they are removed, and `target` is what it was. Else it is `target` itself, not
+    made yet or empty, and what has been written stays.
+    """
+    if not target.exists() or not any(target.iterdir()):
+        yield target
+        return
+    with _naming(target, target):
+        draft = Path(tempfile.mkdtemp(prefix=".new-", dir=target))
+    try:
+        with _naming(target, draft):
+            yield draft
+            for entry in sorted(draft.iterdir()):
+                entry.replace(target / entry.name)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 @contextmanager

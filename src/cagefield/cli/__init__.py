@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Protocol
 
 import cagefield
-from cagefield.errors import CagefieldError, warnings_in_one_line
+from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 
 if TYPE_CHECKING:
 
@@ -46,8 +46,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
-        return _refuse(f"{names}: {error.strerror or error}" if names else str(error))
+        return _refuse(line_of(error))
+    except MemoryError as error:
+        return _refuse(f"there is not enough memory ({error or 'the system gave no more'})")
     except KeyboardInterrupt:
         print("cagefield: interrupted", file=sys.stderr)
         return 130
