@@ -31,6 +31,8 @@ _DESCRIPTION = """Edit the geometry of a captured radiance field with two nested
 def main(argv: Sequence[str] | None = None) -> int:
     """Exit code of the command line `argv` (the process's own for None): 0, or 2 for bad input."""
     args = list(sys.argv[1:] if argv is None else argv)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of folders may be no UTF-8
     if args in (["--version"], ["-V"]):
         print(f"cagefield {cagefield.__version__}")
         return 0
