@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import errno
+import glob
 import os
 import shutil
 import tempfile
 import uuid
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from cagefield.exchange import exchanged
 
 
 @contextmanager
@@ -76,26 +79,78 @@ def merged_folder(target: Path) -> Iterator[Path]:
 def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
     """An empty folder beside `target` to be filled: takes its place on success, is removed on failure.
 
-    What `target` held under the names in `own` goes once the new folder is in place; other entries move over
-    to it. After a failure `target` is what it was.
+    What `target` held under the names in `own` goes; other entries stand in the new folder when it takes its
+    place. After a failure `target` is what it was. Where the system can exchange two names at once there is
+    a whole folder at `target` at every moment; else `recover_folder` puts back what an end between two
+    renames left. An OSError about the new folder, or about none (a full disk), names `target`.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     draft, retired = (
         target.with_name(f".{target.name}.{role}-{uuid.uuid4().hex[:8]}") for role in ("new", "old")
     )
-    draft.mkdir()
+    with _naming(target, draft):
+        draft.mkdir()
     try:
-        yield draft
-        if target.exists():
-            target.rename(retired)
-        draft.rename(target)
+        with _naming(target, draft):
+            yield draft
+            others = _others(target, own)
+            for entry in others:
+                _linked(entry, draft / entry.name)
+            if not target.exists():
+                draft.rename(target)
+            elif exchanged(draft, target):
+                retired = draft
+            else:
+                target.rename(retired)
+                draft.rename(target)
     except BaseException:
-        shutil.rmtree(draft, ignore_errors=True)
-        if retired.exists() and not target.exists():
-            retired.rename(target)
+        if retired is not draft:
+            shutil.rmtree(draft, ignore_errors=True)
+            if retired.exists() and not target.exists():
+                retired.rename(target)
         raise
     if retired.exists():
-        for entry in retired.iterdir():
-            if entry.name not in own:
+        for entry in _others(retired, own):
+            if not (target / entry.name).exists():
                 entry.rename(target / entry.name)
         shutil.rmtree(retired, ignore_errors=True)
+
+
+def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | None:
+    """Puts back, where `target` is not there, the newest folder that an end between renames left beside it.
+
+    The name that it had is returned, None where there was nothing to do. `is_whole` says which folders count.
+    """
+    if target.exists() or not target.parent.is_dir():
+        return None
+    left = [
+        folder
+        for folder in target.parent.glob(f".{glob.escape(target.name)}.old-*")
+        if folder.is_dir() and is_whole(folder)
+    ]
+    if not left:
+        return None
+    newest = max(left, key=lambda folder: folder.stat().st_mtime)
+    newest.rename(target)
+    return newest
+
+
+def _others(folder: Path, own: Collection[str]) -> list[Path]:
+    """What a folder holds beside the names in `own`."""
+    return [] if not folder.is_dir() else [entry for entry in folder.iterdir() if entry.name not in own]
+
+
+def _linked(entry: Path, copy: Path) -> None:
+    """Another name of a file, or a folder with other names of its files; a copy where there are no links."""
+
+    def link(source: str, destination: str) -> str:
+        try:
+            os.link(source, destination, follow_symlinks=False)
+        except OSError:
+            shutil.copy2(source, destination, follow_symlinks=False)
+        return destination
+
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.copytree(entry, copy, symlinks=True, copy_function=link)
+    else:
+        link(str(entry), str(copy))
