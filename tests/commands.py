@@ -23,3 +23,14 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
     assert err.startswith("cagefield: ") and err.count("\n") == 1 and err.endswith("\n")
     assert "Traceback" not in err
     return err
+
+
+def given_up(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
+    """The line with which a command ends that fails on its way, after lines of its progress."""
+    capsys.readouterr()
+    assert main([str(arg) for arg in argv]) == 2
+    err = capsys.readouterr().err
+    *progress, last = err.splitlines()
+    assert last.startswith("cagefield: ") and "Traceback" not in err
+    assert not any(line.startswith("cagefield: ") and "warning" not in line for line in progress)
+    return last

@@ -250,7 +250,7 @@ def test_errors_name_the_line_the_key_and_the_cure(change: tuple[str, str], mess
         ("[" * 1000, "nested too deeply|not valid YAML"),
         ("a: &a [1,1,1,1,1,1,1,1,1,1]\n" + "".join(
             f"{y}: &{y} [{','.join(['*' + x] * 10)}]\n" for x, y in zip("abcdefgh", "bcdefghi", strict=True)
-        ), "more than 50000 values"),
+        ), "more than 250000 values"),
         ("\x00", "not valid YAML"),
         ("3", "expected keys"),
     ],

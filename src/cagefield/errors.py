@@ -47,6 +47,12 @@ class DeviceError(CagefieldError):
     """A compute device that is not there."""
 
 
+def line_of(error: OSError) -> str:
+    """What the system refused, as one line: the files that it is about, and why."""
+    names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
+    return f"{names}: {error.strerror or error}" if names else str(error.strerror or error)
+
+
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Shows warnings as a line on stderr, without their place in the source."""

@@ -51,6 +51,7 @@ from cagefield.scene_files import (
     read_cameras,
     read_field,
     read_manifest,
+    recover,
     write_json,
 )
 
@@ -169,6 +170,7 @@ class Scene:
                 names the file and the cure.
         """
         folder = Path(path)
+        recover(folder)
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
@@ -177,7 +179,7 @@ class Scene:
             if not (folder / name).is_file():
                 raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
         cameras = read_cameras(folder / CAMERAS)
-        edits = load_edits(folder / EDITS, check=False)
+        edits = load_edits(folder / EDITS, check=False, mend=True)
         field = read_field(folder / FIELD)
         original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).is_file() else None
         try:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from cagefield.atomic_files import recover_folder
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
@@ -31,6 +33,7 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
         SceneError: something is there that may not be replaced.
     """
     target = Path(path).resolve()
+    recover(target)
     if not target.exists():
         return target
     if not target.is_dir():
@@ -42,6 +45,19 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
     if not overwrite:
         raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
     return target
+
+
+def recover(folder: Path) -> None:
+    """Puts a scene back that a program left under another name when it was ended while it replaced it.
+
+    Says so in a warning. A scene that is there, and a folder that none was at, stay as they are.
+    """
+    found = recover_folder(folder.resolve(), is_scene)
+    if found is not None:
+        warnings.warn(
+            f"{folder} was left as {found.name} by a program that was ended while it replaced it; it is back",
+            stacklevel=2,
+        )
 
 
 def is_scene(path: Path | str) -> bool:

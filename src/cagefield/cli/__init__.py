@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Protocol
 
 import cagefield
-from cagefield.errors import CagefieldError, warnings_in_one_line
+from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 
 if TYPE_CHECKING:
 
@@ -31,6 +31,8 @@ _DESCRIPTION = """Edit the geometry of a captured radiance field with two nested
 def main(argv: Sequence[str] | None = None) -> int:
     """Exit code of the command line `argv` (the process's own for None): 0, or 2 for bad input."""
     args = list(sys.argv[1:] if argv is None else argv)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of folders may be no UTF-8
     if args in (["--version"], ["-V"]):
         print(f"cagefield {cagefield.__version__}")
         return 0
@@ -46,8 +48,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
-        return _refuse(f"{names}: {error.strerror or error}" if names else str(error))
+        return _refuse(line_of(error))
+    except MemoryError as error:
+        return _refuse(f"there is not enough memory ({error or 'the system gave no more'})")
     except KeyboardInterrupt:
         print("cagefield: interrupted", file=sys.stderr)
         return 130

@@ -75,6 +75,7 @@ class Render:
                 check_file(self.out.with_name(self.out.stem + end), self.overwrite)
 
         from cagefield import devices
+        from cagefield.atomic_files import merged_folder
         from cagefield.cli.pictures import in_one_row, write_pictures
         from cagefield.rendering.images import write_video
         from cagefield.scene import Scene
@@ -89,12 +90,14 @@ class Render:
         pictures = track(self._pictures(scene, cameras), len(cameras), "Rendering")
         if video:
             write_video(self.out, (in_one_row(picture) for picture in pictures), fps)
+        elif single:
+            for picture in pictures:
+                write_pictures(self.out.with_suffix(""), picture)
         else:
             digits = max(4, len(str(len(cameras) - 1)))
-            for index, picture in enumerate(pictures):
-                write_pictures(
-                    self.out.with_suffix("") if single else self.out / f"{index:0{digits}d}", picture
-                )
+            with merged_folder(self.out) as folder:
+                for index, picture in enumerate(pictures):
+                    write_pictures(folder / f"{index:0{digits}d}", picture)
         count = f"{len(cameras)} picture{'s' if len(cameras) > 1 else ''}"
         print(f"{count} in {self.out}")
 

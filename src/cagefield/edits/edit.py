@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike
 from cagefield.cage_checks import format_vector
 from cagefield.cages import Axes, Cage, outside_by
 from cagefield.edits import operations as ops
-from cagefield.edits.limits import as_text, flow_reach, is_valid, largest_safe
+from cagefield.edits.limits import as_text, flow_reach, largest_safe
+from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import Adjustment, problem_of_options
+from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.typing import Array
 from cagefield.warps import SHELLS, Falloff, FlowShell, Shell, Warp
@@ -27,6 +29,17 @@ from cagefield.warps.lattice import Lattice
 
 AT_ONCE = 500
 """Points at which a lattice is compared with the exact map at a time: hundredths of a second."""
+
+_SEARCHED = 500
+"""Operations among which the one is sought that an impossible edit never recovered from."""
+
+
+class ImpossibleEditError(EditError):
+    """An edit whose operation `number`, counted from 1, makes no cage."""
+
+    def __init__(self, message: str, number: int) -> None:
+        super().__init__(message)
+        self.number = number
 
 
 @dataclass(frozen=True)
@@ -69,6 +82,9 @@ class Edit:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
+        problem = problem_of_name(self.name) or problem_of_count(len(self.operations))
+        if problem is not None:
+            raise EditError(f"edit: {problem}")
         problem = problem_of_options(
             self.adjustment,
             self.shell,
@@ -92,15 +108,11 @@ class Edit:
     def deformed(self) -> Cage:
         """The inner cage after all operations."""
         cage = self.inner
-        for number, operation in enumerate(self.operations, start=1):
-            try:
-                cage = operation.apply(cage)
-            except CageError as error:
-                message = f"operation {number}, {operation.noun} {operation}: {error}"
-                safe = largest_safe(lambda t, c=cage, o=operation: is_valid(o, t, c))  # type: ignore[misc]
-                raise self._error(
-                    message + (f"; {as_text(safe)} of it is safe" if safe > 0.0 else "")
-                ) from None
+        try:
+            for cage in cages_along(self.inner, self.operations):  # noqa: B007
+                pass
+        except ImpossibleOperationError as error:
+            raise ImpossibleEditError(str(self._error(str(error))), error.number) from None
         return cage
 
     def translate(self, by: ArrayLike) -> Edit:
@@ -212,12 +224,12 @@ class Edit:
         1.0 where the whole operation is safe; otherwise everything from 0 to t is. The last operation is
         meant where none is given. A discrete edit is limited only by its cage turning inside out.
         """
-        before = self
-        if operation is None:
-            if not self.operations:
-                return 1.0
-            before, operation = self.replace(operations=self.operations[:-1]), self.operations[-1]
-        return before._largest_part(operation)
+        if operation is not None:
+            return self._largest_part(operation, self.deformed)
+        if not self.operations:
+            return 1.0
+        *_, before, _ = (self.inner, *cages_along(self.inner, self.operations))
+        return self._largest_part(self.operations[-1], before)
 
     def lattice_error(
         self,
@@ -249,8 +261,8 @@ class Edit:
         distance = np.concatenate(distances)
         return float(distance.max(initial=0.0)), float(distance.mean()) if len(distance) else 0.0
 
-    def _largest_part(self, operation: Operation) -> float:
-        cage = self.deformed
+    def _largest_part(self, operation: Operation, cage: Cage) -> float:
+        """Largest share of an operation on the inner cage, when that is at `cage`, that is safe."""
 
         def safe(t: float) -> bool:
             try:
@@ -269,11 +281,12 @@ class Edit:
 
     def _safe_part(self) -> str:
         """What is still safe of the operation after which the edit never recovered, as a clause."""
-        for number in range(len(self.operations), 0, -1):
-            before = self.replace(operations=self.operations[: number - 1])
-            if before._is_safe(before.deformed):
+        cages = [self.inner, *cages_along(self.inner, self.operations)]
+        # Of very many operations only the last are searched, which take a second.
+        for number in range(len(self.operations), max(0, len(self.operations) - _SEARCHED), -1):
+            if self._is_safe(cages[number - 1]):
                 operation = self.operations[number - 1]
-                share = as_text(before._largest_part(operation))
+                share = as_text(self._largest_part(operation, cages[number - 1]))
                 return f"; {share} of this {operation.noun} (operation {number}, {operation}) is safe"
         return ""
 

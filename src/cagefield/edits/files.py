@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -40,19 +41,26 @@ from scipy.spatial.transform import Rotation
 from cagefield.atomic_files import replaced_file
 from cagefield.cages import Cage
 from cagefield.edits import nodes, operations
-from cagefield.edits.edit import Edit
+from cagefield.edits.edit import Edit, ImpossibleEditError
+from cagefield.edits.names import mended, problem_of_name
 from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
+from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
 from cagefield.typing import Array
 
 VERSION = 1
+MOST_EDITS = 500
+"""Edits of a file: each takes a millisecond to be checked."""
+
 _SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")
 
 
-def load_edits(path: str | os.PathLike[str], *, check: bool = True) -> EditStack:
+def load_edits(path: str | os.PathLike[str], *, check: bool = True, mend: bool = False) -> EditStack:
     """The edit stack of a .yaml, .yml or .json file; with check=False also one that cannot be evaluated.
+
+    With mend=True names that no edit may have, which older versions wrote, are replaced, with a warning.
 
     Raises `EditFileError`, naming the file, the line (YAML), the key and the cure, for a file that cannot be
     read, unknown keys and impossible values.
@@ -65,23 +73,33 @@ def load_edits(path: str | os.PathLike[str], *, check: bool = True) -> EditStack
         raise EditFileError(f"{file}: not a UTF-8 text file; save it as UTF-8") from None
     except OSError as error:
         raise EditFileError(f"{file}: cannot be read ({error.strerror or error})") from None
-    return parse_edits(text, format=kind, source=str(file), check=check)
+    return parse_edits(text, format=kind, source=str(file), check=check, mend=mend)
 
 
-def parse_edits(text: str, *, format: str = "yaml", source: str = "edits", check: bool = True) -> EditStack:
+def parse_edits(
+    text: str, *, format: str = "yaml", source: str = "edits", check: bool = True, mend: bool = False
+) -> EditStack:
     """The edit stack of a text, format "yaml" or "json"; `source` names it in errors.
 
-    Enabled edits are checked (`Edit.check`) unless check=False.
+    Enabled edits are checked (`Edit.check`) unless check=False; `mend` as for `load_edits`.
     """
-    root = nodes.read_yaml(text, source) if format == "yaml" else nodes.read_json(text, source)
+    yaml = format == "yaml"
+    root = nodes.read_yaml(text, source, halves=mend) if yaml else nodes.read_json(text, source)
     if root.is_list:
-        return EditStack(_edit(item, check) for item in root.items())
+        return _stack(root, check, mend)
     keys = root.mapping(required=("edits",), optional=("version",))
     if "version" in keys and keys["version"].integer(1, 10**6) > VERSION:
         raise keys["version"].error(
             f"version {keys['version'].value} is newer than this program's {VERSION}; update cagefield"
         )
-    return EditStack(_edit(item, check) for item in keys["edits"].items())
+    return _stack(keys["edits"], check, mend)
+
+
+def _stack(node: Node, check: bool, mend: bool) -> EditStack:
+    items = node.items()
+    if len(items) > MOST_EDITS:
+        raise node.error(f"{len(items)} edits are too many, a file has at most {MOST_EDITS}; leave some out")
+    return EditStack(_edit(item, check, mend) for item in items)
 
 
 def save_edits(stack: EditStack, path: str | os.PathLike[str]) -> None:
@@ -105,7 +123,7 @@ def dump_edits(stack: EditStack, *, format: str = "yaml") -> str:
     return nodes.write_yaml(content)
 
 
-def _edit(node: Node, check: bool) -> Edit:
+def _edit(node: Node, check: bool, mend: bool) -> Edit:
     keys = node.mapping(
         required=("inner",),
         optional=(
@@ -131,9 +149,11 @@ def _edit(node: Node, check: bool) -> Edit:
     options["adjustment"] = "discrete" if deleted else "continuous"
     if "adjustment" in keys:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
-    for name in ("name", "shell", "falloff"):
+    for name in ("shell", "falloff"):
         if name in keys:
             options[name] = keys[name].text()
+    if "name" in keys:
+        options["name"] = _name(keys["name"], mend)
     for name in ("keep_source", "enabled", "allow_folding"):
         if name in keys:
             options[name] = keys[name].boolean()
@@ -141,22 +161,33 @@ def _edit(node: Node, check: bool) -> Edit:
         options["width"] = keys["width"].number()
     if "lattice" in keys and not keys["lattice"].is_null:
         options["lattice"] = keys["lattice"].integer(2, 512)
+    items = keys["operations"].items() if "operations" in keys else []
+    if (problem := problem_of_count(len(items))) is not None:
+        raise keys["operations"].error(problem)
+    options["operations"] = tuple(_operation(item) for item in items)
     try:
         edit = Edit(inner, **options)
+    except ImpossibleEditError as error:
+        raise items[error.number - 1].error(str(error)) from None
     except CagefieldError as error:
         raise node.error(str(error)) from None
-    for item in keys["operations"].items() if "operations" in keys else ():
-        operation = _operation(item)
-        try:
-            edit = edit.then(operation)
-        except CagefieldError as error:
-            raise item.error(str(error)) from None
     if check and edit.enabled:
         try:
             edit.check()
         except CagefieldError as error:
             raise node.error(str(error)) from None
     return edit
+
+
+def _name(node: Node, mend: bool) -> str:
+    name = node.text()
+    problem = problem_of_name(name)
+    if problem is None:
+        return name
+    if not mend:
+        raise node.error(problem)
+    warnings.warn(f"{node.error(problem)}; it is replaced", stacklevel=2)
+    return mended(name)
 
 
 def _cage(node: Node) -> Cage:

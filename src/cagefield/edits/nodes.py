@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,7 +14,11 @@ import yaml
 
 from cagefield.errors import EditFileError
 
-_MOST_VALUES = 50_000
+_MOST_VALUES = 250_000
+"""Values of a file, aliases followed: seconds to be read."""
+_DEEPEST = 20
+_HALF = re.compile(r"\\(u|U0000)[dD][89a-fA-F]")
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,9 @@ class Node:
         allowed = (*required, *optional)
         for key, node in self.value.items():
             if key not in allowed:
-                near = difflib.get_close_matches(str(key), allowed, n=1, cutoff=0.6)
+                near = difflib.get_close_matches(str(key)[:40], allowed, n=1, cutoff=0.6)
                 hint = f'; did you mean "{near[0]}"?' if near else f"; the keys here are {', '.join(allowed)}"
-                raise node.error(f'unknown key "{key}"{hint}')
+                raise node.error(f"unknown key {_quoted(key)}{hint}")
         for key in required:
             if key not in self.value:
                 raise self.error(f'"{key}" is missing')
@@ -126,7 +131,7 @@ class Node:
     def choice(self, values: Sequence[str]) -> str:
         """One of some words."""
         if self.value not in values:
-            near = difflib.get_close_matches(str(self.value), values, n=1)
+            near = difflib.get_close_matches(str(self.value)[:40], values, n=1)
             hint = f'; did you mean "{near[0]}"?' if near else ""
             raise self.error(f"must be {' or '.join(values)}, got {self._shown}{hint}")
         return str(self.value)
@@ -137,19 +142,25 @@ class Node:
             return "keys"
         if isinstance(self.value, list):
             return "a list"
-        return "nothing" if self.value is None else json.dumps(self.value)
+        return "nothing" if self.value is None else _quoted(self.value)
 
 
-def read_yaml(text: str, source: str) -> Node:
-    """The root of a YAML text; only plain values are built, whatever tags it carries."""
+def read_yaml(text: str, source: str, *, halves: bool = False) -> Node:
+    r"""The root of a YAML text; only plain values are built, whatever tags it carries.
+
+    With `halves` it may have escapes of half characters, such as "\ud800".
+    """
+    # The fast loader refuses them.
+    loader = yaml.SafeLoader if halves and _HALF.search(text) else _Loader
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        _check_extent(text, source, loader)
+        root = yaml.compose(text, Loader=loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark else 0
         problem = error.problem or error.context
         raise Node(None, source, line, "").error(f"not valid YAML: {problem}") from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeError) as error:
         raise Node(None, source, 0, "").error(f"not valid YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
         raise Node(None, source, 0, "").error("nested too deeply") from None
@@ -158,22 +169,46 @@ def read_yaml(text: str, source: str) -> Node:
     return _from_yaml(root, source, "", (), [_MOST_VALUES])
 
 
+def _check_extent(text: str, source: str, loader: Any) -> None:
+    """Refuses what is nested too deeply or holds too many values, before anything is built of it."""
+    depth = values = 0
+    for event in yaml.parse(text, Loader=loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if isinstance(event, yaml.NodeEvent):
+            values += 1
+        mark = event.start_mark
+        place = Node(None, source, mark.line + 1 if mark else 0, "")
+        if depth > _DEEPEST + 1:
+            raise place.error("nested too deeply")
+        if values > 2 * _MOST_VALUES:  # keys are events too
+            raise place.error(f"more than {_MOST_VALUES} values")
+
+
 def read_json(text: str, source: str) -> Node:
     """The root of a JSON text."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        for n, (key, _) in enumerate(pairs):
-            if key in (other for other, _ in pairs[:n]):
-                raise Node(None, source, 0, "").error(f'key "{key}" is given twice; remove one')
-        return dict(pairs)
+        found: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in found:
+                raise Node(None, source, 0, "").error(f"key {_quoted(key)} is given twice; remove one")
+            found[key] = value
+        return found
 
     try:
         value = json.loads(text, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
         raise Node(None, source, error.lineno, "").error(f"not valid JSON: {error.msg}") from None
+    except EditFileError:
+        raise
+    except ValueError as error:  # a number of thousands of digits
+        raise Node(None, source, 0, "").error(f"cannot be read: {error}") from None
     except RecursionError:
         raise Node(None, source, 0, "").error("nested too deeply") from None
-    return _from_json(value, source, "")
+    return _from_json(value, source, "", 0, [_MOST_VALUES])
 
 
 def write_yaml(content: Any) -> str:
@@ -209,7 +244,7 @@ def _from_yaml(
     budget[0] -= 1
     if budget[0] < 0:
         raise Node(None, source, line, path).error(f"more than {_MOST_VALUES} values")
-    if any(node is parent for parent in above) or len(above) > 20:
+    if any(node is parent for parent in above) or len(above) > _DEEPEST:
         raise Node(None, source, line, path).error("nested too deeply")
     if isinstance(node, yaml.MappingNode):
         mapping: dict[Any, Node] = {}
@@ -218,7 +253,7 @@ def _from_yaml(
             here = f"{path}.{key}" if path else str(key)
             at = key_node.start_mark.line + 1
             if key in mapping:
-                raise Node(None, source, at, here).error(f'key "{key}" is given twice; remove one')
+                raise Node(None, source, at, here).error(f"key {_quoted(key)} is given twice; remove one")
             # An error about a value is where its key stands, not where a block under it starts.
             mapping[key] = replace(_from_yaml(value_node, source, here, (*above, node), budget), line=at)
         return Node(mapping, source, line, path)
@@ -228,20 +263,17 @@ def _from_yaml(
             for n, item in enumerate(node.value)
         ]
         return Node(items, source, line, path)
-    raw = str(node.value) if isinstance(node, yaml.ScalarNode) and node.style is None else None
+    raw = str(node.value) if isinstance(node, yaml.ScalarNode) and not node.style else None
     return Node(_scalar(node, Node(None, source, line, path)), source, line, path, raw)
 
 
 def _scalar(node: yaml.Node, place: Node) -> Any:
-    loader = yaml.SafeLoader("")
     try:
-        value = loader.construct_object(node)
-    except (yaml.YAMLError, ValueError) as error:
-        problem = getattr(error, "problem", None) or str(error)
+        value = yaml.constructor.SafeConstructor().construct_object(node)
+    except Exception as error:  # constructors of tags raise anything on values that are not theirs
+        problem = getattr(error, "problem", None) or str(error) or type(error).__name__
         raise place.error(f"cannot be read: {problem}") from None
-    finally:
-        loader.dispose()
-    if isinstance(value, str) and isinstance(node, yaml.ScalarNode) and node.style is None:
+    if isinstance(value, str) and isinstance(node, yaml.ScalarNode) and not node.style:
         # YAML 1.1 takes 1e-3 for text; a person means a number.
         try:
             return float(value) if any(c.isdigit() for c in value) and "_" not in value else value
@@ -252,13 +284,27 @@ def _scalar(node: yaml.Node, place: Node) -> Any:
     return str(node.value)  # dates and the like are text here
 
 
-def _from_json(value: Any, source: str, path: str) -> Node:
+def _from_json(value: Any, source: str, path: str, depth: int, budget: list[int]) -> Node:
+    budget[0] -= 1
+    if budget[0] < 0:
+        raise Node(None, source, 0, path).error(f"more than {_MOST_VALUES} values")
+    if depth > _DEEPEST:
+        raise Node(None, source, 0, path[:80]).error("nested too deeply")
     if isinstance(value, dict):
         children = {
-            key: _from_json(item, source, f"{path}.{key}" if path else key) for key, item in value.items()
+            key: _from_json(item, source, f"{path}.{key}" if path else key, depth + 1, budget)
+            for key, item in value.items()
         }
         return Node(children, source, 0, path)
     if isinstance(value, list):
-        items = [_from_json(item, source, f"{path}[{n}]") for n, item in enumerate(value)]
+        items = [_from_json(item, source, f"{path}[{n}]", depth + 1, budget) for n, item in enumerate(value)]
         return Node(items, source, 0, path)
     return Node(value, source, 0, path)
+
+
+def _quoted(value: object) -> str:
+    """A value as a message shows it: in ASCII, and not without end."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**40:
+        return "a number of more than 40 digits"
+    text = json.dumps(value)
+    return text if len(text) <= 80 else f'{text[:77]}..."'

@@ -15,6 +15,7 @@ from PIL import Image, UnidentifiedImageError
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.rendering.render_result import to_uint8
+from cagefield.rendering.video_encoder import encoder
 from cagefield.typing import UInt8
 
 
@@ -72,10 +73,9 @@ def video_writer(
     extended by repeating the last row or column: yuv420p, which every player shows, has even ones. `quality`
     is x264's CRF, 0 (lossless) to 51.
 
-    Raises CagefieldError for a suffix other than .mp4, and for frames of another size.
+    Raises CagefieldError for a suffix other than .mp4, and for frames of another size; OSError, that names
+    the file, where it cannot be written.
     """
-    import imageio_ffmpeg
-
     path = Path(path)
     if path.suffix.lower() != ".mp4":
         raise CagefieldError(f"{path}: a video's name ends in .mp4")
@@ -84,18 +84,10 @@ def video_writer(
     height, width = shape
     pad = ((0, height % 2), (0, width % 2), (0, 0))
     count = 0
-    with replaced_file(path) as temporary:
-        writer = imageio_ffmpeg.write_frames(
-            str(temporary),
-            (width + width % 2, height + height % 2),
-            fps=fps,
-            codec="libx264",
-            pix_fmt_out="yuv420p",
-            macro_block_size=2,
-            quality=None,
-            output_params=["-crf", str(quality), "-movflags", "+faststart"],
-        )
-        writer.send(None)
+    with (
+        replaced_file(path) as temporary,
+        encoder(temporary, (width + width % 2, height + height % 2), fps, quality) as encode,
+    ):
 
         def add(frame: NDArray[Any]) -> None:
             nonlocal count
@@ -104,13 +96,10 @@ def video_writer(
                 raise CagefieldError(
                     f"frame {count} is {list(pixels.shape)}; all frames must be {[height, width, 3]}"
                 )
-            writer.send(np.pad(pixels, pad, mode="edge").tobytes())
+            encode(np.pad(pixels, pad, mode="edge").tobytes())
             count += 1
 
-        try:
-            yield add
-        finally:
-            writer.close()
+        yield add
 
 
 def write_video(

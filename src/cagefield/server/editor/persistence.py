@@ -191,7 +191,9 @@ def _parsed(content: dict[str, object]) -> Document:
     """The document of an autosave. Raises ValueError and its like for anything else."""
     if content["version"] != 1:
         raise CagefieldError("an autosave of another version")
-    stack = parse_edits(json.dumps(content["edits"]), format="json", source="autosave", check=False)
+    stack = parse_edits(
+        json.dumps(content["edits"]), format="json", source="autosave", check=False, mend=True
+    )
     keys = tuple(
         Keyframe(
             tuple(key["c2w"]),

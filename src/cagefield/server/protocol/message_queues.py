@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections import deque
+
+from pydantic_core import PydanticSerializationError
 
 from cagefield.server.protocol import client_messages, server_messages
 
@@ -28,7 +31,7 @@ class SendQueue:
             self.waiting = deque(item for item in self.waiting if item[0] != superseded)
         elif len(self.waiting) >= MOST_WAITING:
             self.waiting.popleft()
-        self.waiting.append((message.redundancy_key(), message.model_dump_json()))
+        self.waiting.append((message.redundancy_key(), _text(message)))
         self._some.set()
 
     def put_picture(self, content: bytes) -> None:
@@ -74,3 +77,11 @@ class ReceiveQueue:
             self._some.clear()
             await self._some.wait()
         return self.waiting.popleft()
+
+
+def _text(message: server_messages.ServerMessage) -> str:
+    """The message as JSON. Half characters, of a folder's name or a text that is quoted, are escaped."""
+    try:
+        return message.model_dump_json()
+    except PydanticSerializationError:
+        return json.dumps(message.model_dump(), separators=(",", ":"))

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from cagefield.errors import CagefieldError, warnings_in_one_line
+from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.server.render_worker.tasks import Failed, Ready, Result, Task
 
 TO_END = 10.0
@@ -63,6 +63,8 @@ def _done(handlers: Any, task: Task, generation: ctypes.c_ulong) -> Result:
         return handlers.do(task, lambda wanted: generation.value > wanted)
     except CagefieldError as error:
         return Failed(task.number, str(error))
+    except OSError as error:
+        return Failed(task.number, line_of(error))
     except Exception as error:
         return Failed(task.number, f"rendering failed: {type(error).__name__}: {error}")
 

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, line_of
 from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.protocol.message_queues import ReceiveQueue
 from cagefield.server.protocol.validation_errors import refusal
@@ -118,8 +118,10 @@ def errors_reported_to(page: Page) -> Iterator[None]:
     """What cannot be done becomes a line for the page's user."""
     try:
         yield
-    except (CagefieldError, OSError) as error:
+    except CagefieldError as error:
         page.notice("error", str(error))
+    except OSError as error:
+        page.notice("error", line_of(error))
     except Exception as error:
         _log.exception("a message could not be followed")
         page.notice("error", f"the server could not do that ({type(error).__name__}: {error}); see its log")

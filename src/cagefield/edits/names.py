@@ -1,0 +1,31 @@
+"""What an edit may be called: text that every file, page and terminal takes."""
+
+from __future__ import annotations
+
+import json
+import unicodedata
+
+MOST_CHARACTERS = 200
+"""Length of a name; as the editor's page has it."""
+
+_UNSAFE = ("Cc", "Cs")
+"""Unicode's categories of what no name holds: control characters, and surrogates, which no UTF-8 has."""
+
+
+def problem_of_name(name: object) -> str | None:
+    """Why an edit may not have a name, and the cure; None where it may."""
+    if not isinstance(name, str):
+        return f"an edit's name must be text, got {type(name).__name__}"
+    bad = next((c for c in name if unicodedata.category(c) in _UNSAFE), None)
+    if bad is not None:
+        what = "half a character (a lone surrogate)" if "\ud800" <= bad <= "\udfff" else "a control character"
+        return f"the name {json.dumps(name[:40])} holds {what}, U+{ord(bad):04X}; leave it out"
+    if len(name) > MOST_CHARACTERS:
+        return f"the name has {len(name)} characters, a name has at most {MOST_CHARACTERS}; shorten it"
+    return None
+
+
+def mended(name: str) -> str:
+    """The name with what it may not hold replaced by U+FFFD, and cut."""
+    kept = (chr(0xFFFD) if unicodedata.category(c) in _UNSAFE else c for c in name[:MOST_CHARACTERS])
+    return "".join(kept)

@@ -1,0 +1,74 @@
+"""ffmpeg as a process that writes a video, and whose failure is an error."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from fractions import Fraction
+from pathlib import Path
+
+_CAUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EACCES, errno.EROFS)
+"""What ffmpeg's own words about a file are searched for."""
+
+
+@contextmanager
+def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iterator[Callable[[bytes], None]]:
+    """A function that adds a frame of `size` (width, height), even numbers, rgb24, to an H.264 file.
+
+    The file is whole once the context ends. Where it ends with an error, ffmpeg is killed.
+
+    Raises OSError where ffmpeg could not write the file.
+    """
+    import imageio_ffmpeg
+
+    rate = str(Fraction(fps).limit_denominator())
+    command = [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-xerror", "-v", "error"),
+        *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "pipe:0"),
+        *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", str(quality)),
+        *("-movflags", "+faststart", str(path)),
+    ]
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,  # Ctrl+C is for us, who then end it
+    )
+    assert process.stdin is not None
+
+    def encode(frame: bytes) -> None:
+        try:
+            process.stdin.write(frame)  # type: ignore[union-attr]
+        except BrokenPipeError:
+            raise _failure(process, path) from None
+
+    try:
+        yield encode
+        with suppress(BrokenPipeError):
+            process.stdin.close()
+        if process.wait() != 0:
+            raise _failure(process, path)
+    finally:
+        if process.poll() is None:
+            process.kill()
+        with suppress(BrokenPipeError):
+            process.stdin.close()
+        if process.stderr is not None:
+            process.stderr.close()
+        process.wait()
+
+
+def _failure(process: subprocess.Popen[bytes], path: Path) -> OSError:
+    """The error that ffmpeg ended with, by the system's number where its words name one."""
+    assert process.stderr is not None
+    words = process.stderr.read().decode(errors="replace")
+    process.wait()
+    for number in _CAUSES:
+        if os.strerror(number).lower() in words.lower():
+            return OSError(number, os.strerror(number), str(path))
+    last = (words.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
+    return OSError(errno.EIO, f"the video encoder failed ({last})", str(path))
