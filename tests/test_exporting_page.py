@@ -20,7 +20,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.exporting.page import scene_page
+from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
 from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe
 from cagefield.rendering.metrics import psnr
@@ -102,7 +102,7 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
     after, before = rendered(scene, camera), rendered(scene, camera, edits=False)
     assert psnr(after, before) < 30.0
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps <&> @FIELD@"), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps <&> @FIELD@").one_file(), encoding="utf-8")
     with shown(file) as page:
         assert page.title() == "lumps <&> @FIELD@"
         assert psnr(pixels(page), after) >= 40.0
@@ -117,7 +117,7 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
 def test_mouse_wheel_and_two_fingers_move_the_camera(tmp_path: Path) -> None:
     scene = lumps_scene()
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps"), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps").one_file(), encoding="utf-8")
     with shown(file) as page:
         seen = [pixels(page)]
 
@@ -172,7 +172,7 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
     ring = turntable((0, 0, 0), 3.2, 6, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)
     keys = tuple(Keyframe(tuple(camera.c2w.ravel()), 45.0, 1.0) for camera in ring[2:4])
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps", keys), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps", keys).one_file(), encoding="utf-8")
     with shown(file) as page:
         page.press("body", " ")
         until(page, "!cagefieldViewer.viewer.plays")
@@ -191,16 +191,18 @@ def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "1 edit, a camera path of 2 keys" in printed(capsys, "export", folder, "-o", out)
     text = out.read_text(encoding="utf-8")
     assert text.startswith("<!doctype html>") and '"loop": true' in text
-    assert "src=" not in text.split("<script>")[0] and "href=" not in text.split("<script>")[0]
+    assert "src=" not in text.split("<script>")[0] and "href=\"data:,\"" in text.split("<script>")[0]
     for words, said in (
         (("-o", out), "exists already"),
-        (("-o", tmp_path / "x.html", "--as", "mesh"), "are not written as .html"),
+        (("-o", tmp_path / "x.html", "--as", "mesh"), "are not written as a page"),
         (("-o", tmp_path / "x.ply", "--as", "page"), "a page is written as .html"),
         (("-o", tmp_path / "x.html", "--selection", "x"), "leave out --selection"),
+        (("-o", tmp_path / "x.html", "--embed"), "--embed writes a folder"),
+        (("-o", folder, "--embed", "--overwrite"), "holds no viewer.js and is left as it is"),
     ):
         assert said in refused(capsys, "export", folder, *words)
 
 
 def test_splats_are_refused() -> None:
     with pytest.raises(CagefieldError, match="the scene holds splats; a page shows voxels"):
-        scene_page(splat_scene(), "splats")
+        ScenePage.of(splat_scene(), "splats")
