@@ -114,7 +114,7 @@ class ScenePage:
         return self._html(ONE_FILE, entries, "\n".join(scripts))
 
     def folder(self) -> dict[str, bytes]:
-        """The files of a folder for a web site, by name; addresses are relative, and others for other bytes."""
+        """The files, by name, of a folder for a web site; addresses are relative, and new for new bytes."""
         entries, written = {}, {SCRIPT: _viewer()}
         for name, data in self.files.items():
             written[NAMES[name]] = data

@@ -24,8 +24,8 @@ chords are .0006 of the radius beside the circle."""
 MOST_STATES = 120
 """Longer motions have fewer states a second."""
 
-BUDGET = 16 << 20
-"""Bytes of nodes that move, before they are compressed to about a quarter."""
+BUDGET = 8 << 20
+"""Bytes of nodes that move, before they are compressed to about a third."""
 
 SIZES = (LATTICE, 48, 32, 24, 16)
 """Nodes an axis of the lattices of edits that move: the most that fit into the budget."""
@@ -68,8 +68,9 @@ def path_edits(
     knots = [_parts(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
-    shells = sum(edits[n].adjustment == "continuous" for n in moving)
-    nodes = next((r for r in SIZES if 6 * r**3 * shells * len(unique) <= BUDGET), SIZES[-1])
+    shells = [n for n in moving if edits[n].adjustment == "continuous"]
+    lattices = sum(len({parts[n] for parts in unique}) for n in shells)
+    nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
     stacks = {parts: _stack(edits, parts, moving, nodes) for parts in unique}
     states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
     found: list[Occupancy] = []

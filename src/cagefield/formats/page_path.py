@@ -4,9 +4,9 @@
     states     [S] uint16, the state at each of these times; a state that comes again is stored once
     occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
     lattice    [2, 3 N] uint8, halves as in `page_edits`: of all edits in state 0
-    n.rows     as `page_edits` has them, of state n
-    n.lattice  [2, 3 M] uint8, the nodes of the edits that move, the ranges `moving` of the header one after
-               the other; n from 1 on
+    rows.n     as `page_edits` has them, of state n
+    nodes.k    [2, 3 M] uint8, the lattice of an edit that moves. Entry n of the header's `nodes` says which
+               of them state n has in the ranges (first node, nodes) of `moving`
 
 Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same
 kinds of edits (`mixed`): inner cages and shells then follow chords of their ways.
@@ -84,14 +84,22 @@ def encode_page_path(
         "lattice": _halves(states[0].packed.lattice),
     }
     for number, state in enumerate(states):
-        arrays[f"{number}.rows"] = page_rows(state.edits, state.packed)
-        if number:
-            nodes = [state.packed.lattice[first : first + count] for first, count in ranges]
-            arrays[f"{number}.lattice"] = _halves(np.concatenate([*nodes, np.zeros((0, 3), np.float32)]))
+        arrays[f"rows.{number}"] = page_rows(state.edits, state.packed)
+    known: dict[bytes, int] = {}
+    nodes: list[list[int]] = []
+    for state in states:
+        nodes.append([])
+        for first, count in ranges:
+            lattice = state.packed.lattice[first : first + count]
+            place = known.setdefault(lattice.tobytes(), len(known))
+            arrays.setdefault(f"nodes.{place}", _halves(lattice))
+            nodes[-1].append(place)
     header = {
         "edits": [len(state.edits) for state in states],
         "boxes": [len(state.packed.boxes) if state.edits else 0 for state in states],
         "moving": ranges,
+        "nodes": nodes,
+        "lattices": len(known),
         "preserve_opacity": preserve_opacity,
         "origin": occupancy.origin.tolist(),
         "dims": list(occupancy.codes.shape),

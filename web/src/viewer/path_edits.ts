@@ -12,6 +12,9 @@ interface PathHeader {
   boxes: number[];
   /** First node and number of nodes of each lattice that moves. */
   moving: [number, number][];
+  /** Of each state, which lattices it has there; and how many there are. */
+  nodes: number[][];
+  lattices: number;
   preserve_opacity: boolean;
   origin: Vec3;
   dims: Vec3;
@@ -21,8 +24,8 @@ interface State {
   edits: number;
   boxes: number;
   rows: Float32Array;
-  /** The nodes that move. */
-  nodes: Uint16Array;
+  /** The lattices that move. */
+  nodes: Uint16Array[];
 }
 
 /** Rows of an edit of which lower and upper ends of a box are kept: its own, and those of its two hexahedra. */
@@ -45,12 +48,13 @@ export class PathEdits {
     const order = (await file.read("states")) as Uint16Array;
     const codes = (await file.read("occupancy")) as Uint16Array;
     const lattice = joined((await file.read("lattice")) as Uint8Array);
-    const states: State[] = [];
-    for (const [n, edits] of header.edits.entries()) {
-      const rows = (await file.read(`${n}.rows`)) as Float32Array;
-      const nodes = n === 0 ? taken(lattice, header.moving) : joined((await file.read(`${n}.lattice`)) as Uint8Array);
-      states.push({ edits, boxes: header.boxes[n], rows, nodes });
-    }
+    const rows: Float32Array[] = [];
+    const lattices: Uint16Array[] = [];
+    for (const n of header.edits.keys()) rows.push((await file.read(`rows.${n}`)) as Float32Array);
+    for (let k = 0; k < header.lattices; k++) lattices.push(joined((await file.read(`nodes.${k}`)) as Uint8Array));
+    const states = header.edits.map((edits, n) => {
+      return { edits, boxes: header.boxes[n], rows: rows[n], nodes: header.nodes[n].map((k) => lattices[k]) };
+    });
     return new PathEdits(header, times, order, { origin: header.origin, dims: header.dims, codes }, lattice, states);
   }
 
@@ -65,29 +69,17 @@ export class PathEdits {
     const other = states[order[k + 1]];
     const near = share < 0.5 ? one : other;
     if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.nodes);
-    return this.edits(one, mixedRows(one, other, share), mixedHalves(one.nodes, other.nodes, share));
+    const nodes = one.nodes.map((lattice, n) =>
+      lattice === other.nodes[n] ? lattice : mixedHalves(lattice, other.nodes[n], share),
+    );
+    return this.edits(one, mixedRows(one, other, share), nodes);
   }
 
-  private edits({ edits, boxes }: State, rows: Float32Array, nodes: Uint16Array): PageEdits {
+  private edits({ edits, boxes }: State, rows: Float32Array, nodes: Uint16Array[]): PageEdits {
     const lattice = this.lattice.slice();
-    let from = 0;
-    for (const [first, count] of this.header.moving) {
-      lattice.set(nodes.subarray(from, from + 3 * count), 3 * first);
-      from += 3 * count;
-    }
+    nodes.forEach((part, n) => lattice.set(part, 3 * this.header.moving[n][0]));
     return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattice, occupancy: this.occupancy };
   }
-}
-
-function taken(lattice: Uint16Array, ranges: [number, number][]): Uint16Array {
-  const parts = ranges.map(([first, count]) => lattice.subarray(3 * first, 3 * (first + count)));
-  const out = new Uint16Array(parts.reduce((sum, part) => sum + part.length, 0));
-  let at = 0;
-  for (const part of parts) {
-    out.set(part, at);
-    at += part.length;
-  }
-  return out;
 }
 
 /** Whether two states have the same kinds of edits: the fourth numbers of their rows say of which kind they are. */
