@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import http.server
 import io
 import itertools
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,14 +21,17 @@ from PIL import Image
 from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
-from cagefield.errors import CagefieldError
-from cagefield.exporting.page import scene_page
+from cagefield.edits.partial import partial_edit
+from cagefield.errors import CagefieldError, EditError
+from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
+from cagefield.formats.page_file import bytes_until
 from cagefield.keyframe_files import dump_path
-from cagefield.keyframes import Keyframe
+from cagefield.keyframes import Keyframe, Timeline
 from cagefield.rendering.metrics import psnr
 from cagefield.scene import Scene
 from commands import printed, refused
 from editor_page import CHROMIUM, FLAGS
+from hand import Hand
 from page_fields import lumps
 from splat_scenes import splat_scene
 
@@ -46,8 +51,8 @@ def lumps_scene() -> Scene:
 
 
 @contextmanager
-def shown(file: Path) -> Iterator[Any]:
-    """The page of a file, its first whole picture drawn; it asks nobody for anything."""
+def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
+    """The page of a file, its first whole picture drawn, or of an address; it asks no other for anything."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no chromium on this machine")
@@ -55,17 +60,18 @@ def shown(file: Path) -> Iterator[Any]:
     asked: list[str] = []
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
+        page = browser.new_page(viewport={"width": SIZE, "height": SIZE}, has_touch=touch, is_mobile=touch)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda said: complaints.append(said.text))
         page.on("request", lambda request: asked.append(request.url))
-        page.goto(file.as_uri())
-        page.add_style_tag(content=".bar, .message { visibility: hidden; }")
-        settle(page)
+        url = address.as_uri() if isinstance(address, Path) else address
+        page.goto(url, wait_until="commit")
+        if isinstance(address, Path):
+            settle(page)
         yield page
         browser.close()
     assert complaints == []
-    assert [url for url in asked if not url.startswith("file:")] == []
+    assert [other for other in asked if not other.startswith((url.rsplit("/", 1)[0], "data:"))] == []
 
 
 def until(page: Any, condition: str, seconds: float = 120.0) -> None:
@@ -76,12 +82,13 @@ def until(page: Any, condition: str, seconds: float = 120.0) -> None:
         time.sleep(0.02)
 
 
-def settle(page: Any) -> None:
-    """Waits for the whole picture of the full level."""
-    until(
-        page, "Boolean(window.cagefieldViewer?.viewer?.renderer.level?.last && cagefieldViewer.viewer.whole)"
+def settle(page: Any, level: str = "level?.last") -> None:
+    """Waits for the whole picture of the full level, or of a level, in `page`, a page or a frame."""
+    until(page, f"Boolean(window.cagefieldViewer?.viewer?.renderer.{level} && cagefieldViewer.viewer.whole)")
+    page.evaluate(
+        """document.querySelectorAll(".bar, .message, .arrived").forEach(e => e.style.visibility = "hidden")
+        || new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"""
     )
-    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def pixels(page: Any) -> NDArray[np.uint8]:
@@ -102,7 +109,7 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
     after, before = rendered(scene, camera), rendered(scene, camera, edits=False)
     assert psnr(after, before) < 30.0
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps <&> @FIELD@"), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps <&> @FIELD@").one_file(), encoding="utf-8")
     with shown(file) as page:
         assert page.title() == "lumps <&> @FIELD@"
         assert psnr(pixels(page), after) >= 40.0
@@ -114,37 +121,27 @@ def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> N
         assert psnr(pixels(page), after) >= 40.0
 
 
-def test_mouse_wheel_and_two_fingers_move_the_camera(tmp_path: Path) -> None:
+def test_mouse_wheel_and_keys_move_the_camera(tmp_path: Path) -> None:
     scene = lumps_scene()
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps"), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps").one_file(), encoding="utf-8")
     with shown(file) as page:
         seen = [pixels(page)]
-
-        def eye() -> NDArray[np.float64]:
-            return np.array(page.evaluate("cagefieldViewer.viewer.orbit.eye"))
-
-        first = eye()
+        first, target = orbit(page)
         page.mouse.move(60, 60)
         page.mouse.down()
         page.mouse.move(90, 60, steps=3)
         page.mouse.up()
         settle(page)
-        turned = eye()
+        turned, target = orbit(page)
         # A quarter of the height is an eighth of a full turn, about the orbit's centre, at the same height.
-        target = np.array(page.evaluate("cagefieldViewer.viewer.orbit.target"))
         a, b = (v[:2] / np.linalg.norm(v[:2]) for v in (first - target, turned - target))
         assert np.dot(a, b) == pytest.approx(np.cos(np.pi / 4), abs=1e-6)
         assert turned[2] == pytest.approx(first[2])
         seen.append(pixels(page))
         page.mouse.wheel(0, 300)
         settle(page)
-        assert np.linalg.norm(eye() - target) > 1.2 * np.linalg.norm(turned - target)
-        seen.append(pixels(page))
-        page.evaluate(_PINCH)
-        settle(page)
-        near = np.linalg.norm(eye() - np.array(page.evaluate("cagefieldViewer.viewer.orbit.target")))
-        assert near == pytest.approx(np.linalg.norm(first - target) * np.exp(0.36) / 2.0, rel=1e-3)
+        assert np.linalg.norm(orbit(page)[0] - target) > 1.2 * np.linalg.norm(turned - target)
         seen.append(pixels(page))
         page.press("body", "h")
         settle(page)
@@ -153,18 +150,33 @@ def test_mouse_wheel_and_two_fingers_move_the_camera(tmp_path: Path) -> None:
         assert psnr(one, other) < 30.0
 
 
-_PINCH = """() => {
-    const canvas = document.querySelector("canvas");
-    canvas.setPointerCapture = () => undefined;
-    const send = (type, pointerId, clientX) => canvas.dispatchEvent(
-        new PointerEvent(type, { pointerId, clientX, clientY: 60, pointerType: "touch", bubbles: true }));
-    send("pointerdown", 11, 50);
-    send("pointerdown", 12, 70);
-    send("pointermove", 11, 40);
-    send("pointermove", 12, 80);
-    send("pointerup", 11, 40);
-    send("pointerup", 12, 80);
-}"""
+def orbit(page: Any) -> NDArray[np.float64]:
+    """[eye, target] of the page's camera."""
+    return np.array(page.evaluate("[cagefieldViewer.viewer.orbit.eye, cagefieldViewer.viewer.orbit.target]"))
+
+
+def test_one_finger_turns_and_two_shift_and_pinch(tmp_path: Path) -> None:
+    file = tmp_path / "scene.html"
+    file.write_text(ScenePage.of(lumps_scene(), "lumps").one_file(), encoding="utf-8")
+    with shown(file, touch=True) as page:
+        hand = Hand(page)
+        eye, target = orbit(page)
+        hand.move([(60, 60)], [(90, 60)])
+        turned, same = orbit(page)
+        np.testing.assert_allclose(same, target, atol=1e-9)
+        a, b = (v[:2] / np.linalg.norm(v[:2]) for v in (eye - target, turned - target))
+        assert np.dot(a, b) == pytest.approx(np.cos(np.pi / 4), abs=1e-6)
+        # Both fingers by a third of the height: what was in the middle of the picture is there now.
+        hand.move([(40, 60), (60, 60)], [(40, 100), (60, 100)])
+        shifted, centre = orbit(page)
+        far = np.linalg.norm(turned - target)
+        np.testing.assert_allclose(shifted - centre, turned - target, atol=1e-6)
+        tangent = np.tan(0.5 * np.radians(page.evaluate("cagefieldViewer.viewer.fov")))
+        assert np.linalg.norm(centre - target) == pytest.approx(2.0 * tangent * far / 3.0, rel=1e-6)
+        # Twice as far apart is twice as near.
+        hand.move([(50, 60), (70, 60)], [(40, 60), (80, 60)])
+        near, centre = orbit(page)
+        assert np.linalg.norm(near - centre) == pytest.approx(0.5 * far, rel=1e-6)
 
 
 def test_the_camera_path_is_played(tmp_path: Path) -> None:
@@ -172,13 +184,155 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
     ring = turntable((0, 0, 0), 3.2, 6, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)
     keys = tuple(Keyframe(tuple(camera.c2w.ravel()), 45.0, 1.0) for camera in ring[2:4])
     file = tmp_path / "scene.html"
-    file.write_text(scene_page(scene, "lumps", keys), encoding="utf-8")
+    file.write_text(ScenePage.of(scene, "lumps", keys).one_file(), encoding="utf-8")
     with shown(file) as page:
         page.press("body", " ")
         until(page, "!cagefieldViewer.viewer.plays")
         settle(page)
         end = np.array(page.evaluate("cagefieldViewer.viewer.orbit.eye"))
         np.testing.assert_allclose(end, ring[3].origin, atol=1e-6)
+
+
+TURN = Edit(Cage.box((0, 0, 0), (0.8, 0.8, 0.8)), Cage.box((0, 0, 0), (1.7, 1.6, 1.5)))
+
+
+def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
+    gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6)))
+    scene = dataclasses.replace(
+        lumps_scene(), edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)), MOVE, gone])
+    )
+    pose = tuple(scene.cameras["test"][0].c2w.ravel())
+    keys = (
+        Keyframe(pose, 45.0, 2.0, {1: 0.0, 2: 0.0, 3: 0.0}),
+        Keyframe(pose, 45.0, 1.0, {1: 1.0, 2: 0.2, 3: 0.4}),
+        Keyframe(pose, 45.0, 1.0, {1: 1.0, 2: 1.0, 3: 1.0}),
+    )
+    page_of = ScenePage.of(scene, "lumps", keys)
+    assert page_of.along is not None and page_of.along.states <= 37 and len(page_of.along.data) < 4e6
+    # Half-way between states as exact as the lattices of the whole edits are.
+    assert page_of.along.error[0] < 0.05 * scene.field.sample_spacing
+    file = tmp_path / "scene.html"
+    file.write_text(page_of.one_file(), encoding="utf-8")
+    line = Timeline(keys, loop=False)
+    with shown(file) as page:
+        until(page, "cagefieldViewer.viewer.canPlay")
+        pictures = []
+        for seconds in (0.0, 0.83, 2.0, 2.6, 3.0):
+            page.evaluate(f"cagefieldViewer.viewer.seek(cagefieldViewer.viewer.header.path, {seconds})")
+            settle(page)
+            parts = line.parts(np.array([seconds]))
+            there = [partial_edit(edit, float(parts[n][0])) for n, edit in enumerate(scene.edits, start=1)]
+            stack = EditStack([edit for edit in there if edit is not None])
+            camera = dataclasses.replace(_as_shown(scene.cameras["test"][0], 45.0))
+            pictures.append(rendered(dataclasses.replace(scene, edits=stack), camera))
+            assert psnr(pixels(page), pictures[-1]) >= 36.0, seconds
+        page.press("body", "h")
+        settle(page)
+        assert psnr(pixels(page), rendered(scene, scene.cameras["test"][0])) >= 40.0
+    for one, other in itertools.pairwise(pictures):
+        assert psnr(one, other) < 30.0
+
+
+def _as_shown(camera: Camera, fov_y_deg: float) -> Camera:
+    focal = 0.5 * camera.height / np.tan(0.5 * np.radians(fov_y_deg))
+    return dataclasses.replace(camera, fx=focal, fy=focal)
+
+
+def test_a_path_that_moves_no_edit_has_no_states() -> None:
+    scene = lumps_scene()
+    keys = tuple(Keyframe(tuple(camera.c2w.ravel()), 45.0) for camera in scene.cameras["train"])
+    assert "path" not in ScenePage.of(scene, "lumps", keys).files
+
+
+def test_parts_of_an_edit_that_are_impossible_are_named() -> None:
+    """After a quarter turn the cage is inside again, on the way its corners are not."""
+    close = Edit(TURN.inner, Cage.box((0, 0, 0), (1.0, 1.0, 1.0)), name="spin").rotate((0.0, 0.0, np.pi / 2))
+    scene = dataclasses.replace(lumps_scene(), edits=EditStack([close]))
+    pose = tuple(scene.cameras["test"][0].c2w.ravel())
+    keys = (Keyframe(pose, 45.0, 1.0, {1: 0.0}), Keyframe(pose, 45.0, 1.0))
+    with pytest.raises(EditError, match=r'shows an edit at \d+% of its way: edit "spin": .*outer'):
+        ScenePage.of(scene, "lumps", keys)
+
+
+def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = dataclasses.replace(lumps_scene(), field=lumps(1, False, (84, 40, 36)))
+    scene.save(tmp_path / "lumps")
+    out = tmp_path / "site" / "deep" / "lumps"
+    said = printed(capsys, "export", tmp_path / "lumps", "-o", out, "--embed")
+    assert '<iframe src="lumps/index.html"' in said
+    assert {each.name for each in out.iterdir()} == {INDEX, SCRIPT, NAMES["field"], NAMES["edits"]}
+    (out / "notes.txt").write_text("mine")
+    assert "exists already" in refused(capsys, "export", tmp_path / "lumps", "-o", out, "--embed")
+    printed(capsys, "export", tmp_path / "lumps", "-o", out, "--embed", "--overwrite")
+    assert (out / "notes.txt").read_text() == "mine"
+    outer = out.parent / "outer.html"
+    outer.write_text(
+        '<!doctype html><link rel="icon" href="data:,"><body style="margin: 0">'
+        f'<iframe src="lumps/{INDEX}" width="{SIZE}" height="{SIZE}" style="border: 0"></iframe>'
+    )
+    printed(capsys, "export", tmp_path / "lumps", "-o", out.parent / "one.html")
+    text = (out.parent / "one.html").read_bytes()
+    cuts = {
+        NAMES["field"]: bytes_until((out / NAMES["field"]).read_bytes(), "1."),
+        # In one file the coarse level comes before the edits.
+        "one.html": text.index(b'take("edits"'),
+    }
+    whole = rendered(scene, scene.cameras["test"][0])
+    for address in ("outer.html", "one.html"):
+        go_on = threading.Event()
+        with (
+            web_server(tmp_path / "site", cuts, go_on) as link,
+            shown(f"{link}/deep/{address}") as page,
+        ):
+            until(page, "document.querySelector('canvas, iframe') !== null")
+            frame = page.main_frame if address == "one.html" else page.frames[1]
+            settle(frame, "level?.last === false")
+            coarse = pixels(page)
+            assert 16.0 < psnr(coarse, rendered(scene, scene.cameras["test"][0], edits=False)) < 36.0
+            go_on.set()
+            settle(frame)
+            assert psnr(pixels(page), whole) >= 40.0
+
+
+@contextmanager
+def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> Iterator[str]:
+    """A server of a folder; of files named in `cuts` only so many bytes come before `go_on` is set."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def do_GET(self) -> None:
+            path = root / self.path.split("?")[0].lstrip("/")
+            data, cut = path.read_bytes(), cuts.get(path.name, 0)
+            self.send_response(200)
+            self.send_header("Content-Type", self.guess_type(str(path)))
+            self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data[:cut])
+            self.wfile.flush()
+            if cut:
+                go_on.wait(120.0)
+            self.wfile.write(data[cut:])
+
+        def log_message(self, *words: object) -> None:
+            """Says nothing."""
+
+    server = http.server.ThreadingHTTPServer(("localhost", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://localhost:{server.server_address[1]}"
+    finally:
+        go_on.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def test_a_folder_on_a_disk_says_how_it_is_opened(tmp_path: Path) -> None:
+    write_folder(tmp_path / "lumps", ScenePage.of(lumps_scene(), "lumps").folder())
+    with shown((tmp_path / "lumps" / INDEX).as_uri()) as page:
+        until(page, "document.querySelector('.message').textContent.includes('open it by a web server')")
 
 
 def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -191,16 +345,18 @@ def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "1 edit, a camera path of 2 keys" in printed(capsys, "export", folder, "-o", out)
     text = out.read_text(encoding="utf-8")
     assert text.startswith("<!doctype html>") and '"loop": true' in text
-    assert "src=" not in text.split("<script>")[0] and "href=" not in text.split("<script>")[0]
+    assert "src=" not in text.split("<script>")[0] and 'href="data:,"' in text.split("<script>")[0]
     for words, said in (
         (("-o", out), "exists already"),
-        (("-o", tmp_path / "x.html", "--as", "mesh"), "are not written as .html"),
+        (("-o", tmp_path / "x.html", "--as", "mesh"), "are not written as a page"),
         (("-o", tmp_path / "x.ply", "--as", "page"), "a page is written as .html"),
         (("-o", tmp_path / "x.html", "--selection", "x"), "leave out --selection"),
+        (("-o", tmp_path / "x.html", "--embed"), "--embed writes a folder"),
+        (("-o", folder, "--embed", "--overwrite"), "holds no viewer.js and is left as it is"),
     ):
         assert said in refused(capsys, "export", folder, *words)
 
 
 def test_splats_are_refused() -> None:
     with pytest.raises(CagefieldError, match="the scene holds splats; a page shows voxels"):
-        scene_page(splat_scene(), "splats")
+        ScenePage.of(splat_scene(), "splats")

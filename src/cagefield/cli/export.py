@@ -16,6 +16,7 @@ from cagefield.cli.options import (
     SpzVersion,
     Up,
     check_file,
+    check_folder,
     progress_bar,
     stages,
 )
@@ -40,9 +41,12 @@ class Export:
     """Scene folder."""
     out: Output
     """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply; a page
-    of a scene of voxels, one file that any browser opens without a server: .html."""
+    of a scene of voxels, one file that any browser opens without a server: .html; with --embed a folder."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
     """What to write; a file that ends in .html is a page."""
+    embed: Flag = False
+    """A page as a folder for a web site, to be shown in an <iframe>: its field is a file of its own, which
+    shows coarsely while it loads."""
     selection: str | None = None
     """Only what a cage holds: an edit's name (its inner cage, where the edit has taken it), an edit file, or
     a cage such as '{center: [0, 0, 1], size: 2}'."""
@@ -69,7 +73,7 @@ class Export:
 
     def run(self) -> None:
         """Bakes or fits, writes; prints what is in the file."""
-        if self.out.suffix.lower() == ".html":
+        if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
         self._check()
         from cagefield import devices
@@ -86,26 +90,49 @@ class Export:
         """Writes a page; prints what is in it."""
         from cagefield import devices
         from cagefield.atomic_files import replaced_file
-        from cagefield.exporting.page import scene_page
+        from cagefield.exporting.page import INDEX, SCRIPT, ScenePage, write_folder
         from cagefield.keyframe_files import load_keys
         from cagefield.scene import Scene
 
-        check_file(self.out, self.overwrite)
         if self.what not in ("splats", "page"):
-            raise CagefieldError(f"{self.out}: {self.what} are not written as .html; give another name")
+            raise CagefieldError(f"{self.out}: {self.what} are not written as a page; give another name")
         if self.selection is not None or self.axes is not None:
             raise CagefieldError("a page shows the whole scene; leave out --selection and --axes")
+        if self.embed and self.out.suffix.lower() == ".html":
+            raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
+        if self.embed:
+            check_folder(self.out, self.overwrite, SCRIPT)
+        else:
+            check_file(self.out, self.overwrite)
         scene = Scene.open(self.scene)
         devices.start(self.device)
         path = self.scene / "camera_path.json"
         keys, loop = load_keys(path) if path.is_file() else ((), False)
-        text = scene_page(scene, self.scene.resolve().name, keys, loop=loop)
-        with replaced_file(self.out, parents=False) as draft:
-            draft.write_text(text, encoding="utf-8")
+        page = ScenePage.of(scene, self.scene.resolve().name, keys, loop=loop)
+        if self.embed:
+            written = page.folder()
+            write_folder(self.out, written)
+            size = sum(map(len, written.values()))
+        else:
+            text = page.one_file()
+            size = len(text)
+            with replaced_file(self.out, parents=False) as draft:
+                draft.write_text(text, encoding="utf-8")
         edits = len(scene.edits.active)
         shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
         way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
-        print(f"a page of {len(text) / 1e6:.1f} MB: {shown}{way}\nwritten to {self.out}")
+        print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
+        if page.along is not None:
+            mean, most = (error / scene.field.sample_spacing for error in page.along.error)
+            print(
+                f"edits along the path: {page.along.states} states, lattices of {page.along.nodes}^3 nodes, "
+                f"{len(page.along.data) / 1e6:.1f} MB; between two states they are {mean:.2g} voxels beside "
+                f"the edits of that moment in the mean, {most:.2g} at 99% of the points"
+            )
+        print(f"written to {self.out}")
+        if self.embed:
+            name = self.out.resolve().name
+            print(f'<iframe src="{name}/{INDEX}" width="800" height="600" style="border: 0"></iframe>')
 
     def _check(self) -> None:
         """Refuses what cannot be written before anything is computed."""

@@ -1,23 +1,31 @@
-"""A scene of voxels as one HTML file: the field, its edits, a viewer; it needs no server and no network."""
+"""A scene of voxels as a page, one file or a folder: the field, its edits along a camera path, a viewer."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
 import html
 import json
 import math
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera, turntable
+from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.exporting import FOV_X, scene_up
+from cagefield.exporting.path_states import PathEdits, path_edits
 from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_edits import encode_page_edits, for_pages
 from cagefield.formats.page_field import encode_page_field
+from cagefield.formats.page_file import bytes_until
 from cagefield.keyframes import Keyframe, stills
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
@@ -27,46 +35,128 @@ _HERE = files("cagefield.exporting")
 STILLS_A_SECOND = 12.0
 """Of the camera path; between two of them the page goes straight."""
 
+PART = 3 << 16
+"""Bytes of a file in a script of a page: the browser reads on between two."""
 
-def scene_page(
-    scene: Scene, title: str, keys: tuple[Keyframe, ...] = (), *, loop: bool = False, step: float = 0.5
-) -> str:
-    """The text of an HTML file that shows an edited scene of voxels, with the camera path of `keys`.
+INDEX, SCRIPT = "index.html", "viewer.js"
+NAMES = {"field": "scene.field", "edits": "scene.edits", "path": "scene.path"}
 
-    Parts of edits that keys name are not shown: edits have gone all the way. `step` is the distance between
-    samples in voxels.
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+ONE_FILE = _POLICY + "script-src 'unsafe-inline'"
+FOLDER = _POLICY + "script-src 'self'; connect-src 'self'"
 
-    Raises:
-        CagefieldError: the scene holds splats.
-        EditError: edits that cannot be evaluated, or more than a page takes.
+
+@dataclass(frozen=True)
+class ScenePage:
+    """What a page shows: title, header (cameras, background), and files by the names in NAMES.
+
+    `along` says how edits move along the path, None where they do not.
     """
-    field = scene.field
-    if not isinstance(field, VoxelField):
-        raise CagefieldError(
-            "the scene holds splats; a page shows voxels: write the splats as .ply, .spz or .sog instead"
-        )
-    renderer = Renderer(field, for_pages(scene.edits), preserve_opacity=scene.preserve_opacity)
-    header = {
-        "start": _view(_start(scene)),
-        "up": scene_up(scene).tolist(),
-        "centre": field.center.tolist(),
-        "background": None if scene.background is None else list(scene.background),
-        "path": _path(keys, loop),
-    }
-    parts = {
-        "TITLE": html.escape(title),
-        # Of a script's text only "</" has a meaning to the page.
-        "SCENE": json.dumps(header, allow_nan=False).replace("<", "\\u003c"),
-        "FIELD": _embedded("field", encode_page_field(field, step=step, background=scene.background)),
-        "EDITS": _embedded("edits", encode_page_edits(renderer)) if scene.edits.active else "",
-        "VIEWER": (_HERE / "viewer" / "viewer.js").read_text(encoding="utf-8"),
-    }
-    page = (_HERE / "page.html").read_text(encoding="utf-8")
-    return re.sub("@([A-Z]+)@", lambda found: parts[found[1]], page)
+
+    title: str
+    header: Mapping[str, Any]
+    files: Mapping[str, bytes]
+    along: PathEdits | None
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        title: str,
+        keys: tuple[Keyframe, ...] = (),
+        *,
+        loop: bool = False,
+        step: float = 0.5,
+    ) -> ScenePage:
+        """The page of an edited scene of voxels, with the camera path of `keys`.
+
+        `step` is the distance between samples in voxels.
+
+        Raises:
+            CagefieldError: the scene holds splats.
+            EditError: edits that cannot be evaluated, or more than a page takes.
+        """
+        field = scene.field
+        if not isinstance(field, VoxelField):
+            raise CagefieldError(
+                "the scene holds splats; a page shows voxels: write the splats as .ply, .spz or .sog instead"
+            )
+        plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
+        found = {"field": encode_page_field(field, step=step, background=scene.background)}
+        if scene.edits.active:
+            found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.edits)))
+        along = path_edits(plain, scene.edits, keys, loop)
+        if along is not None:
+            found["path"] = along.data
+        header = {
+            "start": _view(_start(scene)),
+            "up": scene_up(scene).tolist(),
+            "centre": field.center.tolist(),
+            "background": None if scene.background is None else list(scene.background),
+            "path": _path(keys, loop),
+        }
+        return cls(title, header, found, along)
+
+    def one_file(self) -> str:
+        """The text of an HTML file that needs neither server nor network.
+
+        The viewer comes first and the coarse level next, so that a browser shows it while the rest is on its
+        way.
+        """
+        field, coarse = self.files["field"], bytes_until(self.files["field"], "1.")
+        order = [("field", field[:coarse]), *((n, self.files[n]) for n in ("edits",) if n in self.files)]
+        order += [("field", field[coarse:]), *((n, self.files[n]) for n in ("path",) if n in self.files)]
+        scripts = [f"<script>{_viewer().decode()}</script>"]
+        for name, data in order:
+            scripts += [_script(name, data[at : at + PART]) for at in range(0, len(data), PART)]
+        scripts += [_script(name, None) for name in self.files]
+        entries = {name: {"bytes": len(data)} for name, data in self.files.items()}
+        return self._html(ONE_FILE, entries, "\n".join(scripts))
+
+    def folder(self) -> dict[str, bytes]:
+        """The files, by name, of a folder for a web site; addresses are relative, and new for new bytes."""
+        entries, written = {}, {SCRIPT: _viewer()}
+        for name, data in self.files.items():
+            written[NAMES[name]] = data
+            entries[name] = {"bytes": len(data), "url": _address(NAMES[name], data)}
+        script = f'<script src="{_address(SCRIPT, written[SCRIPT])}"></script>'
+        written[INDEX] = self._html(FOLDER, entries, script).encode()
+        return written
+
+    def _html(self, policy: str, entries: Mapping[str, Any], scripts: str) -> str:
+        parts = {
+            "POLICY": policy,
+            "TITLE": html.escape(self.title),
+            # Of a script's text only "</" has a meaning to the page.
+            "SCENE": json.dumps({**self.header, "files": entries}, allow_nan=False).replace("<", "\\u003c"),
+            "SCRIPTS": scripts,
+        }
+        page = (_HERE / "page.html").read_text(encoding="utf-8")
+        return re.sub("@([A-Z]+)@", lambda found: parts[found[1]], page)
 
 
-def _embedded(name: str, data: bytes) -> str:
-    return f'<script type="text/plain" id="{name}">{base64.b64encode(data).decode()}</script>'
+def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
+    """Writes the files of `ScenePage.folder` into a folder, which appears whole, or not at all.
+
+    What else an older folder holds stays there.
+    """
+    with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
+        for name, data in written.items():
+            (draft / name).write_bytes(data)
+
+
+def _viewer() -> bytes:
+    return (_HERE / "viewer" / SCRIPT).read_bytes()
+
+
+def _address(name: str, data: bytes) -> str:
+    """The name with a query that a browser's cache knows these bytes by."""
+    return f"{name}?{hashlib.sha256(data).hexdigest()[:12]}"
+
+
+def _script(name: str, data: bytes | None) -> str:
+    text = "null" if data is None else f'"{base64.b64encode(data).decode()}"'
+    return f'<script>cagefieldViewer.take("{name}",{text})</script>'
 
 
 def _start(scene: Scene) -> Camera:

@@ -14,6 +14,9 @@ an axis.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,8 +51,26 @@ def encode_page_edits(renderer: Renderer) -> bytes:
 
     Raises EditError for a shell without a lattice, and for more edits than the page's shader holds.
     """
-    stack = DeviceStack.from_stack(renderer.edits)
     edits = renderer.edits.active
+    stack = DeviceStack.from_stack(renderer.edits)
+    occupancy = renderer.occupancy
+    header = {
+        "edits": len(edits),
+        "boxes": len(stack.boxes) if edits else 0,
+        "preserve_opacity": renderer.preserve_opacity,
+        "origin": occupancy.origin.tolist(),
+        "dims": list(occupancy.codes.shape),
+    }
+    arrays: dict[str, NDArray[Any]] = {
+        "rows": page_rows(edits, stack),
+        "lattice": byte_planes(stack.lattice.reshape(-1).astype(np.float16)),
+        "occupancy": occupancy.codes.astype(np.uint16),
+    }
+    return pack(MAGIC, VERSION, header, arrays)
+
+
+def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
+    """The rows [ROWS E + 2 B, 4] of a stack's active edits, packed in `stack`. Raises EditError as above."""
     boxes = stack.boxes if edits else np.zeros((0, 2, 3), np.float32)
     if ROWS * len(edits) + 2 * len(boxes) > MOST_ROWS:
         raise EditError(
@@ -58,20 +79,7 @@ def encode_page_edits(renderer: Renderer) -> bytes:
     rows = [_rows(edit, row) for edit, row in zip(edits, stack.params, strict=False)]
     ends = np.zeros((2 * len(boxes), 4), np.float32)
     ends[:, :3] = boxes.reshape(-1, 3)
-    occupancy = renderer.occupancy
-    header = {
-        "edits": len(edits),
-        "boxes": len(boxes),
-        "preserve_opacity": renderer.preserve_opacity,
-        "origin": occupancy.origin.tolist(),
-        "dims": list(occupancy.codes.shape),
-    }
-    arrays = {
-        "rows": np.concatenate([*rows, ends]) if rows else ends,
-        "lattice": byte_planes(stack.lattice.reshape(-1).astype(np.float16)),
-        "occupancy": occupancy.codes.astype(np.uint16),
-    }
-    return pack(MAGIC, VERSION, header, arrays)
+    return np.concatenate([*rows, ends])
 
 
 def _rows(edit: Edit, row: NDArray[np.float32]) -> Float32:

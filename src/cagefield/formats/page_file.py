@@ -80,3 +80,14 @@ def byte_planes(halves: NDArray[np.float16]) -> NDArray[np.uint8]:
 def from_byte_planes(planes: NDArray[np.uint8]) -> NDArray[np.float16]:
     """The numbers [N] of `byte_planes`."""
     return np.asarray(np.ascontiguousarray(planes.T).view("<f2").reshape(-1))
+
+
+def bytes_until(data: bytes, names: str) -> int:
+    """How many bytes of a file come before the first array whose name begins so; all where none does."""
+    _, length = struct.unpack("<II", data[8:16])
+    at = 16 + length
+    for entry in json.loads(data[16:at])["arrays"]:
+        if entry["name"].startswith(names):
+            break
+        at += entry["bytes"]
+    return at

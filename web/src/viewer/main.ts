@@ -1,12 +1,15 @@
 /** The script of exported scenes: their viewer, and what tests and other pages need of it under one name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
+import { take } from "./sources";
 import { SceneViewer } from "./viewer";
 import type { SceneHeader } from "./viewer";
 
 interface ViewerApi {
   FieldRenderer: typeof FieldRenderer;
   readEdits: typeof readEdits;
+  /** Takes parts of files that are in the page itself. */
+  take: typeof take;
   /** The scene that the page shows. */
   viewer?: SceneViewer;
 }
@@ -17,7 +20,7 @@ declare global {
   }
 }
 
-window.cagefieldViewer = { FieldRenderer, readEdits };
+window.cagefieldViewer = { FieldRenderer, readEdits, take };
 
 function element(selector: string): HTMLElement {
   const found = document.querySelector<HTMLElement>(selector);
@@ -25,43 +28,35 @@ function element(selector: string): HTMLElement {
   return found;
 }
 
-/** The bytes in a script of base64; the text is let go of. */
-function embedded(name: string): ArrayBuffer | null {
-  const script = document.getElementById(name);
-  if (!script) return null;
-  const text = atob(script.textContent.trim());
-  script.remove();
-  const bytes = new Uint8Array(text.length);
-  for (let n = 0; n < text.length; n++) bytes[n] = text.charCodeAt(n);
-  return bytes.buffer;
-}
-
 async function start(header: SceneHeader): Promise<void> {
   const message = element(".message");
+  const bar = element(".arrived") as HTMLProgressElement;
   const say = (text: string): void => void (message.textContent = text);
   try {
-    const viewer = new SceneViewer(element("canvas") as HTMLCanvasElement, header, say);
+    const viewer = new SceneViewer(element("canvas") as HTMLCanvasElement, header, say, (share) => {
+      bar.value = share;
+      bar.hidden = share >= 1;
+    });
     window.cagefieldViewer.viewer = viewer;
     const [compare, play, home] = [element(".compare"), element(".play"), element(".home")];
-    const field = embedded("field");
-    const edits = embedded("edits");
-    compare.hidden = edits === null;
-    play.hidden = header.path === null;
-    compare.onclick = () => {
-      viewer.edited = !viewer.edited;
-      compare.textContent = viewer.edited ? "Show before" : "Show after";
-    };
+    compare.hidden = !header.files.edits;
+    compare.onclick = () => (viewer.edited = !viewer.edited);
     play.onclick = () => viewer.play(!viewer.plays);
     home.onclick = () => viewer.home();
-    setInterval(() => void (play.textContent = viewer.plays ? "Stop" : "Play"), 200);
-    window.addEventListener("keydown", ({ key }) => {
+    setInterval(() => {
+      play.hidden = !viewer.canPlay;
+      play.textContent = viewer.plays ? "Stop" : "Play";
+      compare.textContent = viewer.edited ? "Show before" : "Show after";
+    }, 100);
+    window.addEventListener("keydown", ({ key, target }) => {
       if (key === "b") compare.click();
-      if (key === " ") play.click();
+      // A button that has the focus takes the space itself.
+      if (key === " " && !(target instanceof HTMLButtonElement)) play.click();
       if (key === "h") home.click();
     });
-    if (field === null) throw new Error("the file holds no field; export the scene again");
-    await viewer.run(field, edits);
+    await viewer.run();
   } catch (error) {
+    bar.hidden = true;
     say(error instanceof Error ? error.message : String(error));
   }
 }

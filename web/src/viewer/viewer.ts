@@ -1,11 +1,15 @@
-/** An exported scene: its field and edits, with orbit, before/after and the camera path; no server, no network. */
+/** An exported scene: its field and edits, with orbit, before/after and the camera path; no server of its own. */
 import { FieldRenderer } from "../field/field_renderer";
 import { finished, Pacing } from "../field/pacing";
 import { readEdits } from "../field/page_edits";
+import type { PageEdits } from "../field/page_edits";
 import { listen } from "./fingers";
 import { Orbit } from "./orbit";
 import { viewAt } from "./path";
 import type { Path, View } from "./path";
+import { PathEdits } from "./path_edits";
+import { open, whole } from "./sources";
+import type { FileEntry } from "./sources";
 import type { Vec3 } from "./vectors";
 
 /** What an exported file says of its scene. */
@@ -15,6 +19,8 @@ export interface SceneHeader {
   centre: Vec3;
   background: Vec3 | null;
   path: Path | null;
+  /** `edits`: those of the scene. `path`: how far they have gone along the camera path. */
+  files: { field: FileEntry; edits?: FileEntry; path?: FileEntry };
 }
 
 /** Milliseconds after the last motion until the picture is drawn whole. */
@@ -31,11 +37,17 @@ export class SceneViewer {
   /** The next row of the whole picture; null where it is shown. */
   private row: number | null = 0;
   private playing: number | null = null;
+  /** The scene's edits; undefined while they are on their way. */
+  private edits: PageEdits | null | undefined;
+  /** The edits along the path, and whether it can be played. */
+  private along: PathEdits | null = null;
+  canPlay = false;
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly header: SceneHeader,
     private readonly say: (text: string) => void,
+    private readonly arrived: (share: number) => void = () => undefined,
   ) {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
     if (!gl) throw new Error("This browser has no WebGL2, which the scene is drawn with.");
@@ -54,16 +66,32 @@ export class SceneViewer {
     new ResizeObserver(() => this.touch()).observe(canvas);
   }
 
-  /** Loads the scene, and draws it from then on. */
-  async run(field: ArrayBuffer, edits: ArrayBuffer | null): Promise<void> {
-    if (edits) this.renderer.setEdits(await readEdits(edits));
+  /** Loads the scene, coarse level first, and draws it from then on. */
+  async run(): Promise<void> {
+    const { files } = this.header;
     void this.draw();
+    const field = await open("field", files.field);
+    let edits: Promise<void> | undefined;
     await this.renderer.load(field, {
+      onArrival: (bytes) => this.arrived(Math.min(0.99, bytes / files.field.bytes)),
       onLevel: (number, of) => {
         this.say(number < of ? "Loading detail …" : "");
+        edits ??= this.loadEdits();
         this.touch();
       },
     });
+    await edits;
+    if (files.path) this.along = await PathEdits.read(await open("path", files.path));
+    this.canPlay = this.header.path !== null;
+    this.arrived(1);
+  }
+
+  /** Loads the scene's edits, once there is something to see. */
+  private async loadEdits(): Promise<void> {
+    const { files } = this.header;
+    this.edits = files.edits ? await readEdits(await whole(await open("edits", files.edits))) : null;
+    this.renderer.setEdits(this.edits);
+    this.touch();
   }
 
   /** Whether the whole picture of what is to be seen is shown. */
@@ -84,16 +112,24 @@ export class SceneViewer {
     return this.playing !== null;
   }
 
-  /** Plays the camera path from its begin, or stops. */
+  /** Plays the camera path from its begin, or stops where it is. */
   play(on: boolean): void {
-    this.playing = on && this.header.path ? performance.now() : null;
+    this.playing = on && this.canPlay ? performance.now() : null;
     this.touch();
   }
 
-  /** Goes back to where the scene opens. */
+  /** Goes back to where the scene opens, with its edits whole. */
   home(): void {
-    this.look(this.header.start);
     this.playing = null;
+    if (this.edits !== undefined) this.renderer.setEdits(this.edits);
+    this.look(this.header.start);
+  }
+
+  /** Shows a moment of the camera path. */
+  seek(path: Path, seconds: number): void {
+    const time = path.loop ? seconds % path.seconds : Math.min(seconds, path.seconds);
+    if (this.along) this.renderer.setEdits(this.along.at(time));
+    this.look(viewAt(path, time));
   }
 
   private get tangent(): number {
@@ -134,10 +170,11 @@ export class SceneViewer {
     const { path } = this.header;
     if (this.playing !== null && path) {
       const time = (performance.now() - this.playing) / 1000;
-      this.look(viewAt(path, time));
+      this.seek(path, time);
       if (!path.loop && time >= path.seconds) this.playing = null;
     }
-    if (this.row === null) return;
+    // The full level is not shown before its edits are there.
+    if (this.row === null || (renderer.level?.last && this.edits === undefined)) return;
     const dense = Math.min(devicePixelRatio, MOST_PIXELS_PER_POINT);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) => Math.max(1, Math.round(n * dense)));
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from cagefield.edits import Edit
+from cagefield.edits.partial import partial_edit
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.validity import problem
@@ -25,10 +26,13 @@ def blended(
     for entry in document.entries:
         part = parts.get(entry.id, 1.0)
         edit = entry.edit
-        if not edit.enabled or known_problem(edit) is not None or (edit.deleted and part < 0.5):
+        if not edit.enabled or known_problem(edit) is not None:
             continue
-        if part < 1.0:
-            edit = edit.replace(operations=tuple(operation.part(part) for operation in edit.operations))
+        there = partial_edit(edit, part)
+        if there is None:
+            continue
+        if there is not edit:
+            edit = there
             why = problem(edit)
             if why is not None:
                 raise CagefieldError(f'edit "{edit.name}" is not possible at {part:.0%}: {why}')

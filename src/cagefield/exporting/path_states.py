@@ -1,0 +1,158 @@
+"""The edits of a scene on their way along its camera path, as a page shows them, and how exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.partial import partial_edit
+from cagefield.errors import EditError
+from cagefield.formats.page_edits import LATTICE, for_pages
+from cagefield.formats.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
+from cagefield.keyframes import Keyframe, Timeline
+from cagefield.rendering.occupancy import Occupancy
+from cagefield.rendering.renderer import Renderer
+
+STATES_A_SECOND = 12.0
+"""Where edits move; the page goes straight between two. A quarter turn in two seconds is 4 degrees a state:
+chords are .0006 of the radius beside the circle."""
+
+MOST_STATES = 120
+"""Longer motions have fewer states a second."""
+
+BUDGET = 8 << 20
+"""Bytes of nodes that move, before they are compressed to about a third."""
+
+SIZES = (LATTICE, 48, 32, 24, 16)
+"""Nodes an axis of the lattices of edits that move: the most that fit into the budget."""
+
+LEAST = 1e-3
+"""The part that stands for 0: what has not begun has all its numbers too, and is where it was, nearly."""
+
+PROBES = 4000
+"""Points at which what the page shows is compared with the exact edits, half-way between two states."""
+
+
+@dataclass(frozen=True)
+class PathEdits:
+    """What a page holds of edits along a path: the file, how many states, the nodes an axis of lattices.
+
+    `error` is the distance (mean, 99th percentile) of points half-way between states from where the stack of
+    that moment, with the lattices of `for_pages`, takes them, in world units.
+    """
+
+    data: bytes
+    states: int
+    nodes: int
+    error: tuple[float, float]
+
+
+def path_edits(
+    renderer: Renderer, edits: EditStack, keys: Sequence[Keyframe], loop: bool
+) -> PathEdits | None:
+    """The states of `edits` along the path of `keys`; None where all of them have gone all the way all along.
+
+    `renderer` draws the field. Raises EditError for an edit that is not possible at a part that is shown.
+    """
+    if len(keys) < 2:
+        return None
+    edits = for_pages(edits)
+    line = Timeline(keys, loop=loop)
+    times = _times(line, edits)
+    if times is None:
+        return None
+    knots = [_parts(line, edits, t) for t in times]
+    unique = list(dict.fromkeys(knots))
+    moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
+    shells = [n for n in moving if edits[n].adjustment == "continuous"]
+    lattices = sum(len({parts[n] for parts in unique}) for n in shells)
+    nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
+    stacks = {parts: _stack(edits, parts, moving, nodes) for parts in unique}
+    states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
+    found: list[Occupancy] = []
+    errors: list[NDArray[np.float64]] = []
+    for stack in stacks.values():
+        renderer = renderer.with_edits(stack)
+        found.append(renderer.occupancy)
+    for k in range(len(knots) - 1):
+        if knots[k] == knots[k + 1]:
+            continue
+        middle = _stack(edits, _parts(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes)
+        renderer = renderer.with_edits(middle)
+        found.append(renderer.occupancy)
+        one, other = states[knots[k]], states[knots[k + 1]]
+        if mixable(one, other):
+            errors.append(_distances(PathState.of(middle), one, other))
+    data = encode_page_path(
+        times,
+        [unique.index(parts) for parts in knots],
+        list(states.values()),
+        joined_occupancy(found),
+        preserve_opacity=renderer.preserve_opacity,
+    )
+    off = np.concatenate(errors) if errors else np.zeros(1)
+    return PathEdits(data, len(unique), nodes, (float(off.mean()), float(np.percentile(off, 99))))
+
+
+Parts = tuple[float, ...]
+
+
+def _times(line: Timeline, edits: EditStack) -> list[float] | None:
+    """Seconds at which states are taken: where edits move, and where they begin and end to."""
+    count = max(2, round(line.seconds * STATES_A_SECOND) + 1)
+    while True:
+        at = np.linspace(0.0, line.seconds, count)
+        rows = [_parts(line, edits, t) for t in at]
+        if all(part == 1.0 for row in rows for part in row):
+            return None
+        last = count - 1
+        kept = [n for n in range(count) if n in (0, last) or not rows[n - 1] == rows[n] == rows[n + 1]]
+        if len(kept) <= MOST_STATES or count <= 2:
+            return [float(at[n]) for n in kept]
+        count = max(2, int(count * MOST_STATES / len(kept)))
+
+
+def _parts(line: Timeline, edits: EditStack, seconds: float) -> Parts:
+    """How far each edit has gone, 1 for those that the path does not name."""
+    named = line.parts(np.array([seconds]))
+    shown = [number for number, edit in enumerate(edits, 1) if edit.enabled and edit.changes_anything]
+    return tuple(
+        round(float(named[number][0]), 5) if number in named and number in shown else 1.0
+        for number in range(1, len(edits) + 1)
+    )
+
+
+def _stack(edits: EditStack, parts: Parts, moving: Sequence[int], nodes: int) -> EditStack:
+    """The stack at these parts; the lattices of edits that move have at most `nodes` an axis."""
+    found: list[Edit] = []
+    for number, (edit, part) in enumerate(zip(edits, parts, strict=True)):
+        try:
+            there = partial_edit(edit, max(part, LEAST))
+            if there is not None and there.enabled and not there.is_possible:
+                there.check()
+        except EditError as error:
+            raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
+        if there is None:
+            continue
+        if number in moving and there.lattice is not None:
+            there = there.replace(lattice=min(nodes, there.lattice))
+        found.append(there)
+    return EditStack(found)
+
+
+def _distances(exact: PathState, one: PathState, other: PathState) -> NDArray[np.float64]:
+    """How far the page's map half-way between two states is from the map of that moment, [PROBES]."""
+    rng = np.random.default_rng(0)
+    boxes = exact.packed.boxes
+    box = rng.integers(len(boxes), size=PROBES)
+    points = rng.uniform(boxes[box, 0], boxes[box, 1]).astype(np.float32)
+    ahead = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (PROBES, 1))
+    ours = mixed(one, other, 0.5).to_canonical(points, ahead)
+    theirs = exact.packed.to_canonical(points, ahead)
+    # A point on the other side of a cut, at the surface of a cage that moves alone, is no error of the map.
+    same = ours[3] == theirs[3]
+    return np.asarray(np.linalg.norm(ours[0] - theirs[0], axis=1)[same], np.float64)

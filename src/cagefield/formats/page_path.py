@@ -1,0 +1,166 @@
+"""The edits of a page along its camera path: states of the stack, and straight ways from one to the next.
+
+    times      [S] float32, seconds from the path's begin, rising
+    states     [S] uint16, the state at each of these times; a state that comes again is stored once
+    occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
+    lattice    [2, 3 N] uint8, halves as in `page_edits`: of all edits in state 0
+    rows.n     as `page_edits` has them, of state n
+    nodes.k    [2, 3 M] uint8, the lattice of an edit that moves. Entry n of the header's `nodes` says which
+               of them state n has in the ranges (first node, nodes) of `moving`
+
+Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same
+kinds of edits (`mixed`): inner cages and shells then follow chords of their ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import EditStack
+from cagefield.edits.edit import Edit
+from cagefield.formats.page_edits import page_rows
+from cagefield.formats.page_file import byte_planes, pack
+from cagefield.rendering.occupancy import BRICK, Occupancy, encode, masks_of
+from cagefield.warps.device_stack import DeviceStack
+from cagefield.warps.packing import (
+    AFFINE,
+    BOX,
+    CONTINUOUS,
+    FIRST,
+    LAST,
+    LOW,
+    OFFSET,
+    RECORD,
+    RECORDS,
+    RESOLUTION,
+    SIMPLE,
+)
+
+MAGIC, VERSION = b"cagepath", 1
+
+
+@dataclass(frozen=True)
+class PathState:
+    """A stack on the way: its active edits and, packed, their numbers and nodes."""
+
+    edits: tuple[Edit, ...]
+    packed: DeviceStack
+
+    @classmethod
+    def of(cls, edits: EditStack) -> PathState:
+        """Raises EditError for a stack that cannot be evaluated."""
+        return cls(edits.active, DeviceStack.from_stack(edits))
+
+    @property
+    def nodes(self) -> list[int]:
+        """The nodes of the lattices, one after the other."""
+        sizes = [round(max(row[RESOLUTION], 0.0)) ** 3 for row in self.packed.params[: len(self.edits)]]
+        return [size for size in sizes if size]
+
+
+def encode_page_path(
+    times: Sequence[float],
+    order: Sequence[int],
+    states: Sequence[PathState],
+    occupancy: Occupancy,
+    *,
+    preserve_opacity: bool,
+) -> bytes:
+    """The file of `states`, of which number `order[k]` is shown at `times[k]`.
+
+    All states have lattices of the same sizes in the same order. Raises EditError for more edits than a page
+    takes.
+    """
+    ranges = _moving(states)
+    arrays: dict[str, NDArray[Any]] = {
+        "times": np.asarray(times, np.float32),
+        "states": np.asarray(order, np.uint16),
+        "occupancy": occupancy.codes.astype(np.uint16),
+        "lattice": _halves(states[0].packed.lattice),
+    }
+    for number, state in enumerate(states):
+        arrays[f"rows.{number}"] = page_rows(state.edits, state.packed)
+    known: dict[bytes, int] = {}
+    nodes: list[list[int]] = []
+    for state in states:
+        nodes.append([])
+        for first, count in ranges:
+            lattice = state.packed.lattice[first : first + count]
+            place = known.setdefault(lattice.tobytes(), len(known))
+            arrays.setdefault(f"nodes.{place}", _halves(lattice))
+            nodes[-1].append(place)
+    header = {
+        "edits": [len(state.edits) for state in states],
+        "boxes": [len(state.packed.boxes) if state.edits else 0 for state in states],
+        "moving": ranges,
+        "nodes": nodes,
+        "lattices": len(known),
+        "preserve_opacity": preserve_opacity,
+        "origin": occupancy.origin.tolist(),
+        "dims": list(occupancy.codes.shape),
+    }
+    return pack(MAGIC, VERSION, header, arrays)
+
+
+_KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE]
+_KINDS += [RECORDS + number * RECORD + AFFINE for number in range(2)]
+"""Columns that say of what kind an edit is."""
+
+
+def mixable(one: PathState, other: PathState) -> bool:
+    """Whether the page goes straight from one state to the other: the same kinds of edits in order."""
+    a, b = one.packed, other.packed
+    if len(one.edits) != len(other.edits) or len(a.boxes) != len(b.boxes):
+        return False
+    return bool(np.array_equal(a.params[:, _KINDS], b.params[:, _KINDS]))
+
+
+def mixed(one: PathState, other: PathState, share: float) -> DeviceStack:
+    """The stack that the page evaluates at a share of the way from one state to the other."""
+    a, b = one.packed, other.packed
+    params = (1.0 - share) * a.params + share * b.params
+    # Boxes hold those of both.
+    for low in (BOX, *(RECORDS + number * RECORD + LOW for number in range(2))):
+        first, last = slice(low, low + 3), slice(low + 3, low + 6)
+        params[:, first] = np.minimum(a.params[:, first], b.params[:, first])
+        params[:, last] = np.maximum(a.params[:, last], b.params[:, last])
+    boxes = np.stack(
+        [np.minimum(a.boxes[:, 0], b.boxes[:, 0]), np.maximum(a.boxes[:, 1], b.boxes[:, 1])], axis=1
+    )
+    lattice = (1.0 - share) * a.lattice + share * b.lattice
+    return DeviceStack(
+        params.astype(np.float32), lattice.astype(np.float32), a.n_edits, boxes.astype(np.float32)
+    )
+
+
+def joined_occupancy(found: Sequence[Occupancy]) -> Occupancy:
+    """The occupancy of what any of some, of the same grid, holds."""
+    low = np.min([each.origin for each in found], axis=0)
+    high = np.max([each.origin + BRICK * np.array(each.codes.shape) for each in found], axis=0)
+    blocks = np.zeros((high - low) // BRICK * 2, bool)
+    for each in found:
+        first = (each.origin - low) // BRICK * 2
+        x, y, z = first + 2 * np.array(each.codes.shape)
+        blocks[first[0] : x, first[1] : y, first[2] : z] |= each.blocks
+    return Occupancy(low, encode(masks_of(blocks)))
+
+
+def _moving(states: Sequence[PathState]) -> list[list[int]]:
+    """(first node, nodes) of each lattice that differs between states."""
+    ranges, first = [], 0
+    for count in states[0].nodes:
+        part = slice(first, first + count)
+        lattices = [state.packed.lattice[part] for state in states]
+        if any(not np.array_equal(lattices[0], lattice) for lattice in lattices[1:]):
+            ranges.append([first, count])
+        first += count
+    return ranges
+
+
+def _halves(nodes: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return byte_planes(nodes.reshape(-1).astype(np.float16))
