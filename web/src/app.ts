@@ -16,7 +16,7 @@ import { recallCamera, recallTools } from "./session_storage";
 import { cageOverlay, shownCages } from "./cage_overlay";
 import { Viewport } from "./viewport";
 import { Store, obstacle, selected, showsCages, target } from "./store";
-import { decode, unpack } from "./picture_message";
+import { decode, headed, unpack } from "./picture_message";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, Job, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
 
@@ -64,6 +64,8 @@ export class App {
   private pictureChain: Promise<void> = Promise.resolve();
   /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
   private undrawn: Arrived[] = [];
+  /** Edits that the next frame shows. */
+  private taken: number[] = [];
   private drawn: Arrived[] = [];
   /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
   private orbitFrom: number | null = null;
@@ -84,7 +86,7 @@ export class App {
     this.camera.drawnHere = () => this.page.draws;
     this.viewport.guessed.push(() => this.orbitGuessed());
     this.viewport.beforeFrame.push(() => this.arrange());
-    this.viewport.beforeFrame.push(() => this.acknowledge());
+    this.viewport.beforeFrame.push(() => this.askForMore());
     this.viewport.afterFrame.push((time) => this.framed(time));
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
@@ -94,7 +96,7 @@ export class App {
       opened: () => this.store.set({ connection: "open" }),
       lost: () => this.lost(),
       message: (message) => this.take(message),
-      picture: (bytes) => this.takePicture(bytes),
+      binary: (bytes) => this.takeBinary(bytes),
     });
   }
 
@@ -277,21 +279,44 @@ export class App {
     this.send({ type: "display", view, before, split });
   }
 
+  /** Takes note of a picture of the page's own, which the next frame shows. */
+  drew(header: PictureHeader, received: number, decoded: number): void {
+    this.lastPicture = header;
+    this.lastNews = performance.now();
+    this.orbitSeen(header.camera);
+    this.drawn.push({ header, received, decoded });
+  }
+
+  /** The next frame shows edits: the server may send the next ones. */
+  acknowledge(edits: number[]): void {
+    this.taken.push(...edits);
+  }
+
+  private takeBinary(bytes: ArrayBuffer): void {
+    const { header, start } = headed(bytes);
+    if (header.type === "edits") this.page.take(header, bytes.slice(start));
+    else this.takePicture(bytes, header, start);
+  }
+
   /** Decodes a picture away from the main thread, and shows pictures in the order in which they came. */
-  private takePicture(bytes: ArrayBuffer): void {
+  private takePicture(bytes: ArrayBuffer, header: PictureHeader, start: number): void {
     const received = performance.now();
-    const { header, picture, depth } = unpack(bytes);
+    const { picture, depth } = unpack(bytes, header, start);
     const decoding = decode(header, picture);
     this.pictureChain = this.pictureChain.then(async () => {
       try {
         const image = await decoding;
         const decoded = performance.now();
-        // Of a view that the page draws itself, what the server sends comes too late.
-        if (this.page.draws && !this.camera.resting) {
+        this.page.served(header);
+        // Of what the page draws itself, what the server sends comes too late.
+        if (this.page.outdates(header)) {
           if (image instanceof ImageBitmap) image.close();
-        } else this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
-        this.orbitSeen(header.camera);
-        this.lastPicture = header;
+          this.viewport.invalidate();
+        } else {
+          this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
+          this.orbitSeen(header.camera);
+          this.lastPicture = header;
+        }
         this.lastNews = performance.now();
         this.undrawn.push({ header, received, decoded });
       } catch {
@@ -327,16 +352,19 @@ export class App {
   }
 
   /** Asks for the next picture while the frame with this one is drawn and goes to the screen. */
-  private acknowledge(): void {
+  private askForMore(): void {
     const pictures = this.undrawn.map(({ header }) => header.picture);
-    if (pictures.length > 0) {
+    const numbers = [...pictures, ...this.taken];
+    if (numbers.length > 0) {
+      const waits = this.drag !== null && this.taken.length === 0;
       setTimeout(() => {
         for (const action of this.beforeAsking) action();
-        for (const picture of pictures) this.send({ type: "presented", picture });
-      }, this.drag === null ? 0 : ASKED_AFTER * this.viewport.frameTime);
+        for (const picture of numbers) this.send({ type: "presented", picture });
+      }, waits ? ASKED_AFTER * this.viewport.frameTime : 0);
     }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];
+    this.taken = [];
   }
 
   private presented({ header, received, decoded }: Arrived): void {
@@ -355,7 +383,7 @@ export class App {
       width: full_width,
       height: header.full_height,
       final,
-      page: false,
+      page: header.picture === 0,
     };
     this.store.set({ figures });
   }

@@ -40,6 +40,7 @@ export class CameraFeed {
   restate(): void {
     this.moving = false;
     this.tell();
+    this.viewport.invalidate();
   }
 
   /** Where the picture of a camera message was taken from. */

@@ -12,7 +12,8 @@ export interface Handlers {
   /** The socket is gone; the next attempt is in `wait` milliseconds. */
   lost(wait: number): void;
   message(message: ServerMessage): void;
-  picture(bytes: ArrayBuffer): void;
+  /** A header, and bytes behind it; see `picture_message`. */
+  binary(bytes: ArrayBuffer): void;
 }
 
 export class Connection {
@@ -43,7 +44,7 @@ export class Connection {
     };
     socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
       if (typeof data === "string") this.handlers.message(JSON.parse(data) as ServerMessage);
-      else this.handlers.picture(data);
+      else this.handlers.binary(data);
     };
     socket.onclose = () => {
       this.socket = null;

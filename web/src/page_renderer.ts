@@ -1,16 +1,21 @@
 /**
- * Pictures drawn by the page's own GPU while the view is turned, so that they come at the display's rate.
+ * Pictures drawn by the page's own GPU: what moves at the display's rate, and whole pictures at rest.
  *
- * The field is loaded once, after the server's first whole picture; the edits each time they are others. Whatever
- * the page cannot draw, or draws more slowly than the server, the server draws: drags, normals and depth, splats and
- * NeRFs, pictures at rest. `?render=server` leaves it all to the server, `?render=page` trusts the page's GPU even
- * where it is software.
+ * The field is loaded once, after the server's first whole picture. From then on the page says with `drawing` what
+ * it draws, and is sent the edits each time they are others, those of drags too, in the place of pictures. Whatever
+ * it cannot draw, or draws more slowly than the server, the server draws. Of the page's address
+ * `?render=server` leaves all to the server, `?render=page` trusts the page's GPU with what moves even where
+ * it is software, and `?render=all` with pictures at rest too.
  */
+import { Choice, memoryLimit } from "./field/choice";
 import { FieldRenderer } from "./field/field_renderer";
 import { Pacing } from "./field/pacing";
-import { readEdits } from "./field/page_edits";
+import type { SceneDrawer } from "./field/scene_drawer";
+import { Still } from "./field/still";
+import { PageScene } from "./page_scene";
 import type { App } from "./app";
-import type { Editor } from "./store";
+import type { EditsHeader, PictureHeader } from "./protocol";
+import type { DrawnHere, Editor } from "./store";
 
 /** Milliseconds that one of the page's pictures may take at its smallest; the server's moving pictures take as long. */
 const SLOWEST = 120;
@@ -18,160 +23,264 @@ const SLOWEST = 120;
 /** Pictures in a row that are slower before the server draws for good. */
 const PATIENCE = 5;
 
-const EVERY = 300;
+/** Distances that are read back of a picture, at most. */
+const MOST_DISTANCES = 120_000;
+
+/** What a picture shows: drawn anew where any of it is other than before. */
+type Seen = readonly unknown[];
 
 export class PageRenderer {
-  /** Why the server draws, or null where the page does. */
-  why: string | null = "the field is not loaded yet";
   /** Pictures that the page has drawn. */
   drawn = 0;
-  private readonly wanted: "page" | "server" | "best";
-  private readonly renderer: FieldRenderer;
+  readonly scene: PageScene;
+  readonly drawer: SceneDrawer;
+  readonly choice = new Choice();
+  private readonly wanted: "server" | "page" | "all" | "best";
   private readonly pacing = new Pacing();
-  private loading: Promise<void> | null = null;
-  private isLoaded = false;
-  /** The scene whose field is loaded, or being loaded. */
-  private scene: string | null = null;
-  /** The revision whose edits the renderer has, and the one that was last asked for. */
-  private edits = -1;
-  private asked = -1;
+  private readonly still = new Still();
+  /** Why the server draws for good, or as long as the edits are these. */
+  private closed: string | null = null;
+  private refused: { why: string; pictured: number | undefined } | null = null;
+  /** What the server was told, and of which page. */
+  private told: { here: DrawnHere; page: number | null } = { here: "nothing", page: null };
+  private seen: Seen = [];
   private slow = 0;
-  private times: number[] = [];
-  private figured = -Infinity;
-  private isClosed = false;
+  /** Milliseconds that the last picture, or part of one, took. */
+  private took = 0;
+  /** Edits that were taken and not acknowledged. */
+  private taken: number[] = [];
 
   constructor(private readonly app: App) {
     const given = new URLSearchParams(location.search).get("render");
-    this.wanted = given === "page" || given === "server" ? given : "best";
+    this.wanted = given === "page" || given === "server" || given === "all" ? given : "best";
     const { viewport } = app;
-    this.renderer = new FieldRenderer(viewport.renderer.getContext() as WebGL2RenderingContext);
+    const memory = memoryLimit((navigator as { deviceMemory?: number }).deviceMemory);
+    this.drawer = new FieldRenderer(viewport.renderer.getContext() as WebGL2RenderingContext, memory);
+    this.scene = new PageScene(this.drawer, {
+      changed: () => this.changed(),
+      arrived: (share) => this.app.store.set({ loading: share }),
+      failed: (why) => this.fail(why),
+    });
     if (this.wanted === "server") this.close("the page's address says so");
     else if (this.wanted === "best" && viewport.software) this.close("the page has no GPU");
-    app.store.watch(["figures", "state", "hello"], (now) => this.follow(now));
-    viewport.beforeFrame.push(() => this.draw());
+    app.store.watch(["figures", "state", "hello", "connection"], (now) => this.follow(now));
+    viewport.beforeFrame.push(() => this.frame());
     viewport.canvas.addEventListener("webglcontextrestored", () => void this.restore());
   }
 
-  /** Whether pictures of the moving view are the page's own now. */
+  /** Why the server draws, or null where the page does. */
+  get why(): string | null {
+    return this.closed ?? this.scene.why ?? this.refused?.why ?? null;
+  }
+
+  /** Whether pictures of what moves are the page's own now. */
   get draws(): boolean {
-    const { now } = this.app.store;
-    return (
-      this.why === null &&
-      this.app.drag === null &&
-      now.preview === null &&
-      now.view === "colour" &&
-      now.split === null &&
-      (now.before || this.edits === now.state?.pictured)
-    );
+    return this.told.here !== "nothing" && this.why === null && this.scene.edits !== null;
+  }
+
+  /** Which pictures are the page's own, as the server was told. */
+  get here(): DrawnHere {
+    return this.told.here;
+  }
+
+  /** Whether a picture of the server's shows what is older than what the page shows, or draws itself. */
+  outdates(header: PictureHeader): boolean {
+    const { edits } = this.scene;
+    if (!this.draws || edits === null) return false;
+    return this.told.here === "all" || !this.app.camera.resting || header.revision < edits.header.revision;
+  }
+
+  /** Takes note of how long the server took for a picture. */
+  served({ width, height, full_width, render_ms, encode_ms }: PictureHeader): void {
+    this.choice.served(width * height, render_ms + encode_ms, full_width < this.app.viewport.pixels.width);
+  }
+
+  /** Takes a message's edits. */
+  take(header: EditsHeader, file: ArrayBuffer): void {
+    if (header.why !== null) this.refuse(header.why, header.picture);
+    else this.scene.take(header, file, (why) => (why === null ? this.tookEdits(header) : this.refuse(why, header.picture)));
+  }
+
+  private tookEdits(header: EditsHeader): void {
+    this.app.viewport.renderer.resetState();
+    this.taken.push(header.picture);
+    this.changed();
+  }
+
+  private refuse(why: string, picture: number): void {
+    this.refused = { why, pictured: this.app.store.now.state?.pictured };
+    this.app.send({ type: "presented", picture });
+    this.follow(this.app.store.now);
+  }
+
+  /** The server draws from now on, and a line says why. */
+  private fail(why: string): void {
+    this.close(why);
+    this.app.say(`${why}; the server draws the pictures`, "warning");
   }
 
   private close(why: string): void {
-    this.why = why;
-    this.isClosed = true;
-    this.renderer.dispose();
-    this.app.viewport.renderer.resetState();
+    this.closed = why;
+    this.drawer.dispose();
+    this.changed();
+    this.follow(this.app.store.now);
   }
 
-  /** Loads what is missing, once the server's first whole picture is there. */
+  private changed(): void {
+    const { app } = this;
+    app.viewport.renderer.resetState();
+    this.follow(app.store.now);
+    app.viewport.invalidate();
+  }
+
+  /** Loads what is missing once the server's first whole picture is there, and tells the server who draws. */
   private follow(now: Editor): void {
-    if (this.isClosed || now.state === null || now.hello === null) return;
-    if (this.scene !== now.hello.scene) this.forget(now.hello.scene);
-    if (now.figures.final) this.loading ??= this.load(now.hello.scene);
-    const { pictured } = now.state;
-    if (this.isLoaded && this.app.drag === null && this.asked !== pictured) void this.loadEdits(pictured);
+    if (now.connection !== "open") this.told = { here: "nothing", page: null };
+    if (now.hello === null || now.state === null || now.connection !== "open") return;
+    if (this.closed === null && now.figures.final) this.scene.load(now.hello.field);
+    if (this.refused !== null && this.refused.pictured !== now.state.pictured) this.refused = null;
+    if (this.told.page !== now.hello.page) this.told = { here: "nothing", page: now.hello.page };
+    const { mode } = this;
+    if (mode === this.told.here) return;
+    this.told = { here: mode, page: now.hello.page };
+    if (mode === "nothing") this.app.camera.restate();
+    this.app.send({ type: "drawing", here: mode });
   }
 
-  /** Lets go of a field that is no longer the editor's. */
-  private forget(scene: string): void {
-    this.scene = scene;
-    this.loading = null;
-    this.isLoaded = false;
-    this.edits = this.asked = -1;
-    this.why = "the field is not loaded yet";
-    this.renderer.setEdits(null);
-    this.app.viewport.renderer.resetState();
-  }
-
-  private async load(scene: string): Promise<void> {
-    try {
-      const answer = await fetch(`field${location.search}`);
-      if (scene !== this.scene) return;
-      if (!answer.ok || answer.body === null) {
-        this.why = await answer.text();
-        return;
-      }
-      await this.renderer.load(answer.body);
-      this.app.viewport.renderer.resetState();
-      if (scene !== this.scene) return;
-      this.renderer.background = this.renderer.level?.field.background ?? [0, 0, 0];
-      this.isLoaded = true;
-      this.why = null;
-      this.follow(this.app.store.now);
-    } catch (error) {
-      this.close(error instanceof Error ? error.message : String(error));
-    }
-  }
-
-  private async loadEdits(revision: number): Promise<void> {
-    this.asked = revision;
-    try {
-      const answer = await fetch(`edits${location.search}`);
-      if (!answer.ok) return;
-      const answered = Number(answer.headers.get("X-Revision"));
-      const bytes = await answer.arrayBuffer();
-      const { state } = this.app.store.now;
-      if (this.asked !== revision || state?.pictured !== revision) return;
-      if (answered !== state.revision) {
-        // Of another revision than the page's: the next state asks again.
-        this.asked = -1;
-        return;
-      }
-      this.renderer.setEdits(await readEdits(bytes));
-      this.app.viewport.renderer.resetState();
-      this.edits = revision;
-    } catch {
-      // Without edits that fit, the server draws.
-      this.asked = -1;
-    }
+  /** What the page can draw and does better. */
+  private get mode(): DrawnHere {
+    if (this.why !== null) return "nothing";
+    if (this.drawer.level?.last !== true) return "moving";
+    if (this.wanted === "all") return "all";
+    const { width, height } = this.app.viewport.pixels;
+    return !this.app.viewport.software && this.choice.whole(width * height) ? "all" : "moving";
   }
 
   private async restore(): Promise<void> {
-    if (this.isClosed) return;
-    await this.renderer.restore();
-    this.app.viewport.renderer.resetState();
-    this.app.viewport.invalidate();
+    if (this.closed !== null) return;
+    await this.drawer.restore();
+    this.seen = [];
+    this.changed();
   }
 
-  /** Draws the view as it is, where it moves. */
+  private frame(): void {
+    if (this.draws) this.draw();
+    const { taken } = this;
+    this.taken = [];
+    if (taken.length > 0) this.app.acknowledge(taken);
+  }
+
+  /** Draws the view where it is other than before; at rest, the next part of the whole picture. */
   private draw(): void {
-    const { app, renderer } = this;
-    if (!this.draws || app.camera.resting) return;
-    const { viewport } = app;
-    const { width, height } = viewport.pixels;
-    const scale = this.pacing.scale(width, height);
-    const [w, h] = [Math.max(16, Math.round(scale * width)), Math.max(16, Math.round(scale * height))];
-    const began = performance.now();
-    const focal = (0.5 * h) / Math.tan((viewport.camera.fov * Math.PI) / 360);
-    renderer.setSize(w, h);
-    renderer.edited = !app.store.now.before;
-    renderer.setCamera({ c2w: viewport.c2w, width: w, height: h, fx: focal, fy: focal, cx: 0.5 * w, cy: 0.5 * h });
-    if (!renderer.render()) return;
-    const depth = renderer.readDepth();
-    const took = performance.now() - began;
-    app.pictures.showOwn(w, h, depth, (framebuffer, across, down) => renderer.show(across, down, framebuffer));
-    this.pacing.took(w * h, took);
-    this.drawn += 1;
-    this.figures(w, h, took);
-    this.slow = took > SLOWEST && w * h < 0.05 * width * height ? this.slow + 1 : 0;
-    if (this.slow >= PATIENCE && this.wanted === "best") this.close("the page's GPU is slower than the server");
+    const { app } = this;
+    const seen = this.sight();
+    const moved = !seen.every((part, n) => part === this.seen[n]);
+    this.seen = seen;
+    if (this.isServed()) return;
+    if (moved) this.drawMoved();
+    else if (this.told.here === "all") this.drawStill();
+    if (this.told.here === "all" && !this.still.whole) app.viewport.invalidate();
   }
 
-  private figures(width: number, height: number, took: number): void {
-    const now = performance.now();
-    this.times = [...this.times.filter((time) => now - time < 2000), now];
-    if (now - this.figured < EVERY) return;
-    this.figured = now;
-    const perSecond = 0.5 * this.times.length;
-    this.app.store.set({ figures: { perSecond, renderMs: took, encodeMs: 0, width, height, final: false, page: true } });
+  /** Draws the view as large as its time allows. */
+  private drawMoved(): void {
+    const { width, height } = this.app.viewport.pixels;
+    const scale = this.pacing.scale(width, height);
+    const size = [width, height].map((n) => Math.max(16, Math.round(scale * n)));
+    const drawn = this.paint(size[0], size[1], { first: 0, count: size[1] });
+    this.still.moved(performance.now(), drawn && scale === 1);
+    if (drawn) this.present(size[0], size[1]);
+    else this.seen = [];
+  }
+
+  /** Draws the next rows of the whole picture; where all are there, says so once the camera rests. */
+  private drawStill(): void {
+    const { app, still } = this;
+    const { width, height } = app.viewport.pixels;
+    if (still.whole) {
+      const last = app.lastPicture;
+      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq) app.drew(this.header(width, height, this.took), 0, 0);
+      return;
+    }
+    const rows = still.next(performance.now(), height, this.pacing.rows(width, height));
+    if (rows !== null && this.paint(width, height, rows) && still.drew(rows, height)) this.present(width, height);
+  }
+
+  /** What is to be seen. */
+  private sight(): Seen {
+    const { viewport, store } = this.app;
+    const { view, before, split } = store.now;
+    const { width, height } = viewport.pixels;
+    return [...viewport.viewProjection.elements, width, height, view, before, split, this.drawer.level, this.scene.edits];
+  }
+
+  /** Whether the server's picture is there and shows it. */
+  private isServed(): boolean {
+    const { lastPicture: last, camera, store } = this.app;
+    const { edits } = this.scene;
+    const { view, before, split } = store.now;
+    if (last === null || last.picture === 0 || edits === null || !camera.resting || last.camera !== camera.seq) return false;
+    const same = last.view === view && last.before === before && last.split === split && last.drag === edits.header.drag;
+    return same && last.revision >= edits.header.revision && (last.final || this.told.here !== "all");
+  }
+
+  /** Draws rows of the view; false where there is nothing to draw. */
+  private paint(width: number, height: number, rows: { first: number; count: number }): boolean {
+    const { drawer, app } = this;
+    const { view, before, split } = app.store.now;
+    const { viewport } = app;
+    const focal = (0.5 * height) / Math.tan((viewport.camera.fov * Math.PI) / 360);
+    drawer.setSize(width, height);
+    drawer.setCamera({ c2w: viewport.c2w, width, height, fx: focal, fy: focal, cx: 0.5 * width, cy: 0.5 * height });
+    const { compiled } = drawer;
+    const began = performance.now();
+    const left = before || split === null ? 0 : Math.round(split * width);
+    const normals = view === "normals";
+    let drew = true;
+    drawer.edited = false;
+    if (left > 0) drew = drawer.render({ normals, rows, columns: { first: 0, count: left } });
+    drawer.edited = !before;
+    if (left < width) drew = drawer.render({ normals, rows, columns: { first: left, count: width - left } }) && drew;
+    if (drew) drawer.wait();
+    viewport.renderer.resetState();
+    if (!drew) return false;
+    this.took = performance.now() - began;
+    // What had to wait for a shader says nothing of pictures to come.
+    if (drawer.compiled === compiled) this.measured(width * rows.count, this.took, height === viewport.pixels.height);
+    return true;
+  }
+
+  /** Puts what was drawn on the screen, and says so. */
+  private present(width: number, height: number): void {
+    const { app, drawer } = this;
+    const { view } = app.store.now;
+    const distances = drawer.distances(MOST_DISTANCES);
+    app.pictures.showOwn(distances, (framebuffer, across, down) => drawer.show(across, down, framebuffer, view));
+    this.drawn += 1;
+    const { edits } = this.scene;
+    app.drew(this.header(width, height, this.took), edits?.received ?? 0, edits?.taken ?? 0);
+  }
+
+  private measured(pixels: number, took: number, isWhole: boolean): void {
+    this.pacing.took(pixels, took);
+    this.choice.drew(pixels, took);
+    const { width, height } = this.app.viewport.pixels;
+    this.slow = took > SLOWEST && !isWhole && pixels < 0.05 * width * height ? this.slow + 1 : 0;
+    if (this.wanted !== "best") return;
+    if (this.slow >= PATIENCE) this.close("the page's GPU is too slow");
+    else if (this.choice.serverIsFaster) this.close(`the server is faster: ${this.choice.words}`);
+  }
+
+  /** What one of the page's pictures shows, in the words for the server's; those are numbered from 1. */
+  private header(width: number, height: number, renderMs: number): PictureHeader {
+    const { app } = this;
+    const { view, before, split } = app.store.now;
+    const { drag, seq, revision, final } = this.scene.edits?.header ?? { drag: 0, seq: 0, revision: 0, final: false };
+    const whole = this.still.whole && width === app.viewport.pixels.width;
+    return {
+      type: "picture", picture: 0, camera: app.camera.seq, drag, seq, revision, view, before, split,
+      x: 0, y: 0, width, height, full_width: width, full_height: height, final: whole && final && this.told.here === "all",
+      format: "rgb", picture_bytes: 0, depth_bytes: 0, depth_width: 0, depth_height: 0, depth_scale: 1, render_ms: renderMs, encode_ms: 0,
+    }; // prettier-ignore
   }
 }

@@ -1,5 +1,5 @@
 /** Binary messages: a header in JSON, a picture and its depth. */
-import type { PictureHeader } from "./protocol";
+import type { EditsHeader, PictureHeader } from "./protocol";
 
 export interface Parcel {
   header: PictureHeader;
@@ -8,11 +8,15 @@ export interface Parcel {
   depth: Uint16Array;
 }
 
-/** The parts of a binary message. */
-export function unpack(message: ArrayBuffer): Parcel {
+/** The header of a binary message, and where what it heads begins. */
+export function headed(message: ArrayBuffer): { header: PictureHeader | EditsHeader; start: number } {
   const length = new DataView(message).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as PictureHeader;
-  const start = 4 + length;
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as PictureHeader | EditsHeader;
+  return { header, start: 4 + length };
+}
+
+/** The parts of a picture's message whose header ends at `start`. */
+export function unpack(message: ArrayBuffer, header: PictureHeader, start: number): Parcel {
   const picture = new Uint8Array(message, start, header.picture_bytes);
   const at = start + header.picture_bytes;
   return { header, picture, depth: new Uint16Array(message.slice(at, at + header.depth_bytes)) };

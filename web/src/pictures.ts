@@ -23,6 +23,7 @@ import {
   WebGLRenderTarget,
 } from "three";
 import { DepthImage, NOTHING } from "./depth_image";
+import type { Distances } from "./field/views";
 import type { PictureHeader } from "./protocol";
 import type { Viewport } from "./viewport";
 
@@ -142,9 +143,7 @@ export class Pictures {
 
   /** Shows a picture of the page's own, of the view as it is: `draw` puts it into a framebuffer of a size. */
   showOwn(
-    width: number,
-    height: number,
-    depth: Float32Array,
+    { width, height, values }: Distances,
     draw: (framebuffer: WebGLFramebuffer | null, across: number, down: number) => void,
   ): void {
     this.fit();
@@ -155,7 +154,7 @@ export class Pictures {
     draw(framebuffer, this.target?.width ?? 1, this.target?.height ?? 1);
     renderer.resetState();
     renderer.setRenderTarget(null);
-    this.depth.take(width, height, depth);
+    this.depth.take(width, height, values);
     this.uploadDepth();
     this.viewpoint = { viewProjection: this.viewport.viewProjection, eye: this.viewport.camera.position.clone() };
     this.surface.visible = true;

@@ -14,6 +14,7 @@ export type PageMessage =
   | CameraMessage
   | DisplayMessage
   | PresentedMessage
+  | Drawing
   | DragBegin
   | DragMove
   | DragEnd
@@ -204,6 +205,13 @@ export interface DragMove {
   operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
 }
 /**
+ * Which pictures the page draws itself: none, those of what moves, or all. It is sent edits instead.
+ */
+export interface Drawing {
+  type: "drawing";
+  here: "nothing" | "moving" | "all";
+}
+/**
  * Writes the edited splats, the edits baked in, to a file to be downloaded; in the background.
  */
 export interface ExportSplats {
@@ -292,7 +300,7 @@ export interface PlayEnd {
   play: number;
 }
 /**
- * The page has shown a picture; until then the server sends at most one more.
+ * The page has shown a picture, or what edits make; until then the server sends at most one more.
  */
 export interface PresentedMessage {
   type: "presented";
@@ -415,6 +423,7 @@ export interface Hello {
   version: string;
   page: number;
   scene: string;
+  field: string;
   name: string;
   splats: boolean;
   /**
@@ -516,5 +525,22 @@ export interface PictureHeader {
   depth_height: number;
   depth_scale: number;
   render_ms: number;
+  encode_ms: number;
+}
+/**
+ * Heads a binary message to a page that draws itself, as a PictureHeader does; a file of edits follows.
+ *
+ * The file is one of `cagefield.formats.page_edits`, without what was sent before; it is empty where the
+ * edits cannot be drawn by a page, and `why` says why. The page answers `presented` when it shows them.
+ */
+export interface EditsHeader {
+  type: "edits";
+  picture: number;
+  drag: number;
+  seq: number;
+  revision: number;
+  final: boolean;
+  why: string | null;
+  map_ms: number;
   encode_ms: number;
 }

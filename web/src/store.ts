@@ -1,10 +1,12 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "./cage";
 import type { Axes } from "./operations";
-import type { EditState, Hello, Job, DisplayMessage, Notice, Preparing, Preview, State } from "./protocol";
+import type { Drawing, EditState, Hello, Job, DisplayMessage, Notice, Preparing, Preview, State } from "./protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<DisplayMessage["view"]>;
+/** Which pictures the page draws itself. */
+export type DrawnHere = Drawing["here"];
 export type CageName = "inner" | "outer" | "both";
 export type Target = "field" | CageName;
 
@@ -55,6 +57,8 @@ export interface Editor {
   upload: { name: string; share: number } | null;
   /** What a page plays of the camera path, and pictures show, or null. */
   preview: Preview | null;
+  /** The share of the field's file that has come, while it is loaded; else null. */
+  loading: number | null;
   figures: Figures;
 }
 
@@ -82,6 +86,7 @@ export const START: Editor = {
   jobs: [],
   upload: null,
   preview: null,
+  loading: null,
   figures: { perSecond: 0, renderMs: 0, encodeMs: 0, width: 0, height: 0, final: false, page: false },
 };
 

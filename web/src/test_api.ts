@@ -6,14 +6,24 @@ import type { Operation } from "./operations";
 import type { PictureHeader } from "./protocol";
 import { pickCorner } from "./picking";
 import { draggable } from "./cage_overlay";
-import { selected, type Editor } from "./store";
+import { selected, type DrawnHere, type Editor } from "./store";
 
 export interface TestApi {
   readonly now: Editor;
   readonly picture: PictureHeader | null;
   readonly latency: Latency;
-  /** Pictures that the page's own GPU has drawn, and why the server draws where it does. */
-  readonly page: { drawn: number; why: string | null; draws: boolean };
+  /** What the page's own GPU does: see `PageRenderer`. */
+  readonly page: {
+    drawn: number;
+    why: string | null;
+    draws: boolean;
+    here: DrawnHere;
+    /** How often the field was loaded. */
+    loads: number;
+    /** Bytes of edits that were uploaded, the last time and in all. */
+    uploaded: { last: number; total: number };
+    rates: string;
+  };
   readonly camera: { c2w: number[]; seq: number };
   /** The drag that goes on: what the cages follow of it, and why not all. */
   readonly drag: { id: number; seq: number; ended: boolean; why: string | null; followed: Operation | null } | null;
@@ -52,8 +62,8 @@ export function testApi(app: App): TestApi {
     },
     latency: app.latency,
     get page() {
-      const { drawn, why, draws } = app.page;
-      return { drawn, why, draws };
+      const { drawn, why, draws, here, scene, drawer, choice } = app.page;
+      return { drawn, why, draws, here, loads: scene.loads, uploaded: { ...drawer.uploaded }, rates: choice.words };
     },
     get camera() {
       return { c2w: viewport.c2w, seq: app.camera.seq };

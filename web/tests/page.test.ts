@@ -17,7 +17,7 @@ describe("the connection", () => {
   it("opens again, ever more patiently, and at once after it had been open", () => {
     const sockets: (Socket & { sent: string[] })[] = [];
     const waits: number[] = [];
-    const handlers: Handlers = { opened: vi.fn(), lost: (wait) => waits.push(wait), message: vi.fn(), picture: vi.fn() };
+    const handlers: Handlers = { opened: vi.fn(), lost: (wait) => waits.push(wait), message: vi.fn(), binary: vi.fn() };
     const connection = new Connection(() => {
       const sent: string[] = [];
       const socket = { binaryType: "blob" as BinaryType, readyState: 1, onopen: null, onclose: null, onmessage: null, sent, send: (text: string) => void sent.push(text) };

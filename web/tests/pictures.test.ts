@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { DepthImage } from "../src/depth_image";
 import type { PictureHeader } from "../src/protocol";
-import { pack, unpack } from "../src/picture_message";
+import { headed, pack, unpack } from "../src/picture_message";
 
 const HEADER: PictureHeader = {
   type: "picture", picture: 7, camera: 3, drag: 0, seq: 0, revision: 1, view: "colour", before: false, split: null,
@@ -13,8 +13,9 @@ describe("a binary message", () => {
   it("comes apart into what it was made of", () => {
     const depth = new Uint16Array([1, 2, 3, 4, 5, 6, 7, 65535]);
     const message = pack(HEADER, new Uint8Array([9, 8, 7]), depth);
-    const parcel = unpack(message);
-    expect(parcel.header).toEqual(HEADER);
+    const { header, start } = headed(message);
+    expect(header).toEqual(HEADER);
+    const parcel = unpack(message, HEADER, start);
     expect([...parcel.picture]).toEqual([9, 8, 7]);
     expect([...parcel.depth]).toEqual([...depth]);
   });

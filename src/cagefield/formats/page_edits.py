@@ -1,21 +1,29 @@
 """An edit stack as the page's GPU evaluates it: numbers of the edits, their lattices, the deformed occupancy.
 
-    rows       [44 E + 2 B, 4] float32. Of each edit 8 rows, its numbers in `warps.packing`:
-                   box's min, first | box's max, last | lattice's origin, nodes an axis |
-                   to nodes, row 0, continuous | row 1, simple | row 2 | node box's min, first node | max
-               and the hexahedra 0 and 1, 18 rows each: W (its first w is the affine flag), c, the box of y,
-               the bend [4,3], the image [8,3]. Then min and max of the boxes outside which nothing changes.
-    lattice    [2, 3 N] uint8, low and high bytes of float16 displacements in world units, of all lattices
-    occupancy  [bx, by, bz] uint16, codes of the deformed field (`rendering.occupancy`), from `origin` on
+    rows        [44 E + 2 B, 4] float32. Of each edit 8 rows, its numbers in `warps.packing`:
+                    box's min, first | box's max, last | lattice's origin, nodes an axis |
+                    to nodes, row 0, continuous | row 1, simple | row 2 | node box's min, first node | max
+                and the hexahedra 0 and 1, 18 rows each: W (its first w is the affine flag), c, the box of y,
+                the bend [4,3], the image [8,3]. Then min and max of the boxes outside which nothing changes.
+    lattice.N   [2, 3 R^3] uint8, low and high bytes of float16 displacements in world units, of lattice N
+    occupancy   [bx, by, bz] uint16, codes of the deformed field (`rendering.occupancy`), from `origin` on
 
 Inner cages are exact. Shells are lattices: an edit whose shell is evaluated exactly gets one of LATTICE nodes
-an axis.
+an axis, and finer ones than FINEST_LATTICE are made that coarse. In the GPU's texture every lattice begins at
+a multiple of ROW_OF_NODES nodes, so that one can be uploaded without the others.
+
+The header names lattices and the occupancy by keys, digests of their content. A file for a page that has
+some of them already leaves those out; of an occupancy whose grid the page has, it holds the part that
+changed, which `part` says: the key of the one before, and the part's first brick.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,27 +31,49 @@ from numpy.typing import NDArray
 from cagefield.edits import EditStack
 from cagefield.edits.edit import Edit
 from cagefield.errors import EditError
-from cagefield.formats.page_file import byte_planes, pack
+from cagefield.formats.page_file import LEVEL, byte_planes, pack
+from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
 from cagefield.typing import Float32
 from cagefield.warps import packing as row_layout
 from cagefield.warps.device_stack import DeviceStack
+from cagefield.warps.edit_lattice import nodes_of
 
-MAGIC, VERSION = b"cageedit", 1
+MAGIC, VERSION = b"cageedit", 2
 
 LATTICE = 64
 """Nodes an axis of the lattices of edits that have none: 1.5 MB of halves."""
+
+FINEST_LATTICE = 128
+"""Most nodes an axis of a lattice: 12 MB of halves."""
+
+ROW_OF_NODES = 2048
+"""Nodes in a row of the lattices' texture: every WebGL2 has textures of as many texels an edge."""
 
 ROWS, MOST_ROWS = 44, 1024
 """Rows of an edit, and those of the shader's 16 KiB of uniforms, which every WebGL2 has."""
 
 
+@dataclass(frozen=True)
+class PageEdits:
+    """A file of edits, and what a page has that has read it."""
+
+    data: bytes
+    keys: tuple[str, ...] = ()
+    """Of the lattices and, last, the occupancy."""
+    occupancy: Occupancy | None = field(default=None, repr=False)
+
+
+def for_page(edit: Edit) -> Edit:
+    """The edit itself, or the same with a lattice in its shell that a page can have."""
+    if edit.adjustment != "continuous" or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
+        return edit
+    return edit.replace(lattice=LATTICE if edit.lattice is None else FINEST_LATTICE)
+
+
 def for_pages(edits: EditStack) -> EditStack:
     """The stack with a lattice in each continuous edit's shell."""
-    return EditStack(
-        edit.replace(lattice=LATTICE) if edit.adjustment == "continuous" and edit.lattice is None else edit
-        for edit in edits
-    )
+    return EditStack(for_page(edit) for edit in edits)
 
 
 def encode_page_edits(renderer: Renderer) -> bytes:
@@ -51,22 +81,44 @@ def encode_page_edits(renderer: Renderer) -> bytes:
 
     Raises EditError for a shell without a lattice, and for more edits than the page's shader holds.
     """
-    edits = renderer.edits.active
+    return encode_changed_edits(renderer).data
+
+
+def encode_changed_edits(
+    renderer: Renderer,
+    has: Collection[str] = (),
+    occupancies: Mapping[str, Occupancy] | None = None,
+    level: int = LEVEL,
+) -> PageEdits:
+    """The same for a page that `has` what some keys name; `occupancies` are known ones by their keys.
+
+    `level` is deflate's. Raises EditError as `encode_page_edits` does.
+    """
     stack = DeviceStack.from_stack(renderer.edits)
-    occupancy = renderer.occupancy
+    edits = renderer.edits.active
+    table = page_rows(edits, stack)
+    lattices: list[dict[str, Any]] = []
+    arrays: dict[str, NDArray[Any]] = {}
+    for edit, row in zip(edits, stack.params, strict=False):
+        if row[row_layout.CONTINUOUS] > 0.5:
+            nodes = nodes_of(edit)
+            key = _lattice_key(edit, nodes)
+            if key not in has and all(key != before["key"] for before in lattices):
+                arrays[f"lattice.{len(lattices)}"] = byte_planes(nodes.reshape(-1).astype(np.float16))
+            lattices.append({"key": key, "nodes": len(nodes)})
+    occupancy, codes = _occupancy(renderer.occupancy, has, occupancies or {})
     header = {
         "edits": len(edits),
         "boxes": len(stack.boxes) if edits else 0,
         "preserve_opacity": renderer.preserve_opacity,
-        "origin": occupancy.origin.tolist(),
-        "dims": list(occupancy.codes.shape),
+        "lattices": lattices,
+        "occupancy": occupancy,
     }
-    arrays: dict[str, NDArray[Any]] = {
-        "rows": page_rows(edits, stack),
-        "lattice": byte_planes(stack.lattice.reshape(-1).astype(np.float16)),
-        "occupancy": occupancy.codes.astype(np.uint16),
-    }
-    return pack(MAGIC, VERSION, header, arrays)
+    arrays = {"rows": table, **arrays}
+    if codes is not None:
+        arrays["occupancy"] = codes.astype(np.uint16)
+    keys = (*(str(lattice["key"]) for lattice in lattices), str(occupancy["key"]))
+    return PageEdits(pack(MAGIC, VERSION, header, arrays, level), keys, renderer.occupancy)
 
 
 def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
@@ -76,14 +128,60 @@ def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
         raise EditError(
             f"{len(edits)} edits are more than a page's GPU takes; let the server draw, or bake some"
         )
-    rows = [_rows(edit, row) for edit, row in zip(edits, stack.params, strict=False)]
+    rows, first = [], 0
+    for edit, row in zip(edits, stack.params, strict=False):
+        rows.append(_rows(edit, row, first))
+        if row[row_layout.CONTINUOUS] > 0.5:
+            nodes = round(float(row[row_layout.RESOLUTION])) ** 3
+            first += -(-nodes // ROW_OF_NODES) * ROW_OF_NODES
     ends = np.zeros((2 * len(boxes), 4), np.float32)
     ends[:, :3] = boxes.reshape(-1, 3)
     return np.concatenate([*rows, ends])
 
 
-def _rows(edit: Edit, row: NDArray[np.float32]) -> Float32:
-    """The rows [ROWS,4] of an edit from its row of `warps.packing`."""
+def _occupancy(
+    occupancy: Occupancy, has: Collection[str], known: Mapping[str, Occupancy]
+) -> tuple[dict[str, Any], NDArray[np.int32] | None]:
+    """The header of an occupancy, and its codes, or the part of them that a page has to be sent."""
+    codes, origin = occupancy.codes, [int(n) for n in occupancy.origin]
+    key = _digest(np.asarray([*origin, *codes.shape], np.int64), codes)
+    header: dict[str, Any] = {"key": key, "origin": origin, "dims": list(codes.shape), "part": None}
+    if key in has:
+        return header, None
+    for name, before in known.items():
+        same_grid = before.codes.shape == codes.shape and (before.origin == occupancy.origin).all()
+        if name not in has or not same_grid:
+            continue
+        changed = before.codes != codes
+        spans = []
+        for axis in range(3):
+            along = np.flatnonzero(changed.any(axis=tuple(a for a in range(3) if a != axis)))
+            spans.append(slice(int(along[0]), int(along[-1]) + 1))
+        part = codes[tuple(spans)]
+        low = [span.start for span in spans]
+        return header | {"part": {"of": name, "low": low, "dims": list(part.shape)}}, part
+    return header, codes
+
+
+_keys: WeakKeyDictionary[Edit, str] = WeakKeyDictionary()
+
+
+def _lattice_key(edit: Edit, nodes: Float32) -> str:
+    """The key of an edit's lattice; worked out once in the edit's life."""
+    if edit not in _keys:
+        _keys[edit] = _digest(nodes)
+    return _keys[edit]
+
+
+def _digest(*arrays: NDArray[Any]) -> str:
+    content = hashlib.blake2b(digest_size=8)
+    for array in arrays:
+        content.update(np.ascontiguousarray(array).tobytes())
+    return content.hexdigest()
+
+
+def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
+    """The rows [ROWS,4] of an edit from its row of `warps.packing`, its lattice from a node on."""
     p = row_layout
     if row[p.CONTINUOUS] > 0.5 and row[p.RESOLUTION] < 1.0:
         raise EditError(f'edit "{edit.name}" has no lattice; a page draws shells from lattices (`for_pages`)')
@@ -91,7 +189,6 @@ def _rows(edit: Edit, row: NDArray[np.float32]) -> Float32:
     out[0:2, :3] = row[p.BOX : p.BOX + 6].reshape(2, 3)
     out[2:6, :3] = row[p.TO_NODES : p.TO_NODES + 12].reshape(4, 3)
     out[6:8, :3] = row[p.NODE_BOX : p.NODE_BOX + 6].reshape(2, 3)
-    first_node = 65536.0 * row[p.OFFSET] + row[p.OFFSET + 1]
     out[:7, 3] = (
         row[p.FIRST], row[p.LAST], row[p.RESOLUTION], row[p.CONTINUOUS], row[p.SIMPLE], 0.0, first_node,
     )  # fmt: skip

@@ -3,10 +3,9 @@
     times      [S] float32, seconds from the path's begin, rising
     states     [S] uint16, the state at each of these times; a state that comes again is stored once
     occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
-    lattice    [2, 3 N] uint8, halves as in `page_edits`: of all edits in state 0
+    lattice.k  [2, 3 N] uint8, halves as in `page_edits`. Entry n of the header's `lattices` says which of
+               them the edits of state n have
     rows.n     as `page_edits` has them, of state n
-    nodes.k    [2, 3 M] uint8, the lattice of an edit that moves. Entry n of the header's `nodes` says which
-               of them state n has in the ranges (first node, nodes) of `moving`
 
 Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same
 kinds of edits (`mixed`): inner cages and shells then follow chords of their ways.
@@ -57,10 +56,11 @@ class PathState:
         return cls(edits.active, DeviceStack.from_stack(edits))
 
     @property
-    def nodes(self) -> list[int]:
-        """The nodes of the lattices, one after the other."""
+    def lattices(self) -> list[NDArray[np.float32]]:
+        """The nodes [N,3] of each lattice."""
         sizes = [round(max(row[RESOLUTION], 0.0)) ** 3 for row in self.packed.params[: len(self.edits)]]
-        return [size for size in sizes if size]
+        ends = np.cumsum([size for size in sizes if size], dtype=int)
+        return np.split(self.packed.lattice[: ends[-1]], ends[:-1]) if len(ends) else []
 
 
 def encode_page_path(
@@ -76,30 +76,26 @@ def encode_page_path(
     All states have lattices of the same sizes in the same order. Raises EditError for more edits than a page
     takes.
     """
-    ranges = _moving(states)
     arrays: dict[str, NDArray[Any]] = {
         "times": np.asarray(times, np.float32),
         "states": np.asarray(order, np.uint16),
         "occupancy": occupancy.codes.astype(np.uint16),
-        "lattice": _halves(states[0].packed.lattice),
     }
     for number, state in enumerate(states):
         arrays[f"rows.{number}"] = page_rows(state.edits, state.packed)
     known: dict[bytes, int] = {}
-    nodes: list[list[int]] = []
+    lattices: list[list[int]] = []
     for state in states:
-        nodes.append([])
-        for first, count in ranges:
-            lattice = state.packed.lattice[first : first + count]
+        lattices.append([])
+        for lattice in state.lattices:
             place = known.setdefault(lattice.tobytes(), len(known))
-            arrays.setdefault(f"nodes.{place}", _halves(lattice))
-            nodes[-1].append(place)
+            arrays.setdefault(f"lattice.{place}", byte_planes(lattice.reshape(-1).astype(np.float16)))
+            lattices[-1].append(place)
     header = {
         "edits": [len(state.edits) for state in states],
         "boxes": [len(state.packed.boxes) if state.edits else 0 for state in states],
-        "moving": ranges,
-        "nodes": nodes,
-        "lattices": len(known),
+        "lattices": lattices,
+        "stored": len(known),
         "preserve_opacity": preserve_opacity,
         "origin": occupancy.origin.tolist(),
         "dims": list(occupancy.codes.shape),
@@ -148,19 +144,3 @@ def joined_occupancy(found: Sequence[Occupancy]) -> Occupancy:
         x, y, z = first + 2 * np.array(each.codes.shape)
         blocks[first[0] : x, first[1] : y, first[2] : z] |= each.blocks
     return Occupancy(low, encode(masks_of(blocks)))
-
-
-def _moving(states: Sequence[PathState]) -> list[list[int]]:
-    """(first node, nodes) of each lattice that differs between states."""
-    ranges, first = [], 0
-    for count in states[0].nodes:
-        part = slice(first, first + count)
-        lattices = [state.packed.lattice[part] for state in states]
-        if any(not np.array_equal(lattices[0], lattice) for lattice in lattices[1:]):
-            ranges.append([first, count])
-        first += count
-    return ranges
-
-
-def _halves(nodes: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return byte_planes(nodes.reshape(-1).astype(np.float16))

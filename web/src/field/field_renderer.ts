@@ -10,10 +10,11 @@
  *
  * It leaves the context's state changed: three.js wants `resetState()` after it.
  */
-import { LATTICE_WIDTH, MOST_ROWS, unrolled } from "./edits_glsl";
+import { unrolled } from "./edits_glsl";
+import { EditsOnGpu } from "./edits_on_gpu";
 import { deleteField, uploadLevel, uploadOccupancy } from "./field_textures";
 import type { FieldTextures } from "./field_textures";
-import { plainUnpacking, programOf, setFilter } from "./gl";
+import { programOf } from "./gl";
 import type { Program } from "./gl";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
@@ -21,8 +22,11 @@ import { fragment, VERTEX } from "./march_glsl";
 import type { Variant } from "./march_glsl";
 import type { PageEdits } from "./page_edits";
 import type { Bytes, OnArrival } from "./page_file";
+import type { SceneDrawer } from "./scene_drawer";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
+import { Views } from "./views";
+import type { Distances, View } from "./views";
 
 type GL = WebGL2RenderingContext;
 
@@ -49,43 +53,35 @@ export interface Picture {
   count?: boolean;
   /** Rows from the bottom that are drawn: a picture in parts keeps slow GPUs responsive. */
   rows?: { first: number; count: number };
+  /** Columns from the left that are drawn. */
+  columns?: { first: number; count: number };
 }
 
 interface Shown {
   level: Level;
   textures: FieldTextures;
   occupancy: WebGLTexture;
-}
-
-interface EditsOnGpu {
-  edits: PageEdits;
-  buffer: WebGLBuffer;
-  lattice: WebGLTexture;
-  occupancy: WebGLTexture;
+  /** An occupancy without anything to leap over, for a coarse level under edits: theirs is that of the full one. */
+  solid: WebGLTexture | null;
 }
 
 /** Bytes of textures that a field may take unless the caller says otherwise. */
 const MEMORY = 768 * 2 ** 20;
 
-const SHOW = `#version 300 es
-precision highp float;
-uniform sampler2D picture;
-uniform vec2 size;
-out vec4 colour;
-void main() { colour = vec4(texture(picture, gl_FragCoord.xy / size).rgb, 1.0); }`;
-
-export class FieldRenderer {
+export class FieldRenderer implements SceneDrawer {
   background: Vec3 = [1, 1, 1];
   near = 0;
-  /** Whether the edits are seen; false shows the field before them. A coarse level is shown without. */
+  /** Whether the edits are seen; false shows the field before them. */
   edited = true;
   /** Distance between samples in voxels; null is the file's. */
   step: number | null = null;
   readonly targets: Targets;
   /** Milliseconds that the last new shader took to compile. */
   compileTime = 0;
+  compiled = 0;
   private shown: Shown | null = null;
-  private onGpu: EditsOnGpu | null = null;
+  private readonly onGpu: EditsOnGpu;
+  private readonly views: Views;
   private camera: PinholeCamera | null = null;
   private loading = 0;
   private readonly programs = new Map<string, Program>();
@@ -96,6 +92,8 @@ export class FieldRenderer {
     private readonly memory = MEMORY,
   ) {
     this.targets = new Targets(gl);
+    this.views = new Views(gl, this.targets);
+    this.onGpu = new EditsOnGpu(gl);
     this.vertices = gl.createVertexArray();
   }
 
@@ -104,9 +102,14 @@ export class FieldRenderer {
     return this.shown?.level ?? null;
   }
 
-  /** The edits that are drawn: their occupancy is that of the full level. */
-  private get active(): EditsOnGpu | null {
-    return this.edited && this.shown?.level.last ? this.onGpu : null;
+  /** Bytes of edits that were uploaded, the last time and in all. */
+  get uploaded(): { readonly last: number; readonly total: number } {
+    return this.onGpu.uploaded;
+  }
+
+  /** The edits that are drawn. */
+  private get active(): PageEdits | null {
+    return this.edited ? this.onGpu.edits : null;
   }
 
   /** Bytes of the field's textures. */
@@ -136,46 +139,33 @@ export class FieldRenderer {
 
   /** Uploads what was shown again, after the context was lost and restored. */
   async restore(): Promise<void> {
-    const { shown, onGpu } = this;
+    const { shown } = this;
+    const { edits } = this.onGpu;
     this.programs.clear();
     this.vertices = this.gl.createVertexArray();
-    this.shown = this.onGpu = null;
-    this.targets.forget();
+    this.shown = null;
+    for (const part of [this.targets, this.views, this.onGpu]) part.forget();
     const turn = ++this.loading;
     if (shown) await this.take(shown.level, () => turn === this.loading);
-    this.setEdits(onGpu?.edits ?? null);
+    this.setEdits(edits);
   }
 
-  /** The edits that the field is seen through; null for none. */
+  /** The edits that the field is seen through; null for none. Uploads what is other than before. */
   setEdits(edits: PageEdits | null): void {
-    const { gl } = this;
-    if (this.onGpu) {
-      gl.deleteBuffer(this.onGpu.buffer);
-      gl.deleteTexture(this.onGpu.lattice);
-      gl.deleteTexture(this.onGpu.occupancy);
-      this.onGpu = null;
-    }
-    if (edits === null || edits.edits === 0) return;
-    if (edits.rows.length > 4 * MOST_ROWS) throw new Error("more edits than the page's shader holds");
-    const buffer = gl.createBuffer();
-    gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
-    gl.bufferData(gl.UNIFORM_BUFFER, 16 * MOST_ROWS, gl.STATIC_DRAW);
-    gl.bufferSubData(gl.UNIFORM_BUFFER, 0, edits.rows);
-    gl.bindBuffer(gl.UNIFORM_BUFFER, null);
-    this.onGpu = { edits, buffer, lattice: this.uploadLattice(edits), occupancy: uploadOccupancy(gl, edits.occupancy) };
+    this.onGpu.set(edits);
   }
 
   /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
   render(picture: Picture = {}): boolean {
-    const { gl, shown, camera, active: onGpu } = this;
+    const { gl, shown, camera, active } = this;
     if (!shown || !camera || gl.isContextLost()) return false;
     const { level, textures } = shown;
     const { width, height } = this.targets;
     const variant: Variant = {
       K: level.header.steps.length,
       contracted: level.field.contracted,
-      edited: onGpu !== null,
-      edits: onGpu && unrolled(onGpu.edits.edits),
+      edited: active !== null,
+      edits: active && unrolled(active.edits),
       normals: picture.normals ?? false,
       count: picture.count ?? false,
     };
@@ -187,46 +177,38 @@ export class FieldRenderer {
     this.setField(uniform, shown);
     this.setView(uniform, camera);
     let unit = 0;
-    const bind = (name: string, target: number, texture: WebGLTexture): void => {
+    const bind = (name: string, target: number, texture: WebGLTexture | null): void => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(target, texture);
       gl.uniform1i(uniform(name), unit++);
     };
     bind("densityAtlas", gl.TEXTURE_3D, textures.density);
     bind("brickIndex", gl.TEXTURE_3D, textures.index);
-    bind("bricks", gl.TEXTURE_3D, onGpu?.occupancy ?? shown.occupancy);
+    bind("bricks", gl.TEXTURE_3D, active ? this.deformed(shown) : shown.occupancy);
     textures.colours.forEach((texture, n) => bind(`colourAtlas${n}`, gl.TEXTURE_3D, texture));
-    if (onGpu) {
-      bind("lattice", gl.TEXTURE_2D, onGpu.lattice);
-      gl.uniform1i(uniform("editCount"), onGpu.edits.edits);
-      gl.uniform1i(uniform("boxCount"), onGpu.edits.boxes);
-      gl.uniform1i(uniform("preserveOpacity"), Number(onGpu.edits.preserveOpacity));
-      gl.uniformBlockBinding(program, gl.getUniformBlockIndex(program, "Edits"), 0);
-      gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, onGpu.buffer);
+    if (active) {
+      bind("lattice", gl.TEXTURE_2D, this.onGpu.bind(program));
+      gl.uniform1i(uniform("editCount"), active.edits);
+      gl.uniform1i(uniform("boxCount"), active.boxes);
+      gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
     }
     const { first, count } = picture.rows ?? { first: 0, count: height };
+    const across = picture.columns ?? { first: 0, count: width };
     gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(0, first, width, count);
+    gl.scissor(across.first, first, across.count, count);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
     this.unbind();
     return true;
   }
 
-  /** Puts the colour that was drawn on the canvas, or in a framebuffer, of this size. */
-  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null): void {
+  /** Puts a view of what was drawn on the canvas, or in a framebuffer, of this size. */
+  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null, view: View = "colour"): void {
     const { gl } = this;
-    const program = this.cached("show", () => programOf(gl, VERTEX, SHOW));
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-    gl.viewport(0, 0, width, height);
-    gl.useProgram(program.program);
     gl.bindVertexArray(this.vertices);
     this.plainState();
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.targets.colour);
-    gl.uniform1i(program.uniform("picture"), 0);
-    gl.uniform2f(program.uniform("size"), width, height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    this.views.show(view, this.reach, width, height);
     this.unbind();
   }
 
@@ -235,17 +217,24 @@ export class FieldRenderer {
     return this.targets.read(normals);
   }
 
-  /** Distances of what was drawn, top row first. */
-  readDepth(): Float32Array {
-    return this.targets.readDepth();
+  /** At most about `most` distances of what was drawn, top row first. */
+  distances(most: number): Distances {
+    this.gl.bindVertexArray(this.vertices);
+    this.plainState();
+    const found = this.views.distances(most);
+    this.unbind();
+    return found;
+  }
+
+  wait(): void {
+    this.targets.wait();
   }
 
   /** Frees what lies on the GPU. */
   dispose(): void {
     this.loading++;
-    this.setEdits(null);
     this.drop();
-    this.targets.dispose();
+    for (const part of [this.targets, this.views, this.onGpu]) part.dispose();
     for (const { program } of this.programs.values()) this.gl.deleteProgram(program);
     this.programs.clear();
     this.gl.deleteVertexArray(this.vertices);
@@ -255,44 +244,43 @@ export class FieldRenderer {
     const textures = await uploadLevel(this.gl, level, this.memory, wanted);
     if (textures === null) return;
     this.drop();
-    this.shown = { level, textures, occupancy: uploadOccupancy(this.gl, level.occupancy) };
+    this.shown = { level, textures, occupancy: uploadOccupancy(this.gl, level.occupancy), solid: null };
   }
 
   private drop(): void {
     if (!this.shown) return;
     deleteField(this.gl, this.shown.textures);
     this.gl.deleteTexture(this.shown.occupancy);
+    this.gl.deleteTexture(this.shown.solid);
     this.shown = null;
   }
 
-  private uploadLattice({ lattice }: PageEdits): WebGLTexture {
-    const { gl } = this;
-    const rows = Math.max(1, Math.ceil(lattice.length / (3 * LATTICE_WIDTH)));
-    const data = new Uint16Array(3 * LATTICE_WIDTH * rows);
-    data.set(lattice);
-    plainUnpacking(gl);
-    const texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGB16F, LATTICE_WIDTH, rows);
-    setFilter(gl, gl.TEXTURE_2D, gl.NEAREST);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, LATTICE_WIDTH, rows, gl.RGB, gl.HALF_FLOAT, data);
-    gl.bindTexture(gl.TEXTURE_2D, null);
-    return texture;
+  /** The occupancy of the field under its edits. */
+  private deformed(shown: Shown): WebGLTexture | null {
+    if (shown.level.last) return this.onGpu.bricks;
+    const { occupancy } = shown.level;
+    shown.solid ??= uploadOccupancy(this.gl, { ...occupancy, codes: new Uint16Array(occupancy.codes.length).fill(255) });
+    return shown.solid;
+  }
+
+  /** The nearest and farthest distance of the field's box from the camera. */
+  private get reach(): [number, number] {
+    const { shown, camera } = this;
+    if (!shown || !camera) return [0, 1];
+    const [low, high] = shown.level.field.bounds;
+    const radius = 0.5 * Math.hypot(...high.map((x, axis) => x - low[axis]));
+    const distance = Math.hypot(...high.map((x, axis) => 0.5 * (x + low[axis]) - camera.c2w[4 * axis + 3]));
+    return [Math.max(0, distance - radius), distance + radius];
   }
 
   private program(variant: Variant, brick: number): Program {
-    return this.cached(JSON.stringify([variant, brick]), () => {
-      const program = programOf(this.gl, VERTEX, fragment(variant, brick));
-      this.compileTime = program.milliseconds;
-      return program;
-    });
-  }
-
-  private cached(key: string, make: () => Program): Program {
+    const key = JSON.stringify([variant, brick]);
     let program = this.programs.get(key);
     if (!program) {
-      program = make();
+      program = programOf(this.gl, VERTEX, fragment(variant, brick));
       this.programs.set(key, program);
+      this.compileTime = program.milliseconds;
+      this.compiled += 1;
     }
     return program;
   }
@@ -305,7 +293,7 @@ export class FieldRenderer {
     const size = bounds[1].map((high, axis) => high - bounds[0][axis]);
     const scale = size.map((length, axis) => (contracted ? 2 / length : (resolution[axis] - 1) / length));
     const lower = bounds[0].map((low, axis) => (contracted ? 0.5 * (low + bounds[1][axis]) : low));
-    const { origin, dims: bricks } = active?.edits.occupancy ?? level.occupancy;
+    const { origin, dims: bricks } = active && level.last ? active.occupancy : level.occupancy;
     const step = this.step ?? level.field.step;
     gl.uniform3f(uniform("atlasScale"), 1 / (across[0] * edge), 1 / (across[1] * edge), 1 / (across[2] * edge));
     gl.uniform3i(uniform("indexDims"), ...dims);

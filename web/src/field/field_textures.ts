@@ -1,7 +1,7 @@
 /** A level of a field on the GPU. */
 import { bytesOf, Filler, layoutOf, TooLarge } from "./atlas";
 import type { Layout } from "./atlas";
-import { plainUnpacking, texture3D } from "./gl";
+import { checkMemory, plainUnpacking, texture3D } from "./gl";
 import type { Level, Occupancy } from "./level";
 
 type GL = WebGL2RenderingContext;
@@ -53,6 +53,7 @@ export async function uploadLevel(gl: GL, level: Level, limit: number, wanted: (
     made.push(index);
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, dims[2], dims[1], dims[0], gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, layout.index);
     gl.bindTexture(gl.TEXTURE_3D, null);
+    checkMemory(gl);
     return { layout, density, colours, index, bytes };
   } catch (error) {
     for (const texture of made) gl.deleteTexture(texture);

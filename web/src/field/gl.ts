@@ -40,16 +40,30 @@ export function programOf(gl: GL, vertex: string, fragment: string): Program {
   return { program, uniform, milliseconds: performance.now() - began };
 }
 
-/** An empty 3D texture; throws where the GPU has no memory for it. */
+/** The GPU has not the memory for what is to be drawn. */
+export class OutOfMemory extends Error {
+  constructor() {
+    super("the GPU has not enough memory for the field");
+  }
+}
+
+/** Throws where the GPU had no memory for what it was told since the last look. */
+export function checkMemory(gl: GL): void {
+  for (let error = gl.getError(); error !== gl.NO_ERROR && error !== gl.CONTEXT_LOST_WEBGL; error = gl.getError())
+    if (error === gl.OUT_OF_MEMORY) throw new OutOfMemory();
+}
+
+/** An empty 3D texture; throws `OutOfMemory` where the GPU has none for it. */
 export function texture3D(gl: GL, format: number, size: readonly number[], filter: number): WebGLTexture {
-  while (gl.getError() !== gl.NO_ERROR);
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_3D, texture);
   gl.texStorage3D(gl.TEXTURE_3D, 1, format, size[0], size[1], size[2]);
   setFilter(gl, gl.TEXTURE_3D, filter);
-  if (gl.getError() === gl.OUT_OF_MEMORY) {
+  try {
+    checkMemory(gl);
+  } catch (error) {
     gl.deleteTexture(texture);
-    throw new Error("the GPU has not enough memory for the field");
+    throw error;
   }
   return texture;
 }

@@ -7,8 +7,22 @@ interface EditsHeader {
   edits: number;
   boxes: number;
   preserve_opacity: boolean;
-  origin: Vec3;
-  dims: Vec3;
+  lattices: { key: string; nodes: number }[];
+  occupancy: { key: string; origin: Vec3; dims: Vec3; part: { of: string; low: Vec3; dims: Vec3 } | null };
+}
+
+export interface Lattice {
+  /** Names its content. */
+  key: string;
+  /** [nodes, 3] halves: displacements. */
+  halves: Uint16Array;
+}
+
+/** An occupancy of the deformed field. */
+export interface DeformedOccupancy extends Occupancy {
+  key: string;
+  /** What of it is other than in the occupancy of a key, where that is known. */
+  changed: { of: string; low: Vec3; dims: Vec3; codes: Uint16Array } | null;
 }
 
 export interface PageEdits {
@@ -17,29 +31,38 @@ export interface PageEdits {
   preserveOpacity: boolean;
   /** [edits * ROW + boxes * 2, 4]. */
   rows: Float32Array;
-  /** [nodes, 3] halves: displacements of all lattices. */
-  lattice: Uint16Array;
-  /** Of the deformed field. */
-  occupancy: Occupancy;
+  lattices: Lattice[];
+  occupancy: DeformedOccupancy;
 }
 
-export async function readEdits(source: ArrayBuffer): Promise<PageEdits> {
-  const reader = new ByteReader(source);
-  const { header, ...file } = await opened(reader);
+/** The edits of a file. What a file leaves out is that of `before`; throws where those do not have it either. */
+export async function readEdits(source: ArrayBuffer, before: PageEdits | null = null): Promise<PageEdits> {
+  const file = await PageFile.open<EditsHeader>(new ByteReader(source), "cageedit", 2);
+  const { header } = file;
   const rows = (await file.read("rows")) as Float32Array;
-  const lattice = joined((await file.read("lattice")) as Uint8Array);
-  const codes = (await file.read("occupancy")) as Uint16Array;
-  return {
-    edits: header.edits,
-    boxes: header.boxes,
-    preserveOpacity: header.preserve_opacity,
-    rows,
-    lattice,
-    occupancy: { origin: header.origin, dims: header.dims, codes },
-  };
+  const lattices: Lattice[] = [];
+  for (const [n, { key }] of header.lattices.entries()) {
+    const known = [...lattices, ...(before?.lattices ?? [])].find((lattice) => lattice.key === key);
+    lattices.push(known ?? { key, halves: joined((await file.read(`lattice.${n}`)) as Uint8Array) });
+  }
+  const { key, origin, dims, part } = header.occupancy;
+  const old = before?.occupancy ?? null;
+  let occupancy: DeformedOccupancy;
+  if (old?.key === key) occupancy = old;
+  else {
+    const codes = (await file.read("occupancy")) as Uint16Array;
+    if (part === null) occupancy = { key, origin, dims, codes, changed: null };
+    else if (old?.key === part.of) occupancy = { key, origin, dims, codes: patched(old, part.low, part.dims, codes), changed: { ...part, codes } };
+    else throw new Error("the edits are the change of ones that this page has not");
+  }
+  return { edits: header.edits, boxes: header.boxes, preserveOpacity: header.preserve_opacity, rows, lattices, occupancy };
 }
 
-async function opened(reader: ByteReader): Promise<{ header: EditsHeader; read: (name: string) => Promise<unknown> }> {
-  const file = await PageFile.open<EditsHeader>(reader, "cageedit", 1);
-  return { header: file.header, read: (name) => file.read(name) };
+/** The codes of an occupancy with others in the part that begins at `low`. */
+export function patched({ dims, codes }: Occupancy, low: Vec3, size: Vec3, part: Uint16Array): Uint16Array {
+  const out = codes.slice();
+  let n = 0;
+  for (let x = low[0]; x < low[0] + size[0]; x++)
+    for (let y = low[1]; y < low[1] + size[1]; y++, n += size[2]) out.set(part.subarray(n, n + size[2]), (x * dims[1] + y) * dims[2] + low[2]);
+  return out;
 }

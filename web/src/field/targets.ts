@@ -27,6 +27,11 @@ export class Targets {
     return this.textures?.colour ?? null;
   }
 
+  /** 0.5 + 0.5 normal [RGBA8]; null unless the last picture had them. */
+  get normals(): WebGLTexture | null {
+    return this.textures?.normals ?? null;
+  }
+
   /** Distances [R32UI, bits of floats]. */
   get depth(): WebGLTexture | null {
     return this.textures?.depth ?? null;
@@ -74,18 +79,16 @@ export class Targets {
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, third);
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    const depth = this.readDepth();
+    const depth = flipped(this.readDepth(), width);
     return { width, height, rgba: flipped(rgba, 4 * width), depth, normals: third && flipped(third, 4 * width) };
   }
 
-  /** [h, w]: distances along the rays, infinite where nothing is, top row first. */
-  readDepth(): Float32Array {
-    const { gl, width, height } = this;
+  /** [h, w]: floats of the integer framebuffer that is bound, of its size, bottom row first. */
+  readBits(width: number, height: number): Float32Array {
+    const { gl } = this;
     const bits = new Uint32Array(width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     gl.pixelStorei(gl.PACK_ALIGNMENT, 1);
-    gl.readBuffer(gl.COLOR_ATTACHMENT1);
     if (gl.getParameter(gl.IMPLEMENTATION_COLOR_READ_FORMAT) === gl.RED_INTEGER) {
       gl.readPixels(0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, bits);
     } else {
@@ -93,8 +96,17 @@ export class Targets {
       gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, four);
       for (let n = 0; n < bits.length; n++) bits[n] = four[4 * n];
     }
+    return new Float32Array(bits.buffer);
+  }
+
+  /** Waits until what was drawn is there. */
+  wait(): void {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return flipped(new Float32Array(bits.buffer), width);
   }
 
   /** Forgets what a lost context had. */
@@ -107,6 +119,15 @@ export class Targets {
     if (textures) for (const texture of Object.values<WebGLTexture | null>(textures)) gl.deleteTexture(texture);
     gl.deleteFramebuffer(this.framebuffer);
     this.forget();
+  }
+
+  private readDepth(): Float32Array {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
+    gl.readBuffer(gl.COLOR_ATTACHMENT1);
+    const depth = this.readBits(this.width, this.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    return depth;
   }
 
   private texture(format: number, filter: number): WebGLTexture {

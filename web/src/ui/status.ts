@@ -10,6 +10,14 @@ const LONG = 2000;
 export function status(app: App): HTMLElement {
   const message = h("span", { class: "message" });
   const preparing = h("span", { class: "preparing", hidden: true, role: "status" });
+  const loading = h("span", { class: "preparing", hidden: true, role: "status" });
+  const bar = h("progress", { max: 1 });
+  loading.append("Loading the field ", bar);
+  loading.title = "Once it is here, this page's own GPU draws";
+  app.store.watch(["loading"], ({ loading: share }) => {
+    loading.hidden = share === null;
+    bar.value = share ?? 0;
+  });
   const figures = h("span", { class: "figures" });
   const saved = h("span", { class: "saved" });
   const connection = h("span", { class: "connection" });
@@ -38,11 +46,11 @@ export function status(app: App): HTMLElement {
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
     const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
     figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}` : "";
-    figures.title = f.page ? "" : (app.page.why ?? "");
+    figures.title = [app.page.why ?? "", app.page.choice.words].filter((text) => text !== "").join(" · ");
     saved.textContent = state === null ? "" : state.saved ? "saved" : "not saved";
     saved.classList.toggle("due", state?.saved === false);
     connection.className = `connection ${c}`;
     connection.title = { open: "Connected", connecting: "Connecting…", lost: "The server is gone" }[c];
   });
-  return h("footer", { class: "status" }, message, h("span", { class: "space" }), preparing, figures, saved, connection);
+  return h("footer", { class: "status" }, message, h("span", { class: "space" }), preparing, loading, figures, saved, connection);
 }

@@ -4,17 +4,15 @@ import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import type { Bytes } from "../field/page_file";
-import type { PageEdits } from "../field/page_edits";
+import type { Lattice, PageEdits } from "../field/page_edits";
 import { mixedHalves } from "./halves";
 
 interface PathHeader {
   edits: number[];
   boxes: number[];
-  /** First node and number of nodes of each lattice that moves. */
-  moving: [number, number][];
-  /** Of each state, which lattices it has there; and how many there are. */
-  nodes: number[][];
-  lattices: number;
+  /** Of each state, which lattices its edits have; and how many there are. */
+  lattices: number[][];
+  stored: number;
   preserve_opacity: boolean;
   origin: Vec3;
   dims: Vec3;
@@ -24,8 +22,7 @@ interface State {
   edits: number;
   boxes: number;
   rows: Float32Array;
-  /** The lattices that move. */
-  nodes: Uint16Array[];
+  lattices: Lattice[];
 }
 
 /** Rows of an edit of which lower and upper ends of a box are kept: its own, and those of its two hexahedra. */
@@ -37,7 +34,6 @@ export class PathEdits {
     private readonly times: Float32Array,
     private readonly order: Uint16Array,
     private readonly occupancy: PageEdits["occupancy"],
-    private readonly lattice: Uint16Array,
     private readonly states: State[],
   ) {}
 
@@ -47,15 +43,15 @@ export class PathEdits {
     const times = (await file.read("times")) as Float32Array;
     const order = (await file.read("states")) as Uint16Array;
     const codes = (await file.read("occupancy")) as Uint16Array;
-    const lattice = joined((await file.read("lattice")) as Uint8Array);
     const rows: Float32Array[] = [];
-    const lattices: Uint16Array[] = [];
+    const stored: Lattice[] = [];
     for (const n of header.edits.keys()) rows.push((await file.read(`rows.${n}`)) as Float32Array);
-    for (let k = 0; k < header.lattices; k++) lattices.push(joined((await file.read(`nodes.${k}`)) as Uint8Array));
+    for (let k = 0; k < header.stored; k++) stored.push({ key: `${k}`, halves: joined((await file.read(`lattice.${k}`)) as Uint8Array) });
     const states = header.edits.map((edits, n) => {
-      return { edits, boxes: header.boxes[n], rows: rows[n], nodes: header.nodes[n].map((k) => lattices[k]) };
+      return { edits, boxes: header.boxes[n], rows: rows[n], lattices: header.lattices[n].map((k) => stored[k]) };
     });
-    return new PathEdits(header, times, order, { origin: header.origin, dims: header.dims, codes }, lattice, states);
+    const occupancy = { key: "path", origin: header.origin, dims: header.dims, codes, changed: null };
+    return new PathEdits(header, times, order, occupancy, states);
   }
 
   /** The edits at seconds from the path's begin. */
@@ -68,17 +64,17 @@ export class PathEdits {
     const one = states[order[k]];
     const other = states[order[k + 1]];
     const near = share < 0.5 ? one : other;
-    if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.nodes);
-    const nodes = one.nodes.map((lattice, n) =>
-      lattice === other.nodes[n] ? lattice : mixedHalves(lattice, other.nodes[n], share),
-    );
-    return this.edits(one, mixedRows(one, other, share), nodes);
+    if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.lattices);
+    const lattices = one.lattices.map((lattice, n) => {
+      if (lattice === other.lattices[n]) return lattice;
+      const key = `${lattice.key} ${other.lattices[n].key} ${share}`;
+      return { key, halves: mixedHalves(lattice.halves, other.lattices[n].halves, share) };
+    });
+    return this.edits(one, mixedRows(one, other, share), lattices);
   }
 
-  private edits({ edits, boxes }: State, rows: Float32Array, nodes: Uint16Array[]): PageEdits {
-    const lattice = this.lattice.slice();
-    nodes.forEach((part, n) => lattice.set(part, 3 * this.header.moving[n][0]));
-    return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattice, occupancy: this.occupancy };
+  private edits({ edits, boxes }: State, rows: Float32Array, lattices: Lattice[]): PageEdits {
+    return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattices, occupancy: this.occupancy };
   }
 }
 

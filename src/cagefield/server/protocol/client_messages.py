@@ -13,6 +13,7 @@ from cagefield.server.protocol.common import (
     MOST_BYTES,
     CameraMessage,
     Corners,
+    DrawnHere,
     EditId,
     FalloffName,
     JobKind,
@@ -36,10 +37,17 @@ class DisplayMessage(Message):
 
 
 class PresentedMessage(Message):
-    """The page has shown a picture; until then the server sends at most one more."""
+    """The page has shown a picture, or what edits make; until then the server sends at most one more."""
 
     type: Literal["presented"] = "presented"
     picture: int
+
+
+class Drawing(Message):
+    """Which pictures the page draws itself: none, those of what moves, or all. It is sent edits instead."""
+
+    type: Literal["drawing"] = "drawing"
+    here: DrawnHere
 
 
 class DragBegin(Message):
@@ -274,7 +282,7 @@ class CancelJob(Message):
 
 
 PageMessage: TypeAlias = Annotated[
-    CameraMessage | DisplayMessage | PresentedMessage | DragBegin | DragMove | DragEnd | DragCancel
+    CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
     | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange
     | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
     | ExportSplats | CancelJob,

@@ -12,6 +12,9 @@ A drag goes: `drag_begin`, any number of `drag` (each states the whole operation
 the server may skip all but the newest), then `drag_end` or `drag_cancel`. The server answers with `dragged`:
 how much of the operation could be followed, and where the cages then are.
 
+A page that draws with its own GPU says so with `drawing`. It is then sent the edits, as binary messages of
+their own (see `server_messages.EditsHeader`), in the place of the pictures that it draws.
+
 A page plays the camera path so: `play_begin`, then `play` with each camera on the way, then `play_end`. All
 pages are told with `preview` that it began, and that it is over, also where something else has ended it.
 """
@@ -27,6 +30,7 @@ Corners: TypeAlias = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
 Pose: TypeAlias = Annotated[list[FiniteFloat], Field(min_length=16, max_length=16)]
 Axes: TypeAlias = Literal["world", "cage"]
 View: TypeAlias = Literal["colour", "depth", "opacity", "normals"]
+DrawnHere: TypeAlias = Literal["nothing", "moving", "all"]
 ShellName: TypeAlias = Literal["flow", "trilinear"]
 FalloffName: TypeAlias = Literal["smooth", "linear"]
 JobKind: TypeAlias = Literal["test_views", "camera_path"]

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from cagefield.server.protocol.client_messages import PageMessage
-from cagefield.server.protocol.server_messages import PictureHeader, ServerMessage
+from cagefield.server.protocol.server_messages import EditsHeader, PictureHeader, ServerMessage
 
 _REF = "#/definitions/{model}"
 _NUMBER = {"type": "number"}
@@ -29,8 +29,11 @@ def schema() -> dict[str, Any]:
     """
     page = TypeAdapter(PageMessage).json_schema(ref_template=_REF)
     server = TypeAdapter(ServerMessage).json_schema(ref_template=_REF)
-    header = TypeAdapter(PictureHeader).json_schema(ref_template=_REF)
-    definitions = {**page.pop("$defs"), **_complete({**server.pop("$defs"), "PictureHeader": header})}
+    headers = {
+        header.__name__: TypeAdapter(header).json_schema(ref_template=_REF)
+        for header in (PictureHeader, EditsHeader)
+    }
+    definitions = {**page.pop("$defs"), **_complete({**server.pop("$defs"), **headers})}
     definitions |= {"PageMessage": page, "ServerMessage": server}
     for definition in definitions.values():
         _require(definition, [n for n, field in definition.get("properties", {}).items() if "const" in field])

@@ -31,6 +31,8 @@ class Hello(Message):
     page: int
     scene: str
     """Another one where another scene or file is opened in the place of this one."""
+    field: str
+    """Names what the scene holds: a page that has loaded the field of this name need not load it again."""
     name: str
     splats: bool
     """True where the field is of splats, which can be downloaded."""
@@ -217,4 +219,23 @@ class PictureHeader(Message):
     depth_scale: float
     render_ms: float
     """Time in the renderer, map and occupancy included."""
+    encode_ms: float
+
+
+class EditsHeader(Message):
+    """Heads a binary message to a page that draws itself, as a PictureHeader does; a file of edits follows.
+
+    The file is one of `cagefield.formats.page_edits`, without what was sent before; it is empty where the
+    edits cannot be drawn by a page, and `why` says why. The page answers `presented` when it shows them.
+    """
+
+    type: Literal["edits"] = "edits"
+    picture: int
+    drag: int
+    seq: int
+    revision: int
+    final: bool
+    """True for the edits' own lattices, false for those of a drag."""
+    why: str | None
+    map_ms: float
     encode_ms: float

@@ -15,16 +15,26 @@ from cagefield.fields.splat import SplatField
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
-from cagefield.server.protocol.common import Level
+from cagefield.server.protocol.common import DrawnHere, Level
 from cagefield.server.protocol.conversion import state_of
 from cagefield.server.protocol.message_queues import SendQueue
 from cagefield.server.render_queue.background import BackgroundWork
+from cagefield.server.render_queue.binary_messages import edits_message, picture_message
 from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
 from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp
-from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import spread
 from cagefield.server.render_worker.pictures import Display
-from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Task, values_of
+from cagefield.server.render_worker.tasks import (
+    EditsDone,
+    Failed,
+    PageEditsTask,
+    PictureDone,
+    PictureTask,
+    Shown,
+    Task,
+    values_of,
+)
 
 
 @dataclass
@@ -37,6 +47,13 @@ class Page:
     display: Display = field(default_factory=Display)
     drag: int = 0
     seq: int = 0
+    has: tuple[str, ...] = ()
+    """Keys of what the page has of edits that it draws itself."""
+
+    @property
+    def stamp(self) -> tuple[int, int]:
+        """Its drag that goes on and the newest of that, 0, 0 where none does."""
+        return (self.drag, self.seq) if self.drag else (0, 0)
 
     def notice(self, level: Level, text: str) -> None:
         """A line for this page's user."""
@@ -113,6 +130,13 @@ class Coordinator:
         self.dispatcher.scheduler.camera(
             page.number, seq, camera.width, camera.height, moving, time.monotonic()
         )
+        self.pump()
+
+    def drawing(self, page: Page, here: DrawnHere) -> None:
+        """A page draws pictures itself, or no more."""
+        if here == "nothing":
+            page.has = ()
+        self.dispatcher.scheduler.drawing(page.number, here, time.monotonic())
         self.pump()
 
     def presented(self, page: Page, picture: int) -> None:
@@ -203,8 +227,13 @@ class Coordinator:
             request.exact,
             generation,
         )
-        drag, seq = (page.drag, page.seq) if page.drag else (0, 0)
-        return task, Stamp(self._shown_revision, drag, seq)
+        return task, Stamp(self._shown_revision, *page.stamp)
+
+    def edits_task(self, request: EditsRequest, generation: int) -> tuple[PageEditsTask, Stamp]:
+        """The task of edits that a page draws itself."""
+        page = self.pages[request.page]
+        task = PageEditsTask(request.number, self._shown, request.exact, page.has, generation)
+        return task, Stamp(self._shown_revision, *page.stamp)
 
     def differing(self, page: int, one: int, another: int) -> Rect | None:
         """Where two revisions differ in a page's picture; None for nowhere."""
@@ -222,7 +251,14 @@ class Coordinator:
         """A picture for a page."""
         page = self.pages.get(request.page)
         if page is not None:
-            page.send_queue.put_picture(_packed(request, stamp, done))
+            page.send_queue.put_picture(picture_message(request, stamp, done))
+
+    def deliver_edits(self, request: EditsRequest, stamp: Stamp, done: EditsDone | Failed) -> None:
+        """Edits for a page that draws them itself, or why it cannot."""
+        page = self.pages.get(request.page)
+        if page is not None:
+            page.has = done.keys if isinstance(done, EditsDone) else ()
+            page.send_queue.put_picture(edits_message(request, stamp, done))
 
     def background_task(self) -> BackgroundTask | None:
         """What may be done now that no page waits for anything."""
@@ -264,35 +300,3 @@ class Coordinator:
 
     def _what_is_shown(self) -> Shown:
         return Shown(values_of(self.session.drawn()), self.session.shown.preserve_opacity)
-
-
-def _packed(request: Request, stamp: Stamp, done: PictureDone) -> bytes:
-    """The binary message of a picture."""
-    region = request.region
-    header = server_messages.PictureHeader(
-        picture=request.number,
-        camera=request.camera,
-        drag=stamp.drag,
-        seq=stamp.seq,
-        revision=stamp.revision,
-        view=request.display.view,
-        before=request.display.before,
-        split=request.display.split,
-        x=region.x,
-        y=region.y,
-        width=region.width,
-        height=region.height,
-        full_width=region.full_width,
-        full_height=region.full_height,
-        final=request.final,
-        format=done.format,
-        picture_bytes=len(done.picture),
-        depth_bytes=len(done.depth),
-        depth_width=done.depth_size[0],
-        depth_height=done.depth_size[1],
-        depth_scale=done.depth_scale,
-        render_ms=1e3 * done.render_seconds,
-        encode_ms=1e3 * done.encode_seconds,
-    )
-    text = header.model_dump_json().encode()
-    return len(text).to_bytes(4, "little") + text + done.picture + done.depth

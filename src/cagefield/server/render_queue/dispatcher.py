@@ -17,12 +17,14 @@ from typing import Any, Protocol
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol.common import Level
 from cagefield.server.render_queue.damage import Rect
-from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_worker.process import Worker
 from cagefield.server.render_worker.tasks import (
     Answered,
+    EditsDone,
     Failed,
+    PageEditsTask,
     PictureDone,
     PictureTask,
     Ready,
@@ -62,11 +64,17 @@ class TaskSource(Protocol):
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         """The task of a picture that the scheduler wants."""
 
+    def edits_task(self, request: EditsRequest, generation: int) -> tuple[PageEditsTask, Stamp]:
+        """The task of edits that a page draws itself."""
+
     def differing(self, page: int, one: int, another: int) -> Rect | None:
         """Where two revisions differ in a page's picture; None for nowhere."""
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture is there."""
+
+    def deliver_edits(self, request: EditsRequest, stamp: Stamp, done: EditsDone | Failed) -> None:
+        """Edits are there, or cannot be drawn by a page."""
 
     def notice(self, level: Level, text: str) -> None:
         """A line for the users."""
@@ -78,7 +86,7 @@ class TaskSource(Protocol):
 @dataclass
 class _Running:
     task: Task
-    request: Request | None = None
+    request: Request | EditsRequest | None = None
     stamp: Stamp | None = None
     done: Callable[[Result], None] | None = None
 
@@ -157,6 +165,9 @@ class Dispatcher:
         if self._queue:
             return self._queue.popleft()
         request = self.scheduler.next(now)
+        if isinstance(request, EditsRequest):
+            edits, stamp = self._source.edits_task(request, self.scheduler.generation)
+            return _Running(edits, request, stamp)
         if request is not None:
             task, stamp = self._source.picture_task(request, self.scheduler.generation)
             return _Running(task, request, stamp)
@@ -193,19 +204,27 @@ class Dispatcher:
     def _finish(self, running: _Running, result: Result) -> None:
         if running.done is not None:
             running.done(result)
-        if running.request is None or running.stamp is None:
+        request = running.request
+        if request is None or running.stamp is None:
+            return
+        if isinstance(request, EditsRequest):
+            if isinstance(result, (EditsDone, Failed)):
+                self.scheduler.sent(request)
+                self._source.deliver_edits(request, running.stamp, result)
+            else:
+                self.scheduler.abandoned(request, again=True)
             return
         if isinstance(result, PictureDone):
-            region = running.request.region
+            region = request.region
             self.scheduler.finished(
-                running.request,
+                request,
                 region.width * region.height,
                 result.render_seconds + result.encode_seconds,
                 result.map_seconds,
             )
-            self._source.deliver(running.request, running.stamp, result)
+            self._source.deliver(request, running.stamp, result)
             return
-        self.scheduler.abandoned(running.request, again=isinstance(result, Stopped))
+        self.scheduler.abandoned(request, again=isinstance(result, Stopped))
         if isinstance(result, Failed):
             self._source.notice("error", result.text)
 

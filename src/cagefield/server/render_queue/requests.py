@@ -1,4 +1,4 @@
-"""Pictures as the scheduler asks for them."""
+"""Pictures, and edits for pages that draw themselves, as the scheduler asks for them."""
 
 from __future__ import annotations
 
@@ -24,3 +24,18 @@ class Request:
     exact: bool
     final: bool
     complete: bool = True
+
+
+@dataclass(frozen=True)
+class EditsRequest:
+    """Edits for a page that draws them itself: `exact` with their own lattices."""
+
+    number: int
+    page: int
+    revision: int
+    exact: bool
+
+    @property
+    def moving(self) -> bool:
+        """Whether they are those of a drag."""
+        return not self.exact

@@ -7,6 +7,7 @@ no web and no renderer: it is told what happens and when, and asked for the next
   anything changes.
 - Where the camera is the one of the last whole picture, only the part is rendered that the edits change.
 - A page is owed a picture only while none of its pictures is on its way; at rest, fewer than two.
+- A page that draws itself is owed the edits instead, the newest of a drag, and no pictures of what moves.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import (
     WHOLE,
     Differing,
@@ -24,7 +26,7 @@ from cagefield.server.render_queue.damage import (
     tiles,
     union,
 )
-from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_worker.pictures import Display, Region
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
@@ -76,6 +78,10 @@ class _Page:
     showing: Showing = field(default_factory=Showing)
     tiles_exact: bool = False
     served: float = -math.inf
+    draws: DrawnHere = "nothing"
+    """Which pictures the page draws itself."""
+    edits: tuple[int, bool] | None = None
+    """The revision, and whether exact, of the edits that the page was sent last."""
 
 
 class Scheduler:
@@ -94,7 +100,7 @@ class Scheduler:
         self._overhead = 0.0
         self._dragging = False
         self._revision = 0
-        self._running: tuple[Request, int] | None = None
+        self._running: tuple[Request | EditsRequest, int] | None = None
         self.generation = 0
         """Grows when a tile that is being rendered is no longer wanted."""
 
@@ -137,11 +143,23 @@ class Scheduler:
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
             was_shown = same and p.shown_version == p.version
+            if p.draws != "nothing" and not same:
+                p.showing.lost()
             self._changed(page, now)
             if let_go:
                 p.changed = -math.inf
                 if was_shown or p.showing.exact:
                     p.shown_version = p.version
+
+    def drawing(self, page: int, here: DrawnHere, now: float) -> None:
+        """A page draws pictures itself, or no more; of one that begins nothing is known that it has."""
+        p = self._pages[page]
+        if p.draws == "nothing" or here == "nothing":
+            p.edits = None
+        if here != p.draws:
+            p.draws = here
+            p.showing.lost()
+            self._changed(page, now)
 
     def presented(self, page: int, picture: int) -> None:
         """A page has shown a picture, and all that were sent before it."""
@@ -176,10 +194,19 @@ class Scheduler:
                 exact=request.exact,
             )
 
-    def abandoned(self, request: Request, again: bool) -> None:
+    def sent(self, request: EditsRequest) -> None:
+        """The edits were made and sent."""
+        self._running = None
+        page = self._pages.get(request.page)
+        if page is not None:
+            page.unshown.append(request.number)
+
+    def abandoned(self, request: Request | EditsRequest, again: bool) -> None:
         """The picture was not rendered: stopped or lost, and is wanted `again`, or not possible at all."""
         running, self._running = self._running, None
         page = self._pages.get(request.page)
+        if again and page is not None and isinstance(request, EditsRequest):
+            page.edits = None
         if again and page is not None and running is not None and page.version == running[1]:
             page.tiles, page.shown_version = None, -1
 
@@ -191,17 +218,17 @@ class Scheduler:
 
     # ---- what is next ----
 
-    def next(self, now: float) -> Request | None:
-        """The picture to render now; None where nothing is owed, or one is being rendered."""
+    def next(self, now: float) -> Request | EditsRequest | None:
+        """The picture to render, or edits to make, now; None where nothing is owed, or one is under way."""
         if self._running is not None:
             return None
         waiting = sorted(
-            (not self._owes_moving(p), p.served, page)
+            (not (self._owes_moving(p) or self._owes_edits(p)), p.served, page)
             for page, p in self._pages.items()
             if p.camera >= 0 and self._has_room(p)
         )
         for _, _, page in waiting:
-            request = self._request(page, now)
+            request = self._edits(page) if self._owes_edits(self._pages[page]) else self._request(page, now)
             if request is not None:
                 self._pages[page].served = now
                 self._running = (request, self._pages[page].version)
@@ -238,7 +265,8 @@ class Scheduler:
         What can wait, background jobs too, stands still while anybody drags.
         """
         return (self._running is None and not self._dragging) and all(
-            p.camera < 0 or (not p.moving and (p.tiles == [] or not self._has_room(p)))
+            p.camera < 0
+            or (not p.moving and ((p.tiles == [] and not self._owes_edits(p)) or not self._has_room(p)))
             for p in self._pages.values()
         )
 
@@ -258,9 +286,24 @@ class Scheduler:
     def _owes_moving(self, p: _Page) -> bool:
         return p.shown_version != p.version
 
+    def _owes_edits(self, p: _Page) -> bool:
+        return p.draws != "nothing" and p.edits != (self._revision, not self._dragging)
+
+    def _edits(self, page: int) -> EditsRequest:
+        p = self._pages[page]
+        p.edits = self._revision, not self._dragging
+        self._numbers += 1
+        return EditsRequest(self._numbers, page, self._revision, not self._dragging)
+
     def _request(self, page: int, now: float) -> Request | None:
         p = self._pages[page]
-        if self._owes_moving(p):
+        if p.draws != "nothing":
+            p.shown_version = p.version
+            if p.draws == "all":
+                p.tiles = []
+            if p.draws == "all" or p.moving or self._dragging:
+                return None
+        elif self._owes_moving(p):
             rect = p.showing.wanting(page, (p.camera, p.display), self._revision, self._differing)
             scale = self._scale(p, rect)
             p.shown_version = p.version

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +17,9 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
 from cagefield.scene import Scene
-from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
+from cagefield.server.render_worker.edited_renderers import EditedRenderers
 from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.tasks import (
     EditValues,
@@ -34,9 +34,6 @@ from cagefield.typing import Float32
 if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer
 
-QUICK_LATTICE = 32
-"""Most lattice nodes along an axis while a cage is dragged."""
-
 LONGEST_STEP = 1.5
 """Most voxels between samples while something moves; no more than a pixel shows, either."""
 
@@ -50,14 +47,6 @@ MOST_DEPTHS = 120_000
 """Depths sent with a picture, at most."""
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """A renderer that is ready, and what it shows."""
-
-    shown: Shown
-    renderer: AnyRenderer
-
-
 class RendererCache:
     """Pictures of one field under any edits; renderers of the last edits are kept."""
 
@@ -67,9 +56,7 @@ class RendererCache:
         self._is_sampled = isinstance(scene.field, VoxelField)
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
-        self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
-        self.exact_renderers: list[_Kept] = []
-        self._quick: list[_Kept] = []
+        self.edited = EditedRenderers(self.plain, self._is_sampled)
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))
@@ -139,48 +126,12 @@ class RendererCache:
             )
             renderer.render(camera)
 
-    def page_field(self) -> bytes | None:
-        """The field as a page's GPU draws it; None for what pages cannot draw. Raises FieldError."""
-        from cagefield.formats.page_field import encode_page_field
-
-        field = self.scene.field
-        if not isinstance(field, VoxelField):
-            return None
-        return encode_page_field(field, step=self.plain.step, background=self.scene.background)
-
-    def page_edits(self, shown: Shown) -> bytes | None:
-        """The edits as a page's GPU evaluates them; None for what pages cannot draw. Raises EditError."""
-        from cagefield.formats.page_edits import encode_page_edits, for_pages
-        from cagefield.rendering.renderer import Renderer
-
-        if not isinstance(self.plain, Renderer):
-            return None
-        stack = for_pages(EditStack(self.edits(shown.edits)))
-        return encode_page_edits(self.plain.with_edits(stack, preserve_opacity=shown.preserve_opacity))
-
     def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
 
         `proceed` is called while it is made, and gives it up by raising.
         """
-        for kept in self.exact_renderers if exact else (*self.exact_renderers, *self._quick):
-            if kept.shown == shown:
-                return kept.renderer
-        edits = self.edits(shown.edits)
-        if not exact and self._is_sampled:
-            ready = {id(edit) for kept in self.exact_renderers for edit in kept.renderer.edits}
-            edits = [edit if id(edit) in ready else self._quickly(edit) for edit in edits]
-        # Occupancy under edits that both share is kept.
-        last = self.exact_renderers[-1:] if exact else (self._quick or self.exact_renderers[-1:])
-        renderer = (last[0].renderer if last else self.plain).with_edits(
-            EditStack(edits), preserve_opacity=shown.preserve_opacity, coarse=not exact, proceed=proceed
-        )
-        if exact:
-            # Two: what pages show, and what a job renders.
-            self.exact_renderers = [*self.exact_renderers[-1:], _Kept(shown, renderer)]
-        else:
-            self._quick = [_Kept(shown, renderer)]
-        return renderer
+        return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, exact, proceed)
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
         """The edits with these fields; those that were there before are the same objects."""
@@ -229,14 +180,6 @@ class RendererCache:
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
         return min(max(shown, least), LONGEST_STEP)
-
-    def _quickly(self, edit: Edit) -> Edit:
-        """The edit with a coarser lattice, kept as long as the edit is."""
-        if edit.adjustment != "continuous" or (edit.lattice or 512) <= QUICK_LATTICE:
-            return edit
-        if edit in self._coarse:
-            return self._coarse[edit]
-        return self._coarse.put(edit, edit.replace(lattice=QUICK_LATTICE))
 
 
 def _warm_splats(stage: WarmStage) -> None:

@@ -16,6 +16,7 @@ from cagefield.server.render_worker.cancellation import GivenUpError, giving_up
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
+from cagefield.server.render_worker.page_files import PageFiles
 from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
@@ -52,11 +53,14 @@ class TaskHandlers:
     def __init__(self, renderers: RendererCache) -> None:
         self._renderers = renderers
         self._files = JobFiles()
+        self._pages = PageFiles(renderers)
 
     def do(self, task: Task, abandoned: Abandoned) -> Result:
         """The task's result. Raises CagefieldError where it cannot be done."""
         if isinstance(task, PictureTask):
             return self._renderers.picture(task, lambda: abandoned(task.generation))
+        if isinstance(task, PageEditsTask):
+            return self._pages.edits(task, lambda: abandoned(task.generation))
         if isinstance(task, FrameTask):
             return self._frame(task, lambda: abandoned(task.generation))
         if isinstance(task, ErrorTask):
@@ -69,14 +73,7 @@ class TaskHandlers:
 
     def _answer(
         self,
-        task: StillTask
-        | SurfaceTask
-        | FitTask
-        | WarmTask
-        | GridTask
-        | EndJobTask
-        | PageFieldTask
-        | PageEditsTask,
+        task: StillTask | SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
     ) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
@@ -89,9 +86,7 @@ class TaskHandlers:
         if isinstance(task, EndJobTask):
             return self._files.end(task.job, task.keep)
         if isinstance(task, PageFieldTask):
-            return self._renderers.page_field()
-        if isinstance(task, PageEditsTask):
-            return self._renderers.page_edits(task.shown)
+            return self._pages.field()
         return grid_lines(Edit(**task.edit))
 
     def _error(self, task: ErrorTask, stop: Callable[[], bool]) -> Result:

@@ -136,17 +136,24 @@ class EndJobTask:
 
 @dataclass(frozen=True)
 class PageFieldTask:
-    """The field as a file that a page's GPU draws; None where pages cannot draw it."""
+    """The field as a file that a page's GPU draws."""
 
     number: int
 
 
 @dataclass(frozen=True)
 class PageEditsTask:
-    """Edits as a page's GPU evaluates them; None where pages cannot draw the field."""
+    """Edits as a page's GPU evaluates them, without what the page `has` (see `formats.page_edits`).
+
+    Abandoned once the shared generation is past `generation`.
+    """
 
     number: int
     shown: Shown
+    exact: bool
+    """Whether with the edits' own lattices; else with those of a drag."""
+    has: tuple[str, ...]
+    generation: int
 
 
 Task: TypeAlias = (
@@ -188,6 +195,17 @@ class PictureDone:
 
 
 @dataclass(frozen=True)
+class EditsDone:
+    """Edits as a file, and the keys of all that a page has that has read it."""
+
+    number: int
+    content: bytes
+    keys: tuple[str, ...]
+    map_seconds: float
+    encode_seconds: float
+
+
+@dataclass(frozen=True)
 class Stopped:
     """The task was abandoned."""
 
@@ -210,4 +228,4 @@ class Answered:
     value: Any = field(default=None)
 
 
-Result: TypeAlias = Ready | PictureDone | Stopped | Failed | Answered
+Result: TypeAlias = Ready | PictureDone | EditsDone | Stopped | Failed | Answered

@@ -19,7 +19,7 @@ from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
-from cagefield.server.render_worker.tasks import PageEditsTask, PageFieldTask, StillTask
+from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
 from cagefield.server.web.security import Guard
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
@@ -113,27 +113,19 @@ def application(
             return PlainTextResponse(str(error), 500)
         return _download(content, "screenshot.png", "image/png")
 
-    async def page_file(make: Callable[[int], PageFieldTask | PageEditsTask]) -> Response:
+    async def field(request: Request) -> Response:
+        coordinator, name = editor.coordinator, f'"{editor.hello.field}"'
+        headers = {"ETag": name}
+        if request.headers.get("if-none-match") == name:
+            return Response(status_code=304, headers=headers)
         try:
-            content = await editor.coordinator.ask(make)
+            content = await coordinator.ask(PageFieldTask)
         except CagefieldError as error:
             return PlainTextResponse(str(error), 409)
-        if content is None:
-            return PlainTextResponse("the server draws this scene: only voxel fields are drawn by pages", 404)
-        return Response(content, media_type="application/octet-stream")
-
-    async def field(_: Request) -> Response:
-        return await page_file(PageFieldTask)
-
-    async def page_edits(_: Request) -> Response:
-        shown, revision = editor.coordinator.shown(), editor.coordinator.session.revision
-        answer = await page_file(lambda number: PageEditsTask(number, shown))
-        answer.headers["X-Revision"] = str(revision)
-        return answer
+        return Response(content, media_type="application/octet-stream", headers=headers)
 
     routes = [
         Route("/field", field),
-        Route("/edits", page_edits),
         WebSocketRoute("/socket", socket),
         Route("/edits.yaml", edits),
         Route("/camera_path.json", camera_path),

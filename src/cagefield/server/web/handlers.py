@@ -80,6 +80,10 @@ class MessageHandlers:
     def _presented(self, message: client_messages.PresentedMessage) -> None:
         self._coordinator.presented(self._page, message.picture)
 
+    @_handles(client_messages.Drawing)
+    def _drawing(self, message: client_messages.Drawing) -> None:
+        self._coordinator.drawing(self._page, message.here)
+
     @_handles(client_messages.Ask)
     async def _ask(self, message: client_messages.Ask) -> None:
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import math
 import os
 import socket
@@ -16,9 +17,10 @@ from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
+from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
 from cagefield.scene import Scene
-from cagefield.scene_files import is_scene
+from cagefield.scene_files import FIELD, is_scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
@@ -67,6 +69,7 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
         version=cagefield.__version__,
         page=0,
         scene=path,
+        field=_field_name(path),
         name=name,
         splats=isinstance(scene.field, SplatField),
         bounds=(vec3(lower), vec3(upper)),
@@ -81,6 +84,14 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
         ),
         cameras=[pose.reshape(-1).tolist() for pose in poses],
     )
+
+
+def _field_name(path: str) -> str:
+    """A name for the content of a scene's field, another one once that is written anew."""
+    file = Path(path) / FIELD
+    state = file.stat() if file.is_file() else None
+    what = (path, *((state.st_mtime_ns, state.st_size) if state else ()), FIELD_VERSION)
+    return hashlib.blake2b(repr(what).encode(), digest_size=8).hexdigest()
 
 
 def _from_outside(scene: Scene) -> Camera:

@@ -1,0 +1,78 @@
+"""Fields and edits as files that pages draw with their own GPU. Lives in the rendering process."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from cagefield.edits import Edit
+from cagefield.errors import CagefieldError
+from cagefield.fields.voxel import VoxelField
+from cagefield.formats.page_edits import encode_changed_edits, for_page
+from cagefield.formats.page_field import encode_page_field
+from cagefield.formats.page_file import LEVEL, QUICK_LEVEL
+from cagefield.rendering.occupancy import Occupancy
+from cagefield.rendering.renderer import Renderer
+from cagefield.server.editor.identity_cache import IdentityCache
+from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
+from cagefield.server.render_worker.edited_renderers import EditedRenderers
+from cagefield.server.render_worker.renderer_cache import RendererCache
+from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Stopped
+
+KEPT_OCCUPANCIES = 6
+"""Occupancies of which pages may be sent the changed part, those that were sent last."""
+
+NOT_DRAWN = "only voxel fields are drawn by pages; the server draws this scene"
+
+
+class PageFiles:
+    """See the module. Makes the files of one scene; what pages have of the edits is not sent again."""
+
+    def __init__(self, renderers: RendererCache) -> None:
+        self._renderers = renderers
+        self._for_page: IdentityCache[Edit, Edit] = IdentityCache(64)
+        self._own = EditedRenderers(renderers.plain, True)
+        """Of stacks with an exact shell, which a page draws with a lattice."""
+        self._occupancies: dict[str, Occupancy] = {}
+
+    def field(self) -> bytes:
+        """The field's file. Raises CagefieldError for what pages cannot draw, and for an empty field."""
+        scene, plain = self._renderers.scene, self._renderers.plain
+        if not isinstance(scene.field, VoxelField) or not isinstance(plain, Renderer):
+            raise CagefieldError(NOT_DRAWN)
+        return encode_page_field(scene.field, step=plain.step, background=scene.background)
+
+    def edits(self, task: PageEditsTask, stop: Stop) -> EditsDone | Stopped:
+        """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
+        began = time.perf_counter()
+        edits = self._renderers.edits(task.shown.edits)
+        drawn = [self._prepared(edit) for edit in edits]
+        same = all(one is other for one, other in zip(edits, drawn, strict=True))
+        renderers = self._renderers.edited if same else self._own
+        try:
+            renderer = self._renderer(renderers, drawn, task, stop)
+        except GivenUpError:
+            return Stopped(task.number)
+        mapped = time.perf_counter()
+        level = LEVEL if task.exact and not task.has else QUICK_LEVEL
+        found = encode_changed_edits(renderer, task.has, self._occupancies, level)
+        assert found.occupancy is not None  # `encode_changed_edits` says which
+        self._occupancies.pop(found.keys[-1], None)
+        self._occupancies[found.keys[-1]] = found.occupancy
+        while len(self._occupancies) > KEPT_OCCUPANCIES:
+            del self._occupancies[next(iter(self._occupancies))]
+        return EditsDone(task.number, found.data, found.keys, mapped - began, time.perf_counter() - mapped)
+
+    def _renderer(
+        self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop
+    ) -> Renderer:
+        renderer = renderers.renderer(edits, task.shown.preserve_opacity, task.exact, giving_up(stop))
+        if not isinstance(renderer, Renderer):
+            raise CagefieldError(NOT_DRAWN)
+        return renderer
+
+    def _prepared(self, edit: Edit) -> Edit:
+        """The edit as a page draws it, the same object each time."""
+        if edit in self._for_page:
+            return self._for_page[edit]
+        return self._for_page.put(edit, for_page(edit))
