@@ -35,8 +35,8 @@ DRAWN_BY: str | None = None
 `pytest --page-renderer`."""
 
 USUAL = ("ReadPixels", "CONTEXT_LOST", "ERR_CONNECTION_REFUSED", "status of 400")
-"""Chromium's own words on the console where pictures are read back, where a test takes the GPU's context or the
-server away, and where the server refuses a file."""
+"""Chromium's own words on the console where pictures are read back, where a test takes the GPU's context or
+the server away, and where the server refuses a file."""
 
 Point = tuple[float, float]
 
