@@ -6,10 +6,26 @@ from pathlib import Path
 
 import pytest
 
+import editor_page
 from cagefield import Scene, load_dataset
 from cagefield.datasets.procedural import make_scene
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--page-renderer`: tests of the editor open its page with `?render=page`."""
+    parser.addoption(
+        "--page-renderer",
+        action="store_true",
+        help="the editor's page draws with its own GPU in all tests of it",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tells the pages who draws."""
+    if config.getoption("--page-renderer"):
+        editor_page.DRAWN_BY = "page"
 
 
 @pytest.fixture(scope="session")

@@ -30,7 +30,24 @@ FLAGS = [
 PATIENCE = 120.0
 """Seconds until what does not come is given up: the first pictures wait for kernels to compile."""
 
+DRAWN_BY: str | None = None
+"""Who draws pages that are opened without saying so: the server where the page has no GPU, `page` with
+`pytest --page-renderer`."""
+
+USUAL = ("ReadPixels", "CONTEXT_LOST", "ERR_CONNECTION_REFUSED", "status of 400")
+"""Chromium's own words on the console where pictures are read back, where a test takes the GPU's context or
+the server away, and where the server refuses a file."""
+
 Point = tuple[float, float]
+
+
+def asking(link: str, render: str) -> str:
+    """The editor's link that says who draws."""
+    return f"{link}{'&' if '?' in link else '?'}render={render}"
+
+
+def _asked(link: str) -> str:
+    return link if DRAWN_BY is None or "render=" in link else asking(link, DRAWN_BY)
 
 
 @dataclass
@@ -116,7 +133,7 @@ class EditorPage:
     def tab(self, link: str) -> EditorPage:
         """One more page of the same browser."""
         page = self.page.context.new_page()
-        page.goto(link)
+        page.goto(_asked(link))
         return EditorPage(page)
 
     def press(self, *keys: str) -> None:
@@ -187,8 +204,10 @@ class EditorPage:
 
 
 @contextlib.contextmanager
-def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[EditorPage]:
-    """A page of the editor; skips where there is no Chromium. The page's own errors fail the test."""
+def editor_page(
+    link: str, width: int = 640, height: int = 460, *, touch: bool = False, usual: tuple[str, ...] = USUAL
+) -> Iterator[EditorPage]:
+    """A page of the editor; skips without Chromium. Errors and words on the console fail the test."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no chromium on this machine")
@@ -196,15 +215,20 @@ def editor_page(link: str, width: int = 640, height: int = 460) -> Iterator[Edit
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         context = browser.new_context(
-            viewport={"width": width, "height": height}, permissions=["clipboard-read", "clipboard-write"]
+            viewport={"width": width, "height": height},
+            permissions=["clipboard-read", "clipboard-write"],
+            has_touch=touch,
+            is_mobile=touch,
         )
         page = context.new_page()
-        page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("dialog", lambda dialog: dialog.accept())
-        page.goto(link)
+        context.on("weberror", lambda error: complaints.append(str(error.error)))
+        context.on("console", lambda said: complaints.append(said.text))
+        page.goto(_asked(link))
         yield EditorPage(page)
         browser.close()
-    assert complaints == []
+    left = [said for said in complaints if not any(word in said for word in usual)]
+    assert left == [], left
 
 
 _SUMMARY = (

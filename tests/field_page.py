@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import cagefield
 from cagefield.cameras import Camera
-from editor_page import CHROMIUM, FLAGS
+from editor_page import CHROMIUM, FLAGS, USUAL
 
 VIEWER = Path(cagefield.__file__).parent / "exporting" / "viewer" / "viewer.js"
 
@@ -104,9 +104,7 @@ def field_page() -> Iterator[FieldPage]:
         page.evaluate(_START)
         yield FieldPage(page)
         browser.close()
-    # Chromium's own words where a test reads pictures back, and takes the context away.
-    usual = ("ReadPixels", "CONTEXT_LOST")
-    assert [said for said in complaints if not any(word in said for word in usual)] == []
+    assert [said for said in complaints if not any(word in said for word in USUAL)] == []
 
 
 def _array(text: str, kind: Any) -> NDArray[Any]:

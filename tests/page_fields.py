@@ -1,11 +1,20 @@
-"""Fields for tests of the page's renderer: lumps of random density and colour."""
+"""Fields and scenes for tests of the page's renderer: lumps of random density and colour."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
 
+from cagefield.cages import Cage
+from cagefield.cameras import turntable
+from cagefield.edits import Edit, EditStack
 from cagefield.fields.voxel import VoxelField
+from cagefield.scene import Scene
+
+SIZE = 120
+"""Of the scene's pictures."""
+
+MOVE = Edit(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9)), adjustment="discrete").translate((0.0, -0.5, 0.8))
 
 
 def lumps(degree: int, contracted: bool, resolution: tuple[int, int, int] = (41, 36, 33)) -> VoxelField:
@@ -26,4 +35,15 @@ def lumps(degree: int, contracted: bool, resolution: tuple[int, int, int] = (41,
         density=density[stored].astype(np.float32),
         sh=sh[stored].astype(np.float32),
         contracted=contracted,
+    )
+
+
+def lumps_scene() -> Scene:
+    """Lumps with one moved, grey behind them."""
+    cameras = turntable((0, 0, 0), 3.2, 3, elevation=0.4, width=SIZE, height=SIZE, fov_x=0.8)
+    return Scene(
+        lumps(1, False),
+        EditStack([MOVE]),
+        {"train": cameras[1:], "test": cameras[1:2]},
+        background=(0.5, 0.5, 0.5),
     )

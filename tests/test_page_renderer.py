@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from editor_cone import EDITS, cone
-from editor_page import EditorPage, editor_page
+from editor_page import USUAL, EditorPage, Point, asking, editor_page
 from editor_server import EditorServer, editor_server
+from editor_server import page as socket_page
+from hand import Hand
 from splat_scenes import splat_scene
 
 HALF = """\
@@ -54,11 +57,6 @@ def server(scene: Path) -> Iterator[EditorServer]:
         yield running
 
 
-def asking(server: EditorServer, render: str) -> str:
-    """The editor's link that says who draws."""
-    return f"{server.link}{'&' if '?' in server.link else '?'}render={render}"
-
-
 def shot(page: EditorPage) -> NDArray[np.float64]:
     """The picture on the screen as it is, the mouse where it is."""
     page.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
@@ -89,7 +87,7 @@ def db(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
 
 
 def test_the_page_draws_the_view_that_is_turned(server: EditorServer, scene: Path) -> None:
-    with editor_page(asking(server, "page"), 500, 420) as page:
+    with editor_page(asking(server.link, "page"), 500, 420) as page:
         page.ready()
         page.press("n", "o")  # room for the picture, and no cages on it
         page.until("cagefield.page.why === null && cagefield.page.draws")
@@ -128,9 +126,9 @@ def pair(server: EditorServer) -> Iterator[tuple[EditorPage, EditorPage]]:
             "window.WebSocket = class extends Plain {"
             " constructor(...given) { super(...given); sockets.push(this); } };"
         )
-        first.page.goto(asking(server, "all"))
+        first.page.goto(asking(server.link, "all"))
         first.ready()
-        own = f"{server.link}?render=server"
+        own = asking(server.link, "server")
         second = first.tab(own)
         second.ready()
         for page in (second, first):
@@ -236,7 +234,7 @@ def test_edits_that_a_page_cannot_draw_are_the_servers_and_the_page_says_why(
 
 def test_software_and_addresses_leave_it_to_the_server(server: EditorServer) -> None:
     for render, why in (("best", "no GPU"), ("server", "address")):
-        with editor_page(asking(server, render), 500, 420) as page:
+        with editor_page(asking(server.link, render), 500, 420) as page:
             page.ready()
             assert why in page.page.evaluate("cagefield.page.why")
             with page.held((120.0, 330.0), (60.0, 5.0)):
@@ -245,9 +243,66 @@ def test_software_and_addresses_leave_it_to_the_server(server: EditorServer) -> 
             assert page.page.evaluate("cagefield.page.drawn") == 0
 
 
+def test_fingers_turn_shift_and_pinch(server: EditorServer) -> None:
+    with editor_page(asking(server.link, "page"), 500, 420, touch=True) as page:
+        page.ready()
+        page.press("n", "o")
+        page.until("cagefield.page.draws")
+        page.settle()
+        hand = Hand(page.page)
+
+        def moved(first: list[Point], last: list[Point]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            """Where the camera is after fingers moved, and where it looks; the page has drawn it."""
+            drawn = page.page.evaluate("cagefield.page.drawn")
+            hand.move(first, last)
+            page.settle()
+            assert page.page.evaluate("cagefield.page.drawn") > drawn
+            c2w = np.array(page.page.evaluate("cagefield.camera.c2w")).reshape(4, 4)
+            return c2w[:3, 3], -c2w[:3, 2]
+
+        eye, ahead = moved([(200, 330)], [(203, 330)])
+        turned, other = moved([(200, 330)], [(280, 330)])
+        assert np.dot(ahead, other) < 0.95 and not np.allclose(eye, turned)
+        shifted, same = moved([(150, 330), (250, 330)], [(150, 280), (250, 280)])
+        np.testing.assert_allclose(same, other, atol=1e-3)
+        assert abs(np.dot(shifted - turned, other)) < 0.1 * np.linalg.norm(shifted - turned)
+        near, same = moved([(150, 330), (250, 330)], [(100, 330), (300, 330)])
+        np.testing.assert_allclose(same, other, atol=1e-3)
+        assert np.dot(near - shifted, other) > 0.9 * np.linalg.norm(near - shifted) > 0.1
+
+
+def test_pages_that_are_closed_leave_nothing_in_the_server(server: EditorServer) -> None:
+    def held() -> tuple[int, int]:
+        """Files and sockets, and threads, of the server and its rendering process."""
+        pids = [server.process.pid, *server.children()]
+        folders = [Path(f"/proc/{pid}") for pid in pids]
+        return sum(len(list((folder / "fd").iterdir())) for folder in folders), sum(
+            len(list((folder / "task").iterdir())) for folder in folders
+        )
+
+    def open_and_close() -> None:
+        with socket_page(server) as (client, hello):
+            client.look_from(hello)
+            client.final()
+
+    open_and_close()
+    before = held()
+    for _ in range(4):
+        open_and_close()
+    end = time.monotonic() + 20.0
+    # Sockets close a moment after the page has gone.
+    while held() > before and time.monotonic() < end:
+        time.sleep(0.05)
+    assert held() <= before
+
+
 def test_splats_are_drawn_by_the_server(tmp_path: Path) -> None:
     scene = tmp_path / "splats"
     splat_scene().save(scene)
-    with editor_server(scene) as server, editor_page(asking(server, "page"), 500, 420) as page:
+    usual = (*USUAL, "status of 404")
+    with (
+        editor_server(scene) as server,
+        editor_page(asking(server.link, "page"), 500, 420, usual=usual) as page,
+    ):
         page.ready()
         page.until("cagefield.page.why.includes('only voxel fields')")
