@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cagefield.atomic_files import recover_folder
+from cagefield.atomic_files import check_writable, recover_folder
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
@@ -31,19 +31,22 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
 
     Raises:
         SceneError: something is there that may not be replaced.
+        OSError: nothing can be written there.
     """
     target = Path(path).resolve()
     recover(target)
-    if not target.exists():
-        return target
-    if not target.is_dir():
+    if target.exists() and not target.is_dir():
         raise SceneError(f"{path} is a file; give a new folder for the scene")
-    if not any(target.iterdir()):
-        return target
-    if not is_scene(target):
-        raise SceneError(f"{path} is a folder that holds no scene and is left as it is; give a new folder")
-    if not overwrite:
-        raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
+    if target.exists() and any(target.iterdir()):
+        if not is_scene(target):
+            raise SceneError(
+                f"{path} is a folder that holds no scene and is left as it is; give a new folder"
+            )
+        if not overwrite:
+            raise SceneError(
+                f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)"
+            )
+    check_writable(target)
     return target
 
 

@@ -113,6 +113,7 @@ class SceneStore:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         save_edits(document.stack, self.path / _EDITS)
+        self._written = self._fingerprint()  # ours, should the rest not be possible
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_file(self.path / CAMERA_PATH) as draft:
                 draft.write_text(camera_path, encoding="utf-8")
@@ -139,7 +140,8 @@ class SceneStore:
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
         if document.keys:
-            (target / CAMERA_PATH).write_text(camera_path, encoding="utf-8")
+            with replaced_file(target / CAMERA_PATH) as draft:
+                draft.write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path, self.source = target.resolve(), None
