@@ -138,7 +138,6 @@ def test_a_place_that_cannot_be_written_is_noticed_at_the_start(
         ("train", tmp_path, "-o", tmp_path / "new"),
         ("demo", "-o", tmp_path / "new"),
         ("import", tmp_path / "x.ply", "-o", tmp_path / "new"),
-        ("bake", scene, "-o", tmp_path / "new"),
         ("edit", scene, tmp_path / "e.yaml", "-o", tmp_path / "new"),
         ("render", scene, "-o", tmp_path / "new.mp4"),
         ("render", scene, "-o", tmp_path / "new"),
