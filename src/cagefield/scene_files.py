@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from cagefield import json_text
 from cagefield.atomic_files import check_writable, recover_folder
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, SceneError
@@ -66,7 +67,7 @@ def recover(folder: Path) -> None:
 def is_scene(path: Path | str) -> bool:
     """True where `path` is a folder with the manifest of a scene, of any version."""
     try:
-        document = json.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
+        document = json_text.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("format") == FORMAT
@@ -133,7 +134,7 @@ def write_json(document: Mapping[str, object], path: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
     if not isinstance(document, dict):

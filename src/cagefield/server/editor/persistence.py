@@ -13,6 +13,7 @@ import hashlib
 import json
 from pathlib import Path
 
+from cagefield import json_text
 from cagefield.atomic_files import replaced_file
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.edits.files import save_edits
@@ -60,7 +61,7 @@ class SceneStore:
     def recovered(self) -> Document | None:
         """What an editor that ended without saving left behind; None where that is nothing new."""
         try:
-            content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
+            content = json_text.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
