@@ -7,10 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cagefield import Scene, datasets
+from cagefield.datasets.procedural import make_scene
+from cagefield.formats.splat_files import write_splats
 from cagefield.rendering.images import video_writer
+from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.loop import run_to_end
 from commands import given_up, printed
 from full_disks import files_up_to, fill, small_disk
-from scenes import ball_scene, files_of
+from scenes import ball_field, ball_scene, files_of
+from splat_scenes import ball_of_splats
 
 
 @pytest.fixture
@@ -75,3 +81,138 @@ def test_pictures_that_do_not_all_fit_leave_the_old_ones(
         and set(after) == set(before)
         and after["0000.png"] != before["0000.png"]
     )
+
+
+EDITS = """edits:
+  - adjustment: discrete
+    inner: {center: [0, 0, 0], size: 1}
+    operations: [{translate: [1, 0, 0]}]
+"""
+
+
+@pytest.mark.parametrize("limit", [20, 2_000])
+def test_a_scene_that_does_not_fit_leaves_the_old_one(
+    tmp_path: Path, scene: Path, capsys: pytest.CaptureFixture[str], limit: int
+) -> None:
+    """Whether the first file fails, which safetensors writes, or one after it."""
+    file = tmp_path / "e.yaml"
+    file.write_text(EDITS)
+    before = files_of(tmp_path)
+    for arguments in (("-o", tmp_path / "new"), ("--overwrite",)):
+        with files_up_to(limit):
+            line = given_up(capsys, "edit", scene, file, *arguments)
+        assert "File too large" in line and "/." not in line
+        assert files_of(tmp_path) == before
+
+
+def test_a_field_that_does_not_fit_is_an_error_of_the_system(tmp_path: Path) -> None:
+    file = tmp_path / "field.safetensors"
+    file.write_bytes(b"old")
+    with files_up_to(1_000), pytest.raises(OSError, match="File too large") as caught:
+        ball_field().save(file)
+    assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
+
+
+def test_import_and_demo_on_a_full_disk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    splats = tmp_path / "ball.ply"
+    write_splats(ball_of_splats(), splats)
+    for limit, arguments in (
+        (2_000, ("import", splats, "-o", tmp_path / "scene")),
+        (700, ("demo", "-o", tmp_path / "demo", "--views", "2", "--size", "32")),
+    ):
+        with files_up_to(limit):
+            line = given_up(capsys, *arguments)
+        assert "File too large" in line and "/." not in line
+        assert list(tmp_path.iterdir()) == [splats]
+
+
+def test_a_place_that_cannot_be_written_is_noticed_at_the_start(
+    tmp_path: Path, scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(datasets, "load_dataset", lambda *_, **__: pytest.fail("began"))
+    monkeypatch.setattr(Scene, "save", lambda *_, **__: pytest.fail("began"))
+    monkeypatch.setattr(Scene, "render", lambda *_, **__: pytest.fail("began"))
+    (tmp_path / "e.yaml").write_text(EDITS)
+    before = files_of(tmp_path)
+    for arguments in (
+        ("train", tmp_path, "-o", tmp_path / "new"),
+        ("demo", "-o", tmp_path / "new"),
+        ("import", tmp_path / "x.ply", "-o", tmp_path / "new"),
+        ("edit", scene, tmp_path / "e.yaml", "-o", tmp_path / "new"),
+        ("render", scene, "-o", tmp_path / "new.mp4"),
+        ("render", scene, "-o", tmp_path / "new"),
+        ("export", scene, "-o", tmp_path / "new.ply"),
+    ):
+        with files_up_to(0):
+            line = given_up(capsys, *arguments)
+        assert f"{arguments[arguments.index('-o') + 1]}: File too large" in line
+    assert files_of(tmp_path) == before
+
+
+class Steps:
+    """A run of so many steps of a minute each, whose state is written or not."""
+
+    def __init__(self, count: int) -> None:
+        self.step, self.count = 0, count
+
+    @property
+    def seconds(self) -> float:
+        return 61.0 * self.step
+
+    @property
+    def done(self) -> float:
+        return self.step / self.count
+
+    def advance(self) -> None:
+        self.step += 1
+
+    def progress(self) -> None:
+        return None
+
+    def store(self, path: Path) -> None:
+        write_checkpoint(path, "steps", {"step": self.step}, {"noise": noise(self.step)})
+
+    def restore(self, path: Path) -> None:
+        self.step = read_checkpoint(path, "steps")[0]["step"]
+
+
+def test_a_training_goes_on_where_its_checkpoint_does_not_fit(tmp_path: Path) -> None:
+    file = tmp_path / "a.training"
+    options = {"checkpoint": file, "on_progress": None}
+    run = Steps(2)
+    with files_up_to(1_000), pytest.warns(UserWarning, match="there is none to resume from, and training"):
+        assert run_to_end(run, resume=False, **options)
+    assert run.step == 2 and list(tmp_path.iterdir()) == []
+    run_to_end(Steps(2), resume=False, **options)
+    before = file.read_bytes()
+    run = Steps(5)
+    with files_up_to(1_000), pytest.warns(UserWarning, match=r"File too large\); the last one, of \d+ s ago"):
+        assert run_to_end(run, resume=True, **options)
+    assert run.step == 5 and file.read_bytes() == before and list(tmp_path.iterdir()) == [file]
+    again = Steps(5)
+    again.restore(file)
+    assert again.step == 2
+
+
+def test_a_scene_without_room_says_where_its_training_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photos = make_scene("chair", tmp_path / "chair", views=4, size=24, test_views=1)
+    out = tmp_path / "out"
+    arguments = ("train", photos, "-o", out, "--steps", "3", "--resolution", "16")
+    with files_up_to(10_000):
+        line = given_up(capsys, *arguments)
+    assert "File too large; the training is lost" in line
+    assert sorted(tmp_path.iterdir()) == [photos]
+    save = Scene.save
+
+    def full(scene: Scene, path: Path, overwrite: bool = False) -> None:
+        with files_up_to(10_000):
+            save(scene, path, overwrite)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Scene, "save", full)
+        line = given_up(capsys, *arguments)
+    assert f"the training is kept in {out}.training" in line
+    assert "scene written" in printed(capsys, *arguments, "--resume")
+    assert sorted(tmp_path.iterdir()) == [photos, out]

@@ -104,7 +104,7 @@ def test_failed_write_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.M
     def disk_full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cagefield.scene.save_edits", disk_full)
+    monkeypatch.setattr("cagefield.scene.dump_edits", disk_full)
     with pytest.raises(OSError, match="No space left"):
         ball_scene().save(path, overwrite=True)
     assert files_of(path) == before
@@ -123,6 +123,7 @@ def test_failed_swap_puts_the_old_scene_back(tmp_path: Path, monkeypatch: pytest
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", refuse_new)
+    monkeypatch.setattr("cagefield.atomic_files.exchanged", lambda one, other: False)
     with pytest.raises(PermissionError):
         Scene(ball_field(density=3.0)).save(path, overwrite=True)
     assert files_of(path) == before

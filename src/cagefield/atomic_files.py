@@ -15,6 +15,24 @@ from pathlib import Path
 from cagefield.exchange import exchanged
 
 
+def check_writable(path: Path, *, inside: bool = False) -> None:
+    """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
+
+    With `inside` it is a folder, and files may be made in it. Raises OSError, that names `path`, where not:
+    called before work whose result has to go there.
+    """
+    path = path.absolute()
+    folders = (path, *path.parents) if inside else path.parents
+    folder = next((each for each in folders if each.exists()), Path("/"))
+    with _naming(path, folder):
+        handle, name = tempfile.mkstemp(prefix=".cagefield-", dir=folder)
+        try:
+            os.write(handle, b"?")
+        finally:
+            os.close(handle)
+            os.unlink(name)
+
+
 @contextmanager
 def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
     """A temporary file beside `path`, same suffix: becomes `path` on success, is removed on failure.

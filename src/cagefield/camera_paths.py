@@ -5,7 +5,6 @@ Camera-to-world matrices are OpenGL [4,4] as everywhere (camera looks along -z, 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import TypeGuard
 import numpy as np
 import numpy.typing as npt
 
+from cagefield import json_text
 from cagefield.cameras import Camera, turntable
 from cagefield.errors import CameraError
 
@@ -218,7 +218,7 @@ def _perpendicular(direction: Floats) -> Floats:
 
 def _read_json(path: Path, what: str) -> dict[str, object]:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CameraError(f"{what} {path} cannot be read: {error.strerror}; check the path") from None
     except ValueError as error:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeGuard
 
+from cagefield import json_text
 from cagefield.errors import CameraError
 from cagefield.keyframes import Keyframe, stills
 
@@ -67,7 +68,7 @@ def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
         CameraError: the file holds no keyframes, or a value that makes none; names it and the cure.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CameraError(
             f"{path} cannot be read ({error.strerror}); make it readable or remove it"

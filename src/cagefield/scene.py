@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import secrets
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
@@ -27,10 +26,10 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
-from cagefield.edits.files import load_edits, save_edits
+from cagefield.edits.files import dump_edits, load_edits
 from cagefield.errors import SceneError
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf import NerfField
@@ -209,7 +208,7 @@ class Scene:
             self.field.save(draft / FIELD)
             if self.original is not None:
                 save_nerf(self.original, draft / ORIGINAL)
-            save_edits(self.edits, draft / EDITS)
+            (draft / EDITS).write_text(dump_edits(self.edits), encoding="utf-8")
             write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
                 draft / CAMERAS,
@@ -227,9 +226,8 @@ class Scene:
             manifest["gains"] = self.gains
         if not self.preserve_opacity:
             manifest["preserve_opacity"] = False
-        draft = folder / f".{MANIFEST}.{secrets.token_hex(4)}"
-        write_json(manifest, draft)
-        draft.replace(folder / MANIFEST)
+        with replaced_file(folder / MANIFEST, parents=False) as draft:
+            write_json(manifest, draft)
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack.

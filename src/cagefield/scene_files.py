@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from cagefield.atomic_files import recover_folder
+from cagefield import json_text
+from cagefield.atomic_files import check_writable, recover_folder
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
@@ -31,19 +32,22 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
 
     Raises:
         SceneError: something is there that may not be replaced.
+        OSError: nothing can be written there.
     """
     target = Path(path).resolve()
     recover(target)
-    if not target.exists():
-        return target
-    if not target.is_dir():
+    if target.exists() and not target.is_dir():
         raise SceneError(f"{path} is a file; give a new folder for the scene")
-    if not any(target.iterdir()):
-        return target
-    if not is_scene(target):
-        raise SceneError(f"{path} is a folder that holds no scene and is left as it is; give a new folder")
-    if not overwrite:
-        raise SceneError(f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)")
+    if target.exists() and any(target.iterdir()):
+        if not is_scene(target):
+            raise SceneError(
+                f"{path} is a folder that holds no scene and is left as it is; give a new folder"
+            )
+        if not overwrite:
+            raise SceneError(
+                f"scene {path} exists already; give a new folder, or --overwrite (overwrite=True)"
+            )
+    check_writable(target)
     return target
 
 
@@ -63,7 +67,7 @@ def recover(folder: Path) -> None:
 def is_scene(path: Path | str) -> bool:
     """True where `path` is a folder with the manifest of a scene, of any version."""
     try:
-        document = json.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
+        document = json_text.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("format") == FORMAT
@@ -130,7 +134,7 @@ def write_json(document: Mapping[str, object], path: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(path.read_text(encoding="utf-8"))
     except (ValueError, OSError) as error:
         raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
     if not isinstance(document, dict):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
+from cagefield.atomic_files import check_writable
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -142,14 +143,16 @@ def check_folder(path: Path, overwrite: bool, mark: str | None = None) -> None:
         raise CagefieldError(f"folder {path} exists already and is not empty; give a new one, or --overwrite")
     if mark is not None and path.is_dir() and any(path.iterdir()) and not (path / mark).is_file():
         raise CagefieldError(f"folder {path} holds no {mark} and is left as it is; give a new one")
+    check_writable(path, inside=mark is None)
 
 
 def check_file(path: Path, overwrite: bool) -> None:
-    """Passes where `path` is new, or a file with `overwrite`."""
+    """Passes where `path` is new, or a file with `overwrite`, and can be written."""
     if path.is_dir():
         raise CagefieldError(f"{path} is a folder; give a file name")
     if path.exists() and not overwrite:
         raise CagefieldError(f"{path} exists already; give another name, or --overwrite")
+    check_writable(path)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from cagefield.cli.options import (
     stages,
 )
 from cagefield.cli.photo_options import Photos
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, line_of
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -107,7 +107,7 @@ class Train:
                 warnings.warn(FOG, stacklevel=2)
             scene, voxels = train_scene(dataset, self.training.config(), checkpoint, resume=self.resume)
             figures, finished = summary(voxels), voxels.finished
-        with self._kept(finished):
+        with self._kept(checkpoint, finished):
             scene.save(self.out, overwrite=self.overwrite or self.resume)
         print(f"{figures}\nscene written to {self.out}")
         if not finished:
@@ -160,7 +160,7 @@ class Train:
         moved = result.space.dataset
         splits = {"train": moved.train, "test": moved.test, "val": moved.val}
         cameras = {name: tuple(view.camera for view in views) for name, views in splits.items() if views}
-        with self._kept(result.finished):
+        with self._kept(checkpoint, result.finished):
             scene, baked = bake_scene(
                 result.field,
                 cameras,
@@ -182,7 +182,7 @@ class Train:
         return scene, f"{line}\n{baked}", result.finished
 
     @contextmanager
-    def _kept(self, finished: bool) -> Iterator[None]:
+    def _kept(self, checkpoint: Path, finished: bool) -> Iterator[None]:
         """Says, where what follows a training fails, that the training itself is kept.
 
         Raises:
@@ -194,6 +194,13 @@ class Train:
             yield
         except CagefieldError as error:
             raise CagefieldError(f"{error}; {note}") from error
+        except OSError as error:
+            kept = (
+                f"the training is kept in {checkpoint}: the same command with --resume goes on from there"
+                if checkpoint.is_file()
+                else "the training is lost, there was no room for its checkpoint either"
+            )
+            raise CagefieldError(f"{line_of(error)}; {kept}") from error
         except BaseException:
             print(note)
             raise

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from PIL import Image, UnidentifiedImageError
 
 from cagefield.errors import DatasetError
+from cagefield.rendering.images import check_pixels
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
@@ -117,6 +118,7 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
 def _opened(path: Path) -> Image.Image:
     try:
         image = Image.open(path)
+        check_pixels(image)
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DatasetError(
             f"{path}: not a readable image ({error}); replace the file or remove its frame"

@@ -16,6 +16,7 @@ from scipy.ndimage import laplace
 
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
+from cagefield.rendering.images import check_pixels
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
 
@@ -71,6 +72,7 @@ def upright(source: Path, name: str, folder: Path) -> RawPhoto:
     """
     try:
         with Image.open(source) as image:
+            check_pixels(image)
             image.load()
             exif = image.getexif()
             focal_35 = exif.get_ifd(_EXIF_IFD).get(_FOCAL_35) or 0

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from cagefield import json_text
 from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.datasets import features, repeated_views
 from cagefield.datasets.features import OnProgress, Photo
@@ -143,7 +144,7 @@ def work_folder(target: Path) -> Path:
 def is_made_of(target: Path, source: Path, frames: int = 80) -> bool:
     """Whether the data set `target` was made of these photos, none of them changed since."""
     try:
-        known = json.loads((target / RECORD).read_text(encoding="utf-8"))
+        known = json_text.loads((target / RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
     return isinstance(known, dict) and known.get("made_of") == record_of(source, frames)
@@ -190,7 +191,7 @@ def _photos(
     """The upright photos in the work folder, and those that cannot be read with the reason."""
     note = work / "photos.json"
     if note.is_file():
-        kept = json.loads(note.read_text(encoding="utf-8"))
+        kept = json_text.loads(note.read_text(encoding="utf-8"))
         known = [RawPhoto(**{**one, "path": work / "images" / one["name"]}) for one in kept["photos"]]
         return known, kept["unreadable"]
     shutil.rmtree(work / "images", ignore_errors=True)

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cagefield import json_text
 from cagefield.cameras import Camera
 from cagefield.datasets.captures import uniform_size, warn_of_scaling
 from cagefield.datasets.photos import Header, choose_downscale, find_photo, is_cut_out, read_header
@@ -192,13 +193,13 @@ class _TransformsFile:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json_text.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise DatasetError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
             "the file may be cut off, copy it again"
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be read ({error})") from None
     if not isinstance(values, dict):
         raise DatasetError(f"{path}: must be a JSON object with the key 'frames'")

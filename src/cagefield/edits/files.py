@@ -45,6 +45,7 @@ from cagefield.edits.edit import Edit, ImpossibleEditError
 from cagefield.edits.names import mended, problem_of_name
 from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
+from cagefield.edits.options import problem_of_lattices
 from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
@@ -99,7 +100,14 @@ def _stack(node: Node, check: bool, mend: bool) -> EditStack:
     items = node.items()
     if len(items) > MOST_EDITS:
         raise node.error(f"{len(items)} edits are too many, a file has at most {MOST_EDITS}; leave some out")
-    return EditStack(_edit(item, check, mend) for item in items)
+    edits = [_edit(item, check, mend) for item in items]
+    shown = [edit for edit in edits if edit.enabled and edit.adjustment == "continuous"]
+    if (problem := problem_of_lattices(edit.lattice for edit in shown)) is not None:
+        if not mend:
+            raise node.error(problem)
+        warnings.warn(f"{node.error(problem)}; lattices above 64 are made 64", stacklevel=2)
+        edits = [edit.replace(lattice=min(edit.lattice, 64)) if edit.lattice else edit for edit in edits]
+    return EditStack(edits)
 
 
 def save_edits(stack: EditStack, path: str | os.PathLike[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal, TypeAlias
 
 from cagefield.warps import FALLOFFS, SHELLS
@@ -9,6 +10,19 @@ from cagefield.warps import FALLOFFS, SHELLS
 Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
 LATTICE_RANGE = (2, 512)
+MOST_NODES = 512**3
+"""Lattice nodes of all edits together, of 32 bytes each: one lattice of 512, or eight of 256."""
+
+
+def problem_of_lattices(lattices: Iterable[int | None]) -> str | None:
+    """Why the lattices of edits that are shown together are too large, and the cure; None where not."""
+    nodes = sum(lattice**3 for lattice in lattices if lattice is not None)
+    if nodes <= MOST_NODES:
+        return None
+    return (
+        f"the edits' lattices have {nodes / 1e6:.0f} million nodes together, at most {MOST_NODES / 1e6:.0f}"
+        " million are kept; give them lower resolutions"
+    )
 
 
 def problem_of_options(

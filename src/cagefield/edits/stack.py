@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cagefield.edits.edit import Edit, bounds_of
+from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
 from cagefield.typing import Array, Mask
 
@@ -157,7 +158,11 @@ class EditStack:
         return tuple(errors)
 
     def check(self) -> None:
-        """Raise `EditError` for the first active edit that cannot be evaluated."""
+        """Raise `EditError` for the first active edit that cannot be evaluated, or too large lattices."""
+        shown = (edit for edit in self.edits if edit.enabled and edit.adjustment == "continuous")
+        too_large = problem_of_lattices(edit.lattice for edit in shown)
+        if too_large is not None:
+            raise EditError(too_large)
         for edit in self.active:
             edit.check()
 

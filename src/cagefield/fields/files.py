@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 
 
@@ -60,12 +64,24 @@ def _opened(path: str | Path) -> Iterator[Any]:
 
 
 def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str, str]) -> None:
-    """Writes a field file, which others may read as they may any new file; its folder must exist."""
+    """Writes a field file, which others may read as they may any new file; its folder must exist.
+
+    Raises:
+        OSError: it cannot be written; names the file, and what was there is as it was.
+    """
+    from safetensors import SafetensorError
     from safetensors.numpy import save_file
 
-    path = Path(path)
-    path.touch()
-    mode = path.stat().st_mode
-    # safetensors writes a temporary file, its owner's alone, and renames it.
-    save_file({name: np.ascontiguousarray(values) for name, values in tensors.items()}, path, header)
-    path.chmod(mode)
+    arrays = {name: np.ascontiguousarray(values) for name, values in tensors.items()}
+    with replaced_file(Path(path), parents=False) as draft:
+        try:
+            save_file(arrays, draft, header)
+        except SafetensorError as error:
+            raise _system_error(error) from None
+
+
+def _system_error(error: Exception) -> OSError:
+    """What the system refused, of which safetensors has the number in its text alone."""
+    found = re.search(r"\(os error (\d+)\)", str(error))
+    number = int(found.group(1)) if found else errno.EIO
+    return OSError(number, os.strerror(number) if found else " ".join(str(error).split()))

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from cagefield import json_text
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
 from cagefield.fields.mlp import Linear, Mlp
@@ -43,7 +44,7 @@ def load_nerf(path: str | Path) -> NerfField:
     cure = "copy it back or import the checkpoint again"
     metadata, tensors = read_tensors(path, KIND, FORMAT_VERSION, cure)
     try:
-        options = json.loads(metadata["options"])
+        options = json_text.loads(metadata["options"])
         rectified = list(options.pop("rectified_feature"))
         coarse = _network(tensors, "coarse", bool(rectified[0]))
         fine = _network(tensors, "fine", bool(rectified[1])) if len(rectified) > 1 else None
@@ -52,7 +53,7 @@ def load_nerf(path: str | Path) -> NerfField:
         return NerfField(coarse, fine, **options)
     except FieldError as error:
         raise FieldError(f"{path}: {error}") from error
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise FieldError(f"{path}: damaged header ({error}); write the field again") from error
 
 
@@ -65,7 +66,10 @@ def _network(tensors: dict[str, Any], part: str, rectified: bool) -> Mlp:
 
     def count(prefix: str) -> int:
         pattern = re.compile(rf"{part}\.{prefix}\.(\d+)\.")
-        return max((int(m.group(1)) + 1 for m in map(pattern.match, tensors) if m), default=0)
+        found = {int(m.group(1)) for m in map(pattern.match, tensors) if m}
+        if found and max(found) >= len(tensors):
+            raise FieldError(f"{part}.{prefix}.{max(found)} is beyond its {len(tensors)} tensors")
+        return max(found, default=-1) + 1
 
     return Mlp(
         trunk=tuple(take(f"trunk.{index}") for index in range(max(1, count("trunk")))),

@@ -15,6 +15,7 @@ This module is the readable float64 reference. `cagefield.rendering.kernels.marc
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ from cagefield.errors import FieldError
 from cagefield.fields.contraction import contract
 from cagefield.fields.files import read_tensors, write_tensors
 
+_DENSE_GRID, _SPARSEST = 1 << 27, 1000
+"""Vertices of a grid of which any number may be stored (512 an axis); of a larger one, one in so many."""
 FORMAT_VERSION = "1"
 
 
@@ -200,9 +203,11 @@ class VoxelField:
         if missing:
             raise FieldError(f"{path}: tensors missing: {', '.join(sorted(missing))}")
         try:
+            resolution = tuple(int(n) for n in tensors["resolution"].reshape(-1).tolist())
+            _check_grid(resolution, len(np.atleast_1d(tensors["vertices"])))
             return cls(
                 bounds=tensors["bounds"],
-                resolution=tuple(tensors["resolution"].tolist()),
+                resolution=resolution,  # type: ignore[arg-type]
                 vertices=tensors["vertices"],
                 density=tensors["density"],
                 sh=tensors["sh"],
@@ -210,6 +215,18 @@ class VoxelField:
             )
         except FieldError as error:
             raise FieldError(f"{path}: {error}") from error
+        except (TypeError, ValueError, OverflowError) as error:
+            raise FieldError(f"{path}: damaged tensors ({error}); write the field again") from error
+
+
+def _check_grid(resolution: tuple[int, ...], stored: int) -> None:
+    """Refuses a grid that takes much memory to be drawn, of which a file holds next to nothing."""
+    total = math.prod(resolution)
+    if total > max(_DENSE_GRID, _SPARSEST * stored):
+        raise FieldError(
+            f"a grid of {' x '.join(map(str, resolution))} would take {4 * total / 1e9:.1f} GB for {stored} "
+            f"stored vertices; a file has one in {_SPARSEST} or more, bake it with a lower resolution"
+        )
 
 
 def _frozen(values: ArrayLike, dtype: Any) -> NDArray[Any]:

@@ -91,7 +91,10 @@ class _State:
     def count(self, prefix: str) -> int:
         """How many layers prefix.0, prefix.1, ... there are: up to the last one that is named."""
         found = [re.match(re.escape(prefix) + r"\.(\d+)\.", name) for name in self.left]
-        return max((int(match.group(1)) + 1 for match in found if match), default=0)
+        highest = max((int(match.group(1)) for match in found if match), default=-1)
+        if highest >= len(self.left):
+            raise FieldError(f"{self.where}: {prefix}.{highest} is beyond its {len(self.left)} tensors")
+        return highest + 1
 
     def take(self, name: str) -> Linear | None:
         """The layer of that name, or None where a tensor of it is missing."""

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cagefield import json_text
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import Axes
@@ -75,7 +76,7 @@ def _chunks(path: Path) -> tuple[dict[str, Any], tuple[int, int]]:
         length, kind = struct.unpack("<II", file.read(8))
         if kind != _JSON or 20 + length > size:
             raise ValueError("its JSON is cut off")
-        gltf = json.loads(file.read(length))
+        gltf = json_text.loads(file.read(length))
         if not isinstance(gltf, dict):
             raise ValueError("its JSON is no object")
         length, kind = struct.unpack("<II", file.read(8))

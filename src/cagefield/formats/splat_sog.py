@@ -17,7 +17,6 @@ Source: the PlayCanvas manual, "The SOG Format"; playcanvas/splat-transform, rea
 from __future__ import annotations
 
 import io
-import json
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
@@ -27,9 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from cagefield import json_text
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.rendering.images import check_pixels
 from cagefield.typing import AnyArray
 
 META = "meta.json"
@@ -79,7 +80,7 @@ def _from_folder(folder: Path, name: str) -> bytes:
 
 def _open(path: Path, content: Images) -> SplatSource:
     try:
-        meta = json.loads(content(META))
+        meta = json_text.loads(content(META))
         return _source(path, meta, content)
     except FieldError:
         raise
@@ -177,6 +178,7 @@ def _pixels(
     """The pixels [n,channels] of an image of at least so many; [height,width,3] where channels is -3."""
     most = 2 * least + (1 << 16) if most is None else most
     with Image.open(io.BytesIO(content)) as image:
+        check_pixels(image)
         size = image.width * image.height
         if not least <= size <= most:
             raise ValueError(f"{name} has {size} pixels for {least} splats")

@@ -18,6 +18,20 @@ from cagefield.rendering.render_result import to_uint8
 from cagefield.rendering.video_encoder import encoder
 from cagefield.typing import UInt8
 
+MOST_PIXELS = 100 << 20
+"""Pixels of a picture that is read: a file of kilobytes may have any number of them."""
+
+
+def check_pixels(image: Image.Image) -> None:
+    """Passes where an opened picture, of which only the header is read, has at most MOST_PIXELS.
+
+    Raises ValueError.
+    """
+    if image.width * image.height > MOST_PIXELS:
+        raise ValueError(
+            f"{image.width} x {image.height} pixels, at most {MOST_PIXELS >> 20} million are read; shrink it"
+        )
+
 
 def read_image(path: str | os.PathLike[str]) -> UInt8:
     """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
@@ -29,6 +43,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
     try:
         with Image.open(path) as file:
             image: Image.Image = file
+            check_pixels(image)
             image.load()
             if image.mode.startswith("I"):
                 image = Image.fromarray((np.asarray(image) / 257.0 + 0.5).astype(np.uint8))
@@ -36,7 +51,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
             return np.array(image.convert("RGBA" if transparent else "RGB"))
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: there is no such image") from error
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DatasetError(f"{path}: not a readable image ({error})") from error
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield import json_text
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
 
@@ -32,7 +33,7 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-        scalars, written_for = json.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))
+        scalars, written_for = json_text.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))
     except KeyError as error:
         raise CagefieldError(
             f"{path}: the checkpoint of another kind of training; give the field that it was started with"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
+import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, line_of
 
 CHECKPOINT_SECONDS = 60.0
 """Seconds of training between two checkpoints."""
@@ -49,7 +51,8 @@ def run_to_end(
     """True when the run was finished, False when Ctrl-C ended it early.
 
     Its state is written to `checkpoint` every minute and at its end, early or not; `resume` continues from
-    there: a run that was finished is so at once.
+    there: a run that was finished is so at once. Where it cannot be written (a full disk) a warning says so,
+    the last one is kept, and the run goes on.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
     Raises:
@@ -72,11 +75,28 @@ def run_to_end(
                 on_progress(run.progress())
             after_step(before)
             if checkpoint is not None and run.seconds - saved > CHECKPOINT_SECONDS:
-                run.store(checkpoint)
-                saved, stored = run.seconds, run.step
+                saved = run.seconds
+                if _stored(run, checkpoint):
+                    stored = run.step
         if checkpoint is not None and run.step != stored:
-            run.store(checkpoint)
+            _stored(run, checkpoint)
     return run.done >= 1.0
+
+
+def _stored(run: Run, checkpoint: Path) -> bool:
+    """Whether the run's state could be written; where not, a warning says what is there to go on from."""
+    try:
+        run.store(checkpoint)
+    except OSError as error:
+        try:
+            age = f"the last one, of {time.time() - checkpoint.stat().st_mtime:.0f} s ago, is kept"
+        except OSError:
+            age = "there is none to resume from"
+        warnings.warn(
+            f"the checkpoint cannot be written ({line_of(error)}); {age}, and training goes on", stacklevel=3
+        )
+        return False
+    return True
 
 
 @contextlib.contextmanager

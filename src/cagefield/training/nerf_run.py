@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,7 +166,14 @@ class NerfRun:
             "optimizer": self.optimizer.state_dict(),
         }
         with replaced_file(path) as draft, draft.open("wb") as out:
-            torch.save(state, out)
+            try:
+                torch.save(state, out)
+            except RuntimeError as error:  # torch's word for a write that failed
+                raise (
+                    error.__context__
+                    if isinstance(error.__context__, OSError)
+                    else OSError(errno.EIO, " ".join(str(error).split())[:120])
+                ) from None
 
     def restore(self, path: Path) -> None:
         """Continues from the state in `path`."""

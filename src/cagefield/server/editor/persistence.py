@@ -13,6 +13,7 @@ import hashlib
 import json
 from pathlib import Path
 
+from cagefield import json_text
 from cagefield.atomic_files import replaced_file
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.edits.files import save_edits
@@ -60,7 +61,7 @@ class SceneStore:
     def recovered(self) -> Document | None:
         """What an editor that ended without saving left behind; None where that is nothing new."""
         try:
-            content = json.loads(self.autosave_path.read_text(encoding="utf-8"))
+            content = json_text.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
@@ -113,6 +114,7 @@ class SceneStore:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         save_edits(document.stack, self.path / _EDITS)
+        self._written = self._fingerprint()  # ours, should the rest not be possible
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_file(self.path / CAMERA_PATH) as draft:
                 draft.write_text(camera_path, encoding="utf-8")
@@ -139,7 +141,8 @@ class SceneStore:
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
         if document.keys:
-            (target / CAMERA_PATH).write_text(camera_path, encoding="utf-8")
+            with replaced_file(target / CAMERA_PATH) as draft:
+                draft.write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path, self.source = target.resolve(), None

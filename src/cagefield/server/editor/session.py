@@ -13,6 +13,7 @@ from dataclasses import replace
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Operation
+from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import CameraError, EditError
 from cagefield.keyframe_files import is_path
 from cagefield.keyframes import Keyframe, Timeline
@@ -367,6 +368,10 @@ class Session:
         self.selected = entry.id
 
     def _push(self, name: str, document: Document) -> None:
+        shown = (entry.edit for entry in document.entries if entry.edit.enabled)
+        too_large = problem_of_lattices(e.lattice for e in shown if e.adjustment == "continuous")
+        if too_large is not None:
+            raise EditError(too_large)
         self.preview = None
         self.history = self.history.push(name, document)
         self.revision += 1
