@@ -34,7 +34,14 @@ DRAWN_BY: str | None = None
 """Who draws pages that are opened without saying so: the server where the page has no GPU, `page` with
 `pytest --page-renderer`."""
 
-USUAL = ("ReadPixels", "CONTEXT_LOST", "ERR_CONNECTION_REFUSED", "status of 400")
+USUAL = (
+    "ReadPixels",
+    "CONTEXT_LOST",
+    "Context Lost",
+    "Context Restored",
+    "ERR_CONNECTION_REFUSED",
+    "status of 400",
+)
 """Chromium's own words on the console where pictures are read back, where a test takes the GPU's context or
 the server away, and where the server refuses a file."""
 

@@ -51,11 +51,16 @@ class FieldPage:
             )
         )
 
-    def edit(self, edits: bytes | None) -> None:
-        """Puts edits in the place of those before."""
+    def edit(self, edits: bytes | None, *, changes: bool = False) -> None:
+        """Puts edits in the place of those before, of which they may be `changes`."""
         text = None if edits is None else base64.b64encode(edits).decode()
         self.page.evaluate(
-            "async (text) => r.setEdits(text && await cagefieldViewer.readEdits(bytes(text)))", text
+            """async ([text, changes]) => {
+                const read = (file) => cagefieldViewer.readEdits(file, changes ? window.had : null);
+                window.had = text && await read(bytes(text));
+                r.setEdits(window.had);
+            }""",
+            [text, changes],
         )
 
     def draw(self, camera: Camera, *, normals: bool = True, count: bool = False, repeat: int = 1) -> Drawn:

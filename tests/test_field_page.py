@@ -12,8 +12,17 @@ from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import EditError
 from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import LATTICE, encode_page_edits, for_pages
+from cagefield.formats.page_edits import (
+    FINEST_LATTICE,
+    LATTICE,
+    MAGIC,
+    VERSION,
+    encode_changed_edits,
+    encode_page_edits,
+    for_pages,
+)
 from cagefield.formats.page_field import encode_page_field
+from cagefield.formats.page_file import unpack
 from cagefield.rendering.metrics import psnr
 from cagefield.rendering.render_result import RenderResult
 from cagefield.rendering.renderer import Renderer
@@ -212,6 +221,32 @@ def test_a_shell_without_a_lattice_gets_one_for_pages() -> None:
     with pytest.raises(EditError, match='edit "turned" has no lattice'):
         encode_page_edits(Renderer(lumps(0, False), exact))
     assert [edit.lattice for edit in for_pages(exact)] == [LATTICE, None]
+    assert for_pages(EditStack([TURNED.replace(lattice=200)])).active[0].lattice == FINEST_LATTICE
+
+
+def test_a_page_is_sent_what_it_has_not(page: FieldPage) -> None:
+    field, seen = lumps(1, False), camera(False)
+    first = Renderer(field, EditStack([GONE, TURNED, BENT]))
+    whole = encode_changed_edits(first)
+    moved = first.with_edits(EditStack([GONE, TURNED, BENT.translate((0.05, 0.0, 0.05))]))
+    ours = moved.render(seen, normals=True)
+    assert whole.occupancy is not None
+    change = encode_changed_edits(moved, whole.keys, {whole.keys[-1]: whole.occupancy})
+    arrays = unpack(change.data, MAGIC, VERSION, "edits")[1]
+    # The lattice that is other than before, and a part of the occupancy.
+    assert set(arrays) == {"rows", "lattice.1", "occupancy"}
+    assert 0 < arrays["occupancy"].size < moved.occupancy.codes.size
+    page.load(encode_page_field(field))
+    page.edit(whole.data)
+    page.edit(change.data, changes=True)
+    uploaded = page.page.evaluate("r.uploaded.last")
+    # 24^3 nodes take 7 rows of 2048.
+    assert uploaded == arrays["rows"].nbytes + 7 * 2048 * 6 + arrays["occupancy"].nbytes
+    check_alike(ours, page.draw(seen))
+    same = encode_changed_edits(moved, change.keys)
+    assert set(unpack(same.data, MAGIC, VERSION, "edits")[1]) == {"rows"}
+    with pytest.raises(Exception, match=r'no array "lattice\.0"'):
+        page.edit(change.data)
 
 
 def test_too_many_edits_are_refused() -> None:

@@ -313,7 +313,7 @@ def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
 
         assert isinstance(renderers.picture(task, stop), Stopped)
         if looks <= 4:  # between the passes; later, between bands of the picture
-            assert renderers.exact_renderers == []
+            assert renderers.edited.exact == []
     done = renderers.picture(task, lambda: False)
     assert isinstance(done, PictureDone)
-    assert np.array_equal(renderers.exact_renderers[-1].renderer.occupancy.codes, expected.occupancy.codes)
+    assert np.array_equal(renderers.edited.exact[-1].occupancy.codes, expected.occupancy.codes)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from cagefield.server.protocol.common import DrawnHere
 from cagefield.server.render_queue.damage import Differing, everywhere
-from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.scheduler import (
     MOST_MOVING,
     MOST_TILES,
@@ -50,9 +51,18 @@ class Bench:
     def step(self, overhead: float = 0.0) -> Request | None:
         """Renders one picture, if one is owed, and has it shown."""
         request = self.scheduler.next(self.now)
+        assert not isinstance(request, EditsRequest)
         if request is not None:
             self.render(request, overhead)
             self.show(request.page)
+        return request
+
+    def edits(self) -> EditsRequest | None:
+        """Makes the edits that are owed, if any are, and leaves them unshown."""
+        request = self.scheduler.next(self.now)
+        if not isinstance(request, EditsRequest):
+            return None
+        self.scheduler.sent(request)
         return request
 
     def settle(self) -> None:
@@ -352,3 +362,71 @@ def test_nothing_else_is_done_between_the_pictures_of_a_drag() -> None:
     b.render(request)
     assert b.scheduler.unshown(1) == MOST_MOVING and b.scheduler.next(b.now) is None
     assert not b.scheduler.idle()
+
+
+def drawing(here: DrawnHere) -> Bench:
+    """A page that shows the whole picture, and from then on draws some of its pictures itself."""
+    b = Bench()
+    b.open(1)
+    b.step()
+    b.settle()
+    b.finish()
+    b.scheduler.drawing(1, here, b.now)
+    return b
+
+
+def test_a_page_that_draws_gets_the_edits_of_a_drag_one_at_a_time_and_no_pictures() -> None:
+    b = drawing("moving")
+    first = b.edits()
+    assert first is not None and first.exact
+    b.scheduler.presented(1, first.number)
+    b.finish()
+    b.scheduler.edits(2, True, b.now)
+    one = b.edits()
+    assert one is not None and (one.revision, one.exact) == (2, False)
+    # The page has not shown it yet: newer ones wait, and the older of them are passed over.
+    b.scheduler.edits(3, True, b.now)
+    b.scheduler.edits(4, True, b.now)
+    assert b.scheduler.next(b.now) is None
+    b.scheduler.presented(1, one.number)
+    two = b.edits()
+    assert two is not None and two.revision == 4
+    b.scheduler.presented(1, two.number)
+    b.settle()
+    assert b.scheduler.next(b.now) is None
+    # Let go: the edits with their own lattices, then the whole picture, for all of it is the page's own.
+    b.scheduler.edits(4, False, b.now)
+    last = b.edits()
+    assert last is not None and (last.revision, last.exact) == (4, True)
+    b.scheduler.presented(1, last.number)
+    b.settle()
+    tiles = b.finish()
+    assert not any(tile.moving for tile in tiles)
+    assert len(set(pixels(tiles))) == SIDE * SIDE
+    assert b.scheduler.idle()
+
+
+def test_a_page_that_draws_all_gets_no_picture_until_it_draws_no_more() -> None:
+    b = drawing("all")
+    edits = b.edits()
+    assert edits is not None
+    b.scheduler.presented(1, edits.number)
+    b.camera(1, 2)
+    b.settle()
+    assert b.scheduler.next(b.now) is None and b.scheduler.idle()
+    b.scheduler.drawing(1, "nothing", b.now)
+    first = b.step()
+    assert first is not None and first.moving
+    b.settle()
+    assert b.finish()[-1].final
+
+
+def test_edits_that_were_lost_are_made_again_and_refused_ones_are_not() -> None:
+    b = drawing("all")
+    request = b.scheduler.next(b.now)
+    assert isinstance(request, EditsRequest)
+    b.scheduler.abandoned(request, again=True)
+    again = b.edits()
+    assert again is not None and again.revision == request.revision
+    b.scheduler.presented(1, again.number)
+    assert b.scheduler.next(b.now) is None

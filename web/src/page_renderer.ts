@@ -137,7 +137,7 @@ export class PageRenderer {
   private follow(now: Editor): void {
     if (now.connection !== "open") this.told = { here: "nothing", page: null };
     if (now.hello === null || now.state === null || now.connection !== "open") return;
-    if (this.closed === null && now.figures.final) this.scene.load(now.hello.field);
+    if (this.closed === null && now.figures.final) this.scene.load(now.hello.field, now.hello.page);
     if (this.refused !== null && this.refused.pictured !== now.state.pictured) this.refused = null;
     if (this.told.page !== now.hello.page) this.told = { here: "nothing", page: now.hello.page };
     const { mode } = this;

@@ -36,6 +36,8 @@ export class PageScene {
   loads = 0;
   /** The name of the field that is there or on its way; see `Hello.field`. */
   private name: string | null = null;
+  /** The page's number when loading it failed; a page that has another one since tries again. */
+  private failedAs: number | null = null;
   private unpacked: PageEdits | null = null;
   private chain: Promise<void> = Promise.resolve();
 
@@ -44,12 +46,12 @@ export class PageScene {
     private readonly events: SceneEvents,
   ) {}
 
-  /** Loads the field of a name, unless it is the one that is there: pages that reconnect have it already. */
-  load(name: string): void {
-    if (name === this.name) return;
+  /** Loads the field of a name, unless it is the one that is there: pages that reconnect, as another one, have it. */
+  load(name: string, page: number): void {
+    if (name === this.name && (this.failedAs === null || this.failedAs === page)) return;
     this.forget();
     this.name = name;
-    void this.fetch(name);
+    void this.fetch(name, page);
   }
 
   /** Takes a message's edits after those before it; calls `done` with whether they are there now. */
@@ -73,13 +75,13 @@ export class PageScene {
 
   /** Lets go of a field that is no longer the editor's. */
   forget(): void {
-    this.name = null;
+    this.name = this.failedAs = null;
     this.edits = this.unpacked = null;
     this.why = "the field is not loaded yet";
     this.drawer.setEdits(null);
   }
 
-  private async fetch(name: string): Promise<void> {
+  private async fetch(name: string, page: number): Promise<void> {
     try {
       this.why = "the field is being loaded";
       const answer = await fetch(`field${location.search}`);
@@ -103,9 +105,8 @@ export class PageScene {
       if (name !== this.name) return;
       if (error instanceof TooLarge || error instanceof OutOfMemory) this.events.failed(error.message);
       else {
-        // Of a server that went away, say: the next greeting has it loaded again.
         this.why = said(error);
-        this.name = null;
+        this.failedAs = page;
       }
     } finally {
       this.events.arrived(null);

@@ -205,7 +205,7 @@ export interface DragMove {
   operation: TranslateBy | RotateBy | ScaleBy | ShearBy | MoveCornersBy;
 }
 /**
- * Which pictures the page draws itself: none, those of what moves, or all. It is sent edits instead.
+ * Which pictures the page draws itself: none, those of what moves, or all. It gets the edits instead.
  */
 export interface Drawing {
   type: "drawing";
@@ -528,7 +528,7 @@ export interface PictureHeader {
   encode_ms: number;
 }
 /**
- * Heads a binary message to a page that draws itself, as a PictureHeader does; a file of edits follows.
+ * Heads a binary message to a page that draws itself as PictureHeader does; a file of the edits follows.
  *
  * The file is one of `cagefield.formats.page_edits`, without what was sent before; it is empty where the
  * edits cannot be drawn by a page, and `why` says why. The page answers `presented` when it shows them.

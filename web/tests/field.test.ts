@@ -3,7 +3,10 @@ import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
 import { joined, summed } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
 import { Pacing } from "../src/field/pacing";
+import { Choice, memoryLimit } from "../src/field/choice";
+import { patched } from "../src/field/page_edits";
 import { ByteReader, PageFile } from "../src/field/page_file";
+import { SETTLES, Still } from "../src/field/still";
 import { Orbit } from "../src/viewer/orbit";
 import { viewAt } from "../src/viewer/path";
 
@@ -102,6 +105,65 @@ describe("pacing", () => {
     expect(pacing.scale(1000, 800)).toBe(0.5);
     expect(pacing.rows(1000, 800)).toBe(400);
   });
+});
+
+describe("a picture at rest", () => {
+  it("begins once nothing has changed for a while, goes down in bands, and begins anew when anything moves", () => {
+    const still = new Still();
+    still.moved(1000, false);
+    expect(still.next(1000 + SETTLES - 1, 100, 60)).toBeNull();
+    const first = still.next(1000 + SETTLES, 100, 60);
+    expect(first).toEqual({ first: 0, count: 60 });
+    expect(still.drew({ first: 0, count: 60 }, 100)).toBe(false);
+    expect(still.next(1100, 100, 60)).toEqual({ first: 60, count: 40 });
+    still.moved(1101, false);
+    expect(still.next(1101 + SETTLES, 100, 100)).toEqual({ first: 0, count: 100 });
+    expect(still.drew({ first: 0, count: 100 }, 100)).toBe(true);
+    expect([still.whole, still.next(2000, 100, 100)]).toEqual([true, null]);
+    still.moved(3000, true);
+    expect(still.next(4000, 100, 100)).toBeNull();
+  });
+});
+
+describe("who draws", () => {
+  it("is the page, until it has been measured to be slower than the server", () => {
+    const choice = new Choice();
+    choice.served(10_000, 20, false);
+    for (let n = 0; n < 5; n++) choice.drew(10_000, 80);
+    expect(choice.serverIsFaster).toBe(false);
+    choice.drew(10_000, 80);
+    expect(choice.serverIsFaster).toBe(true);
+    // Pictures of what moves count for more than those at rest.
+    choice.served(10_000, 70, true);
+    choice.served(10_000, 1, false);
+    expect(choice.serverIsFaster).toBe(false);
+    expect(choice.words).toBe("this page 0.13 million pixels a second, the server 0.14 million pixels a second");
+  });
+
+  it("draws whole pictures where they take little, and does not change its mind to and fro", () => {
+    const choice = new Choice();
+    expect(choice.whole(1000)).toBe(false);
+    choice.drew(1000, 0.2);
+    expect(choice.whole(1_000_000)).toBe(true);
+    expect(choice.whole(1_400_000)).toBe(true);
+    expect(choice.whole(1_600_000)).toBe(false);
+    expect(choice.whole(1_400_000)).toBe(false);
+    choice.served(1000, 1, true);
+    expect(choice.whole(1_400_000)).toBe(true);
+  });
+
+  it("takes memory as the device has it", () => {
+    expect([undefined, 0.25, 2, 8].map((gib) => memoryLimit(gib) / 2 ** 20)).toEqual([768, 96, 256, 768]);
+  });
+});
+
+describe("an occupancy", () => {
+  it("changes in a part", () => {
+    const before = { origin: [0, 0, 0] as Vec3, dims: [2, 3, 4] as Vec3, codes: new Uint16Array(24) };
+    const after = patched(before, [1, 1, 2], [1, 2, 2], Uint16Array.from([1, 2, 3, 4]));
+    expect([...after].flatMap((code, n) => (code ? [[n, code]] : []))).toEqual([[18, 1], [19, 2], [22, 3], [23, 4]]);
+    expect(before.codes.some((code) => code > 0)).toBe(false);
+  }); // prettier-ignore
 });
 
 describe("the viewer's camera", () => {

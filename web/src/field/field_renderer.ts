@@ -20,6 +20,8 @@ import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
 import { fragment, VERTEX } from "./march_glsl";
 import type { Variant } from "./march_glsl";
+import { setField, setView } from "./march_uniforms";
+import type { PinholeCamera } from "./march_uniforms";
 import type { PageEdits } from "./page_edits";
 import type { Bytes, OnArrival } from "./page_file";
 import type { SceneDrawer } from "./scene_drawer";
@@ -29,17 +31,6 @@ import { Views } from "./views";
 import type { Distances, View } from "./views";
 
 type GL = WebGL2RenderingContext;
-
-/** A pinhole camera: pose camera-to-world row by row (OpenGL axes), intrinsics in pixels of its size. */
-export interface PinholeCamera {
-  c2w: readonly number[];
-  width: number;
-  height: number;
-  fx: number;
-  fy: number;
-  cx: number;
-  cy: number;
-}
 
 export interface LoadOptions {
   onArrival?: OnArrival;
@@ -174,8 +165,11 @@ export class FieldRenderer implements SceneDrawer {
     gl.useProgram(program);
     gl.bindVertexArray(this.vertices);
     this.plainState();
-    this.setField(uniform, shown);
-    this.setView(uniform, camera);
+    const occupancy = active && level.last ? active.occupancy : level.occupancy;
+    setField(gl, uniform, level, textures.layout, occupancy, this.step ?? level.field.step);
+    setView(gl, uniform, camera, this.targets);
+    gl.uniform1f(uniform("near"), this.near);
+    gl.uniform3f(uniform("background"), ...this.background);
     let unit = 0;
     const bind = (name: string, target: number, texture: WebGLTexture | null): void => {
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -283,43 +277,6 @@ export class FieldRenderer implements SceneDrawer {
       this.compiled += 1;
     }
     return program;
-  }
-
-  private setField(uniform: Program["uniform"], { level, textures }: Shown): void {
-    const { gl, active } = this;
-    const { bounds, contracted } = level.field;
-    const { resolution, unit, steps } = level.header;
-    const { across, edge, dims } = textures.layout;
-    const size = bounds[1].map((high, axis) => high - bounds[0][axis]);
-    const scale = size.map((length, axis) => (contracted ? 2 / length : (resolution[axis] - 1) / length));
-    const lower = bounds[0].map((low, axis) => (contracted ? 0.5 * (low + bounds[1][axis]) : low));
-    const { origin, dims: bricks } = active && level.last ? active.occupancy : level.occupancy;
-    const step = this.step ?? level.field.step;
-    gl.uniform3f(uniform("atlasScale"), 1 / (across[0] * edge), 1 / (across[1] * edge), 1 / (across[2] * edge));
-    gl.uniform3i(uniform("indexDims"), ...dims);
-    gl.uniform3i(uniform("bricksOrigin"), ...origin);
-    gl.uniform3i(uniform("bricksDims"), ...bricks);
-    gl.uniform3i(uniform("resolution"), ...resolution);
-    gl.uniform3fv(uniform("lower"), lower);
-    gl.uniform3fv(uniform("scale"), scale);
-    gl.uniform3fv(uniform("halfGrid"), resolution.map((n) => (n - 1) / 4)); // prettier-ignore
-    gl.uniform1f(uniform("unit"), unit);
-    gl.uniform1f(uniform("marchStep"), contracted ? step : step / Math.max(...scale));
-    gl.uniform1fv(uniform("coefficientSteps"), steps);
-  }
-
-  private setView(uniform: Program["uniform"], camera: PinholeCamera): void {
-    const { gl } = this;
-    const { width, height } = this.targets;
-    const { c2w } = camera;
-    const across = width / camera.width;
-    const down = height / camera.height;
-    gl.uniform3f(uniform("eye"), c2w[3], c2w[7], c2w[11]);
-    gl.uniformMatrix3fv(uniform("rotation"), true, [c2w[0], c2w[1], c2w[2], c2w[4], c2w[5], c2w[6], c2w[8], c2w[9], c2w[10]]);
-    gl.uniform4f(uniform("lens"), camera.fx * across, camera.fy * down, camera.cx * across, camera.cy * down);
-    gl.uniform1f(uniform("height"), height);
-    gl.uniform1f(uniform("near"), this.near);
-    gl.uniform3f(uniform("background"), ...this.background);
   }
 
   private plainState(): void {

@@ -1,6 +1,7 @@
 /** What of a renderer of the page's GPU the editor uses: `FieldRenderer` is one. */
-import type { PinholeCamera, LoadOptions, Picture } from "./field_renderer";
+import type { LoadOptions, Picture } from "./field_renderer";
 import type { Vec3 } from "./level";
+import type { PinholeCamera } from "./march_uniforms";
 import type { PageEdits } from "./page_edits";
 import type { Bytes } from "./page_file";
 import type { Distances, View } from "./views";

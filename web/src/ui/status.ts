@@ -10,7 +10,7 @@ const LONG = 2000;
 export function status(app: App): HTMLElement {
   const message = h("span", { class: "message" });
   const preparing = h("span", { class: "preparing", hidden: true, role: "status" });
-  const loading = h("span", { class: "preparing", hidden: true, role: "status" });
+  const loading = h("span", { class: "loading", hidden: true, role: "status" });
   const bar = h("progress", { max: 1 });
   loading.append("Loading the field ", bar);
   loading.title = "Once it is here, this page's own GPU draws";

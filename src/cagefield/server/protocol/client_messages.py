@@ -44,7 +44,7 @@ class PresentedMessage(Message):
 
 
 class Drawing(Message):
-    """Which pictures the page draws itself: none, those of what moves, or all. It is sent edits instead."""
+    """Which pictures the page draws itself: none, those of what moves, or all. It gets the edits instead."""
 
     type: Literal["drawing"] = "drawing"
     here: DrawnHere

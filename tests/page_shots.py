@@ -1,0 +1,36 @@
+"""What pages of the editor show."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from editor_page import EditorPage
+
+HALF = """\
+version: 1
+edits:
+  - name: half
+    delete: true
+    inner: {center: [1.0, 0.0, 0.0], size: [2.0, 4.0, 4.0]}
+"""
+"""Nothing is left of what lies at x > 0."""
+
+
+def shot(page: EditorPage) -> NDArray[np.float64]:
+    """The picture on the screen as it is, the mouse where it is."""
+    page.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    image = Image.open(io.BytesIO(page.page.screenshot(clip=page.box)))
+    return np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
+
+
+def filled(picture: NDArray[np.float64]) -> float:
+    """The share of a picture that is not the white background."""
+    return float((picture.min(axis=2) < 0.9).mean())
+
+
+def db(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    return float(-10.0 * np.log10(np.mean(np.square(one - other))))

@@ -1,0 +1,49 @@
+/** The uniforms of the march: where the field lies, and what sees it. */
+import type { Layout } from "./atlas";
+import type { Program } from "./gl";
+import type { Level, Occupancy } from "./level";
+
+type GL = WebGL2RenderingContext;
+
+/** A pinhole camera: pose camera-to-world row by row (OpenGL axes), intrinsics in pixels of its size. */
+export interface PinholeCamera {
+  c2w: readonly number[];
+  width: number;
+  height: number;
+  fx: number;
+  fy: number;
+  cx: number;
+  cy: number;
+}
+
+/** Places a level in the world; `step` is the distance between samples in voxels. */
+export function setField(gl: GL, uniform: Program["uniform"], level: Level, layout: Layout, occupancy: Occupancy, step: number): void {
+  const { bounds, contracted } = level.field;
+  const { resolution, unit, steps } = level.header;
+  const { across, edge, dims } = layout;
+  const size = bounds[1].map((high, axis) => high - bounds[0][axis]);
+  const scale = size.map((length, axis) => (contracted ? 2 / length : (resolution[axis] - 1) / length));
+  const lower = bounds[0].map((low, axis) => (contracted ? 0.5 * (low + bounds[1][axis]) : low));
+  gl.uniform3f(uniform("atlasScale"), 1 / (across[0] * edge), 1 / (across[1] * edge), 1 / (across[2] * edge));
+  gl.uniform3i(uniform("indexDims"), ...dims);
+  gl.uniform3i(uniform("bricksOrigin"), ...occupancy.origin);
+  gl.uniform3i(uniform("bricksDims"), ...occupancy.dims);
+  gl.uniform3i(uniform("resolution"), ...resolution);
+  gl.uniform3fv(uniform("lower"), lower);
+  gl.uniform3fv(uniform("scale"), scale);
+  gl.uniform3fv(uniform("halfGrid"), resolution.map((n) => (n - 1) / 4)); // prettier-ignore
+  gl.uniform1f(uniform("unit"), unit);
+  gl.uniform1f(uniform("marchStep"), contracted ? step : step / Math.max(...scale));
+  gl.uniform1fv(uniform("coefficientSteps"), steps);
+}
+
+/** Sees it from a camera, in a picture of a size. */
+export function setView(gl: GL, uniform: Program["uniform"], camera: PinholeCamera, { width, height }: { width: number; height: number }): void {
+  const { c2w } = camera;
+  const across = width / camera.width;
+  const down = height / camera.height;
+  gl.uniform3f(uniform("eye"), c2w[3], c2w[7], c2w[11]);
+  gl.uniformMatrix3fv(uniform("rotation"), true, [c2w[0], c2w[1], c2w[2], c2w[4], c2w[5], c2w[6], c2w[8], c2w[9], c2w[10]]);
+  gl.uniform4f(uniform("lens"), camera.fx * across, camera.fy * down, camera.cx * across, camera.cy * down);
+  gl.uniform1f(uniform("height"), height);
+}
