@@ -102,8 +102,8 @@ class PagePictures:
                 "and normals where opacity is above a half.",
                 "- Samples: of a ray that meets something; reads of textures for each, leaps included.",
                 "- Sent: the edits' file. Uploaded: what a new state of the edits puts on the GPU. Lattice: "
-                "largest and mean error of halves, in voxels, against float32 nodes; of the lattice itself see "
-                "`flow_lattice.md`.",
+                "largest and mean error of halves, in voxels, against float32 nodes; of the lattice itself "
+                "see `flow_lattice.md`.",
                 "- Page, kernel: a picture of 200x150, the page's in software (SwiftShader).",
                 f"- {cpu_model()}, 2 cores. `python benchmarks/page_pictures.py FOLDER`",
                 "",
