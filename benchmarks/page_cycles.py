@@ -102,6 +102,7 @@ class PageCycles:
                 page.goto(link)
                 used(page)
                 objects = sum(page.evaluate("({...gpuObjects})").values())
+                page.evaluate("try { sessionStorage.clear() } catch {}")
                 page.goto("about:blank")
                 if cycle % max(1, self.cycles // 10) == 0 or cycle == 1:
                     session.send("HeapProfiler.collectGarbage")
@@ -156,6 +157,7 @@ def editor(page: Page) -> None:
     """Waits until the page has drawn the view that is turned."""
     until(page, "Boolean(window.cagefield && cagefield.now.state) && cagefield.page.draws")
     page.keyboard.press("n")
+    page.keyboard.press("o")
     until(page, "cagefield.settled")
     page.mouse.move(120, 330)
     page.mouse.down()

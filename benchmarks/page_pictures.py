@@ -27,8 +27,9 @@ from cagefield.benchmarking.machine import cpu_model
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, load_edits
 from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import encode_page_edits, for_pages
+from cagefield.formats.page_edits import MAGIC, VERSION, encode_page_edits, for_pages
 from cagefield.formats.page_field import encode_page_field
+from cagefield.formats.page_file import unpack
 from cagefield.rendering.metrics import psnr
 from cagefield.rendering.occupancy import of_field
 from cagefield.rendering.render_result import RenderResult, to_uint8
@@ -45,8 +46,8 @@ EDITS = {
     "room": ("room_digger_taller",),
 }
 HEAD = (
-    "| scene | edit | rgb | opacity | depth | normals | samples | reads a sample | shader, ms | upload, MB "
-    "| lattice, voxels | page, ms | kernel, ms |"
+    "| scene | edit | rgb | opacity | depth | normals | samples | reads a sample | shader, ms | sent, MB "
+    "| uploaded, MB | lattice, voxels | page, frames/s | kernel, frames/s |"
 )
 
 
@@ -94,14 +95,15 @@ class PagePictures:
                 *fields,
                 "",
                 HEAD,
-                "| --- | --- |" + " ---: |" * 11,
+                "| --- | --- |" + " ---: |" * 12,
                 *rows,
                 "",
                 f"- rgb, opacity, depth, normals: PSNR in dB at {self.width}x{self.width * 3 // 4}, of depth "
                 "and normals where opacity is above a half.",
                 "- Samples: of a ray that meets something; reads of textures for each, leaps included.",
-                "- Upload: the edits' file. Lattice: largest and mean error of halves, in voxels, against "
-                "float32 nodes; of the lattice itself see `flow_lattice.md`.",
+                "- Sent: the edits' file. Uploaded: what a new state of the edits puts on the GPU. Lattice: "
+                "largest and mean error of halves, in voxels, against float32 nodes; of the lattice itself "
+                "see `flow_lattice.md`.",
                 "- Page, kernel: a picture of 200x150, the page's in software (SwiftShader).",
                 f"- {cpu_model()}, 2 cores. `python benchmarks/page_pictures.py FOLDER`",
                 "",
@@ -139,9 +141,10 @@ class PagePictures:
                 f"{reads.sum() / samples.sum():.1f}",
                 f"{compiled:.0f}",
                 f"{len(data) / 1e6:.2f}" if edit else "",
+                f"{uploaded(data) / 1e6:.2f}" if edit else "",
                 lattice_error(renderer, field.sample_spacing) if edit else "",
-                f"{page_ms:.0f}",
-                f"{1000 * float(np.median(times)):.0f}",
+                f"{1000 / page_ms:.2g}",
+                f"{1 / float(np.median(times)):.2g}",
             ]
             self._save(f"{name}_{edit or 'unedited'}", ours, drawn)
             yield f"| {name} | {edit.replace('_', ' ')} | " + " | ".join(cells) + " |"
@@ -182,6 +185,11 @@ def brick_bytes(field: VoxelField, side: int) -> int:
     held = split.any(axis=(1, 3, 5))
     texel = 2 + 4 * -(-3 * (field.sh_degree + 1) ** 2 // 4)
     return int(held.sum()) * (side + 1) ** 3 * texel + 4 * held.size
+
+
+def uploaded(data: bytes) -> int:
+    """Bytes of the arrays in a file of edits."""
+    return sum(array.nbytes for array in unpack(data, MAGIC, VERSION, "edits for pages")[1].values())
 
 
 def lattice_error(renderer: Renderer, voxel: float) -> str:

@@ -38,6 +38,7 @@ from editor_page import CHROMIUM, FLAGS
 PATIENCE = 300.0
 LEVEL = "window.cagefieldViewer?.viewer?.renderer.level"
 DRAWN = "cagefieldViewer.viewer.whole"
+FIRST = "window.cagefieldViewer?.viewer?.pictures > 0"
 
 
 @dataclass
@@ -76,7 +77,7 @@ class SlowLine:
             ):
                 shown = self._shown(
                     f"{link}/{address}",
-                    (f"{LEVEL} !== null && {LEVEL} !== undefined && {DRAWN}", f"{LEVEL}?.last && {DRAWN}"),
+                    (FIRST, f"{LEVEL}?.last && {DRAWN}"),
                 )
                 rows.append((name, first, shown[0], all_, shown[1]))
         with editor(self.scene) as link:

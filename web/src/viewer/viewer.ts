@@ -36,6 +36,10 @@ export class SceneViewer {
   private moved = performance.now();
   /** The next row of the whole picture; null where it is shown. */
   private row: number | null = 0;
+  /** Whether what is to be seen has been shown at all, if small: only then is the whole picture drawn. */
+  private sketched = false;
+  /** Pictures that have been shown. */
+  pictures = 0;
   private playing: number | null = null;
   /** The scene's edits; undefined while they are on their way. */
   private edits: PageEdits | null | undefined;
@@ -151,6 +155,7 @@ export class SceneViewer {
   private touch(): void {
     this.moved = performance.now();
     this.row = 0;
+    this.sketched = false;
   }
 
   private async draw(): Promise<void> {
@@ -179,7 +184,7 @@ export class SceneViewer {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) => Math.max(1, Math.round(n * dense)));
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const scale = pacing.scale(width, height);
-    const still = performance.now() - this.moved > STILL || scale === 1;
+    const still = (this.sketched && performance.now() - this.moved > STILL) || scale === 1;
     const size = still ? [width, height] : [width, height].map((n) => Math.max(8, Math.round(n * scale)));
     this.aim(size[0], size[1]);
     const first = still ? this.row : 0;
@@ -187,9 +192,13 @@ export class SceneViewer {
     const moved = this.moved;
     if (!renderer.render({ rows: { first, count } })) return;
     const whole = first + count >= size[1];
-    if (whole) renderer.show(width, height);
+    if (whole) {
+      renderer.show(width, height);
+      this.pictures++;
+    }
     pacing.took(size[0] * count, await finished(gl));
     if (this.moved !== moved) return;
+    this.sketched = true;
     if (still) this.row = whole ? null : first + count;
   }
 
