@@ -129,6 +129,8 @@ def test_a_second_editor_is_told_who_has_the_scene(scene: Path, capsys: pytest.C
         subprocess.run(
             [sys.executable, "-c", _HOLDER, str(scene)], check=True, input=b"", capture_output=True
         )
+    command = [sys.executable, "-c", _HOLDER, str(scene)]
+    assert subprocess.run(command, input=b"", capture_output=True).returncode != 0
     second.release()
     assert not (scene.parent / ".scene.cagefield-lock").exists()
     assert subprocess.run(command, input=b"", capture_output=True).returncode == 0
