@@ -10,6 +10,8 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.parse
+import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +35,21 @@ class EditorServer:
         match = re.search(r":(\d+)/", self.link)
         assert match
         return int(match.group(1))
+
+    @property
+    def token(self) -> str:
+        """What the link has after `?token=`."""
+        return urllib.parse.unquote(self.link.partition("?token=")[2])
+
+    @property
+    def headers(self) -> dict[str, str]:
+        """What a program sends that is let in."""
+        return {"Authorization": f"Bearer {self.token}"}
+
+    def get(self, path: str) -> Any:
+        """The answer to a request for a path, such as "/edits.yaml"."""
+        address = f"http://localhost:{self.port}{path}"
+        return urllib.request.urlopen(urllib.request.Request(address, headers=self.headers))
 
     def kill(self) -> None:
         """Ends it as a crash would."""
@@ -133,10 +150,14 @@ class PageClient:
 
 
 @contextlib.contextmanager
-def page(server: EditorServer, *, slow: bool = False) -> Iterator[tuple[PageClient, dict[str, Any]]]:
-    """A page that has just been opened, and what it was told first."""
+def page(
+    server: EditorServer, *, slow: bool = False, known: bool = True
+) -> Iterator[tuple[PageClient, dict[str, Any]]]:
+    """A page that has just been opened, and what it was told first; `known` has the token's cookie."""
     origin = f"http://localhost:{server.port}"
-    with connect(f"ws://localhost:{server.port}/socket", origin=origin, max_size=None) as socket:
+    cookie = {"Cookie": f"cagefield_{server.port}={server.token}"} if known else {}
+    address = f"ws://localhost:{server.port}/socket"
+    with connect(address, origin=origin, max_size=None, additional_headers=cookie) as socket:
         client = PageClient(socket, slow)
         hello = client.until(lambda m: m["type"] == "hello")
         client.joined = client.state()

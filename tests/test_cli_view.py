@@ -66,6 +66,7 @@ def test_a_damaged_scene_is_one_line_that_names_the_file(
     [
         (("--port", "70000"), "--port is 70000; give a number from 0 to 65535"),
         (("--token", "short"), "--token is too short"),
+        (("--root", "nowhere"), "--root nowhere is no folder"),
         (("--host", "no such host"), "is no address"),
         (("--host", "192.0.2.1", "--port", "0"), "cannot listen on 192.0.2.1:0"),
     ],
@@ -85,12 +86,36 @@ def test_a_port_that_is_taken_is_one_line(capsys: pytest.CaptureFixture[str], sc
     assert f"cannot listen on 127.0.0.1:{port}" in message and "give another --port" in message
 
 
-def test_at_home_no_token_is_needed(
-    capsys: pytest.CaptureFixture[str], scene: Path, served: list[Guard]
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of the test's own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "cagefield"
+
+
+def test_at_home_a_token_is_needed_too_and_stays_the_same(
+    capsys: pytest.CaptureFixture[str], scene: Path, served: list[Guard], cache: Path
 ) -> None:
+    """Other users of the machine reach the port; pages that are open come again after a restart."""
+    for _ in range(2):
+        text = printed(capsys, "view", scene, "--no-browser", "--port", "0")
+        assert f"http://localhost:{served[-1].port}/?token={served[-1].token}  (" in text
+    first, second = (guard.token for guard in served)
+    assert first == second and first is not None and len(first) >= 32
+    assert (cache / "token").stat().st_mode & 0o777 == 0o600
+    (cache / "token").chmod(0o644)
+    printed(capsys, "view", scene, "--no-browser", "--port", "0")
+    assert served[-1].token != first
+
+
+def test_a_token_from_the_environment(
+    capsys: pytest.CaptureFixture[str], scene: Path, served: list[Guard], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CAGEFIELD_TOKEN", "from the environment")
     text = printed(capsys, "view", scene, "--no-browser", "--port", "0")
-    (guard,) = served
-    assert guard.token is None and f"http://localhost:{guard.port}/  (" in text
+    assert served[0].token == "from the environment" and "?token=from+the+environment  (" in text
+    monkeypatch.setenv("CAGEFIELD_TOKEN", "short")
+    assert "$CAGEFIELD_TOKEN is too short" in refused(capsys, "view", scene, "--no-browser")
 
 
 def test_other_machines_need_the_token_in_the_link(
@@ -109,7 +134,7 @@ def test_the_browser_is_opened_unless_told_not_to(
     monkeypatch.setattr("webbrowser.open", opened.append)
     printed(capsys, "view", scene, "--port", "0")
     printed(capsys, "view", scene, "--port", "0", "--no-browser")
-    assert opened == [f"http://localhost:{served[0].port}/"]
+    assert opened == [f"http://localhost:{served[0].port}/?token={served[0].token}"]
 
 
 @pytest.mark.parametrize(("answer", "opens"), [("y", 1), ("", 0), ("n", 0)])

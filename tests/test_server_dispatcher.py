@@ -12,8 +12,16 @@ from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.server.render_queue import dispatcher as module
 from cagefield.server.render_queue.damage import WHOLE, Rect
-from cagefield.server.render_queue.dispatcher import RESTARTS, BackgroundTask, Dispatcher, Stamp
+from cagefield.server.render_queue.dispatcher import (
+    PATIENT,
+    RESTARTS,
+    BackgroundTask,
+    Dispatcher,
+    Stamp,
+    TooManyError,
+)
 from cagefield.server.render_queue.requests import Request
+from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import (
     Answered,
     Failed,
@@ -22,6 +30,7 @@ from cagefield.server.render_worker.tasks import (
     Ready,
     Result,
     Shown,
+    StillTask,
     Stopped,
     SurfaceTask,
     Task,
@@ -248,5 +257,63 @@ def test_a_scene_that_the_process_cannot_read_is_told(
         worker.answer(Failed(0, "scene x does not exist"))
         await settle()
         assert source.notices == ["scene x does not exist"]
+
+    play(source, monkeypatch, script)
+
+
+def still(number: int, generation: int) -> StillTask:
+    return StillTask(number, Shown(()), CAMERA, Display(), generation)
+
+
+def test_downloads_wait_for_pictures_and_give_way_to_them(
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        asked = asyncio.ensure_future(dispatcher.ask_patiently(still))
+        await settle()
+        (first,) = worker.tasks
+        assert isinstance(first, StillTask)
+        dispatcher.scheduler.join(1)
+        dispatcher.scheduler.camera(1, 1, 64, 64, True, 0.0)
+        dispatcher.pump()
+        assert worker.generation > first.generation  # it is abandoned
+        worker.answer(Stopped(first.number))
+        await settle()
+        picture = worker.tasks[-1]
+        assert isinstance(picture, PictureTask) and not asked.done()
+        worker.answer(done(picture))
+        await settle()
+        dispatcher.scheduler.presented(1, picture.number)
+        dispatcher.scheduler.leave(1)
+        dispatcher.pump()
+        again = worker.tasks[-1]
+        assert isinstance(again, StillTask) and again.generation >= worker.generation
+        worker.answer(Answered(again.number, b"png"))
+        assert await asked == b"png"
+
+    play(source, monkeypatch, script)
+
+
+def test_downloads_that_nobody_waits_for_are_dropped_and_only_some_wait(
+    source: PlayedDispatcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def script(dispatcher: Dispatcher, worker: PlayedWorker) -> None:
+        asked = [asyncio.ensure_future(dispatcher.ask_patiently(still)) for _ in range(60)]
+        await settle()
+        refused = [one for one in asked if one.done()]
+        assert len(refused) == 60 - PATIENT
+        assert all(isinstance(one.exception(), TooManyError) for one in refused)
+        (first,) = worker.tasks
+        for one in asked[:PATIENT]:
+            one.cancel()
+        await settle()
+        assert worker.generation > first.number and worker.generation > getattr(first, "generation", -1)
+        worker.answer(Stopped(first.number))
+        await settle()
+        assert worker.tasks == [first]
+        surely = asyncio.ensure_future(dispatcher.ask_patiently(still))
+        await settle()
+        worker.answer(Answered(worker.tasks[-1].number, b"png"))
+        assert await surely == b"png"
 
     play(source, monkeypatch, script)

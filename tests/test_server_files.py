@@ -202,7 +202,7 @@ def test_a_dropped_file_takes_the_scenes_place_and_pages_come_again(
             f"{origin}/open",
             params={"name": "C:\\captures\\other.ply"},
             content=(tmp_path / "other.ply").read_bytes(),
-            headers={"Origin": origin},
+            headers={**server.headers, "Origin": origin},
             timeout=120,
         )
         assert (answer.status_code, answer.text) == (200, "opened")
@@ -233,7 +233,7 @@ def test_a_download_has_the_edits_in_it_and_the_page_that_asked_is_told(
         job = done(client)
         assert (job["state"], job["page"], job["out"]) == ("done", hello["page"], "ball.ply")
         address = f"http://localhost:{server.port}/exports/{job['job']}/ball.ply"
-        answer = httpx.get(address)
+        answer = httpx.get(address, headers=server.headers)
         assert 'filename="ball.ply"' in answer.headers["content-disposition"]
         (tmp_path / "down.ply").write_bytes(answer.content)
         means = read_splats(tmp_path / "down.ply").means
@@ -241,8 +241,12 @@ def test_a_download_has_the_edits_in_it_and_the_page_that_asked_is_told(
         np.testing.assert_allclose(
             means[np.lexsort(means.T)], expected[np.lexsort(expected.T)], atol=2e-6
         )  # float32 at 3.5
-        assert httpx.get(address, headers={"Origin": "http://evil.example"}).status_code == 403
-        assert httpx.get(address.replace(f"/{job['job']}/", "/999/")).status_code == 404
+        assert (
+            httpx.get(address, headers={**server.headers, "Origin": "http://evil.example"}).status_code == 403
+        )
+        assert (
+            httpx.get(address.replace(f"/{job['job']}/", "/999/"), headers=server.headers).status_code == 404
+        )
 
 
 def test_an_export_can_be_stopped(server: EditorServer) -> None:
@@ -251,7 +255,12 @@ def test_an_export_can_be_stopped(server: EditorServer) -> None:
         job = client.until(lambda m: m["type"] == "job" and m["state"] == "running")
         client.send("cancel_job", job=job["job"])
         assert done(client)["state"] == "cancelled"
-        assert httpx.get(f"http://localhost:{server.port}/exports/{job['job']}/ball.ply").status_code == 404
+        assert (
+            httpx.get(
+                f"http://localhost:{server.port}/exports/{job['job']}/ball.ply", headers=server.headers
+            ).status_code
+            == 404
+        )
 
 
 def test_voxels_have_no_splats_to_download(tmp_path: Path) -> None:

@@ -18,11 +18,16 @@ def refusal(
     token: str | None = None,
     cookie: str | None = None,
     needs_origin: bool = False,
+    site: str | None = None,
+    has_data: bool = True,
+    bearer: str | None = None,
 ) -> str | None:
     headers = {"host": host} | ({} if origin is None else {"origin": origin})
+    headers |= {} if site is None else {"sec-fetch-site": site}
+    headers |= {} if bearer is None else {"authorization": f"Bearer {bearer}"}
     cookies = {} if cookie is None else {guard.cookie: cookie}
     query = {} if token is None else {"token": token}
-    return guard.refusal(headers, cookies, query, needs_origin=needs_origin)
+    return guard.refusal(headers, cookies, query, needs_origin=needs_origin, has_data=has_data)
 
 
 @pytest.mark.parametrize("host", ["localhost:8741", "127.0.0.1:8741", "[::1]:8741", "LOCALHOST:8741"])
@@ -58,6 +63,19 @@ def test_other_machines_need_the_token() -> None:
     assert refusal(OPEN, host, token="secret-token") is None
     assert refusal(OPEN, host, cookie="secret-token") is None
     assert "does not answer to" in (refusal(OPEN, "evil.example:8741", token="secret-token") or "")
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "something new"])
+def test_other_sites_get_no_data_but_may_lead_to_the_page(site: str) -> None:
+    assert "another site's page asked for this" in (refusal(HOME, site=site) or "")
+    assert refusal(HOME, site=site, has_data=False) is None
+    for own in ("same-origin", "none"):
+        assert refusal(HOME, site=own) is None
+
+
+def test_programs_send_the_token_in_a_header() -> None:
+    assert refusal(OPEN, bearer="secret-token") is None
+    assert "token is missing" in (refusal(OPEN, bearer="secret-tokem") or "")
 
 
 def test_loopback_addresses() -> None:

@@ -249,14 +249,19 @@ def test_sockets_of_other_sites_are_refused(server: EditorServer, headers: dict[
     with (
         socket.create_connection(("localhost", server.port)) as plain,
         pytest.raises(InvalidStatus, match="403"),
-        connect(f"ws://{host.replace('PORT', port)}/socket", sock=plain, origin=origin),
+        connect(
+            f"ws://{host.replace('PORT', port)}/socket",
+            sock=plain,
+            origin=origin,
+            additional_headers=server.headers,
+        ),
     ):
         pass
 
 
 def test_requests_under_another_name_are_refused(server: EditorServer) -> None:
     request = urllib.request.Request(
-        f"http://localhost:{server.port}/edits.yaml", headers={"Host": "evil.example"}
+        f"http://localhost:{server.port}/edits.yaml", headers={**server.headers, "Host": "evil.example"}
     )
     with pytest.raises(urllib.error.HTTPError) as refused:
         urllib.request.urlopen(request)
@@ -268,17 +273,21 @@ def test_the_page_the_edit_file_and_a_screenshot_are_served(server: EditorServer
         load(client, BALL)
         client.look_from(hello, 64)
         client.final()
-        link = f"http://localhost:{server.port}"
-        with urllib.request.urlopen(f"{link}/") as answer:
+        with server.get("/") as answer:
             assert answer.status == 200 and "default-src 'self'" in answer.headers["Content-Security-Policy"]
+            assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
         file = tmp_path / "edits.yaml"
-        file.write_bytes(urllib.request.urlopen(f"{link}/edits.yaml").read())
+        file.write_bytes(server.get("/edits.yaml").read())
         assert [edit.name for edit in load_edits(file)] == ["ball"]
-        shot = urllib.request.urlopen(f"{link}/screenshot.png?page={hello['page']}").read()
+        shot = server.get(f"/screenshot.png?page={hello['page']}").read()
         assert Image.open(io.BytesIO(shot)).size == (64, 64)
-        assert urllib.request.urlopen(f"{link}/screenshot.png").read() == shot  # of the newest page
+        assert server.get("/screenshot.png").read() == shot  # of the newest page
         with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"{link}/screenshot.png?page=999")
+            server.get("/screenshot.png?page=999")
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            server.get("/screenshot.png?page=" + "9" * 5000)
+        with pytest.raises(urllib.error.HTTPError, match="404"):  # and leads to no other site
+            server.get(f"//other.example/?token={server.token}")
 
 
 def test_cages_are_placed_on_the_surface_and_fitted(server: EditorServer) -> None:
@@ -485,7 +494,7 @@ def test_with_a_token_only_its_holders_get_in(tmp_path: Path) -> None:
         assert server.link.endswith("?token=a-long-token")
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(link)
-        with pytest.raises(InvalidStatus, match="403"), page(server):
+        with pytest.raises(InvalidStatus, match="403"), page(server, known=False):
             pass
         opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
         with opener.open(server.link) as answer:

@@ -33,9 +33,15 @@ def upgrade(server: EditorServer, origin: str | None = None) -> bytes:
     host = f"localhost:{server.port}"
     return (
         f"GET /socket HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin or 'http://' + host}\r\n"
+        f"Authorization: Bearer {server.token}\r\n"
         "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
         "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     ).encode()
+
+
+def _get(server: EditorServer, path: str) -> bytes:
+    host, token = f"localhost:{server.port}", server.token
+    return f"GET {path} HTTP/1.1\r\nHost: {host}\r\nAuthorization: Bearer {token}\r\n\r\n".encode()
 
 
 def frame(text: str) -> bytes:
@@ -82,11 +88,11 @@ def is_too_many(server: EditorServer, peer: socket.socket) -> None:
 
 
 def downloads(server: EditorServer, peer: socket.socket) -> None:
-    peer.sendall(f"GET /index.html HTTP/1.1\r\nHost: localhost:{server.port}\r\n\r\n".encode())
+    peer.sendall(_get(server, "/index.html"))
 
 
 def wants_a_screenshot(server: EditorServer, peer: socket.socket) -> None:
-    peer.sendall(f"GET /screenshot.png HTTP/1.1\r\nHost: localhost:{server.port}\r\n\r\n".encode())
+    peer.sendall(_get(server, "/screenshot.png"))
 
 
 VANISHING: list[Callable[[EditorServer, socket.socket], None]] = [

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlencode
 
 import tyro
 
@@ -21,9 +23,11 @@ class View:
     port: int = 8741
     """Port to listen on; 0 takes any that is free."""
     host: str = "localhost"
-    """Address to listen on. Any but this machine's own needs the token in the printed link."""
+    """Address to listen on; pages need the token in the printed link, wherever they are."""
     token: str | None = None
-    """Token that a page must know; a new one is made where --host needs one and none is given."""
+    """Token that a page must know; left out, $CAGEFIELD_TOKEN, which no process list shows, or a new one."""
+    root: Path | None = None
+    """Folder that pages may save and render into; left out, the one that the scene is in."""
     no_browser: Flag = False
     """Print the link, but do not open it."""
     device: Device = "auto"
@@ -32,16 +36,22 @@ class View:
         """Serves until Ctrl+C."""
         if not 0 <= self.port <= 65535:
             raise CagefieldError(f"--port is {self.port}; give a number from 0 to 65535")
-        if self.token is not None and len(self.token) < 8:
-            raise CagefieldError("--token is too short to keep anybody out; give 8 characters or more")
+        given = self.token or os.environ.get("CAGEFIELD_TOKEN") or None
+        if given is not None and (len(given) < 8 or not given.isascii() or not given.isprintable()):
+            what = "--token" if self.token else "$CAGEFIELD_TOKEN"
+            raise CagefieldError(
+                f"{what} is too short to keep anybody out; give 8 characters of ASCII or more"
+            )
+        if self.root is not None and not self.root.is_dir():
+            raise CagefieldError(f"--root {self.root} is no folder; give one that pages may save into")
         from cagefield.server.web.launch import bound_socket, open_scene, serve
-        from cagefield.server.web.security import Guard, is_loopback, new_token
+        from cagefield.server.web.security import Guard, is_loopback, new_token, own_token
 
-        coordinator, hello = open_scene(self.scene, self.device)
+        coordinator, hello = open_scene(self.scene, self.device, self.root)
         listening = bound_socket(self.host, self.port)
         port = int(listening.getsockname()[1])
-        token = self.token or (None if is_loopback(self.host) else new_token())
-        link = f"http://{_shown(self.host)}:{port}/" + (f"?token={token}" if token else "")
+        token = given or (own_token() if is_loopback(self.host) else new_token())
+        link = f"http://{_shown(self.host)}:{port}/?{urlencode({'token': token})}"
         print(f"editing {self.scene}: open {link}  (Ctrl+C ends)", flush=True)
         if not self.no_browser:
             webbrowser.open(link)

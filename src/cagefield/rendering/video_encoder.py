@@ -10,6 +10,9 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
 
+_COMMENT = "made with cagefield"
+"""What the file says of itself."""
+
 _CAUSES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EACCES, errno.EROFS)
 """What ffmpeg's own words about a file are searched for."""
 
@@ -29,7 +32,7 @@ def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iter
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-nostdin", "-xerror", "-v", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", rate, "-i", "pipe:0"),
         *("-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", str(quality)),
-        *("-movflags", "+faststart", str(path)),
+        *("-metadata", f"comment={_COMMENT}", "-movflags", "+faststart", str(path)),
     ]
     process = subprocess.Popen(
         command,
@@ -60,6 +63,16 @@ def encoder(path: Path, size: tuple[int, int], fps: float, quality: int) -> Iter
         if process.stderr is not None:
             process.stderr.close()
         process.wait()
+
+
+def is_ours(path: Path) -> bool:
+    """True for a video that an `encoder` wrote."""
+    try:
+        with path.open("rb") as file:
+            # The comment stands at the end of what comes before the pictures, 8 to 20 bytes each.
+            return _COMMENT.encode() in file.read(1 << 24)
+    except OSError:
+        return False
 
 
 def _failure(process: subprocess.Popen[bytes], path: Path) -> OSError:

@@ -22,6 +22,7 @@ from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
+from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
 
 CAMERA_PATH = "camera_path.json"
@@ -35,11 +36,17 @@ class SceneStore:
     `source`: its scene lies in the user's cache, and there is nothing to save to before Save as.
     """
 
-    def __init__(self, scene: Scene, path: Path, source: Path | None = None) -> None:
+    def __init__(
+        self, scene: Scene, path: Path, source: Path | None = None, root: Path | None = None
+    ) -> None:
+        """`root` is the folder that pages may write into; None for the one that the scene is in."""
         self.scene = scene
         self.source = None if source is None else source.resolve()
         self.origin = path.resolve()
         self.path = path.resolve()
+        self.root = (self.shown_path.parent if root is None else root).resolve()
+        """What pages save and render lies in it."""
+        self._lock: SceneLock | None = None
         self.trouble: str | None = None
         """Why the last autosave failed, or None."""
         self._written = self._fingerprint()
@@ -72,7 +79,33 @@ class SceneStore:
         """The folder of the scene; for a file, one beside it that Save as may make."""
         return self.path if self.source is None else self.source.with_name(f"{stem_of(self.source)}-scene")
 
+    def lock(self) -> None:
+        """Keeps other programs from editing the scene. Raises SceneError where one does."""
+        self._lock = SceneLock(self.path)
+
+    def close(self) -> None:
+        """Lets other programs edit the scene."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
+
     # ---- keeping ----
+
+    def place(self, path: str) -> Path:
+        """Where a page may write what it calls `path`: in `root`, and relative to the scene's place.
+
+        Raises SceneError for any other place.
+        """
+        try:
+            place = (self.shown_path.parent / Path(path).expanduser()).resolve()
+        except (OSError, ValueError, RuntimeError) as error:
+            raise SceneError(f"{path!r:.200} is no place for a file ({error}); give a name") from None
+        if place == self.root or not place.is_relative_to(self.root):
+            raise SceneError(
+                f"{place} lies outside {self.root}, where pages may save; give a name without folders, "
+                "or start the editor with --root"
+            )
+        return place
 
     @property
     def autosave_path(self) -> Path:
@@ -126,12 +159,22 @@ class SceneStore:
 
         Raises SceneError where something is there that may not be replaced.
         """
-        target = Path(path).expanduser()
-        if not target.is_absolute():
-            target = self.shown_path.parent / target
-        if target.resolve() == self.path:
+        target = self.place(path)
+        if target == self.path:
             self.save(session)
             return
+        lock = None if self._lock is None else SceneLock(target)
+        try:
+            self._save_as(session, target, overwrite)
+        except BaseException:
+            if lock is not None:
+                lock.release()
+            raise
+        if lock is not None:
+            self.close()
+            self._lock = lock
+
+    def _save_as(self, session: Session, target: Path, overwrite: bool) -> None:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         try:

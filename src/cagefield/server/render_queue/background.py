@@ -6,7 +6,6 @@ It makes its kernels ready, then measures the lattices of edits, then renders th
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
@@ -119,9 +118,7 @@ class BackgroundWork:
 
     def render(self, message: client_messages.RenderJob) -> None:
         """Begins a job. Raises CagefieldError where it could not write its result."""
-        out = Path(message.out).expanduser()
-        if not out.is_absolute():
-            out = self._store.shown_path.parent / out
+        out = self._store.place(message.out)
         self._numbers += 1
         document, size = self._session.document, (message.width, message.height)
         if message.what == "camera_path":

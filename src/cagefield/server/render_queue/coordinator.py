@@ -21,7 +21,7 @@ from cagefield.server.protocol.message_queues import SendQueue
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_queue.binary_messages import edits_message, picture_message
 from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
-from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp
+from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp, TooManyError
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import spread
 from cagefield.server.render_worker.pictures import Display
@@ -86,6 +86,8 @@ class Coordinator:
         self._stacks: dict[int, tuple[EditStack, bool]] = {}
         """The edits and the opacity choice of pictures' revisions, of those that pages may still show."""
         self._trouble: str | None = None
+        self._asking: set[int] = set()
+        """Pages of which a picture is made for a download."""
         self._preview: tuple[int, int] | None = None
         """The page and the number of the preview that pages were told of."""
 
@@ -195,11 +197,25 @@ class Coordinator:
         """Ends the rendering process and what goes on, and tells the pages to come again."""
         self.background.exports.close()
         self.dispatcher.close()
+        self.store.close()
 
     async def ask(self, make: Callable[[int], Task]) -> Any:
         """What the rendering process answers to a task. Raises CagefieldError."""
         self.dispatcher.interrupt()
         return await self.dispatcher.ask(make)
+
+    async def ask_patiently(self, page: int, make: Callable[[int, int], Task]) -> Any:
+        """The same of a task that gives way to pages' pictures; one at a time of each page.
+
+        Raises TooManyError where the page has one already, or too many wait.
+        """
+        if page in self._asking:
+            raise TooManyError("a picture of this page is being made already; try again when it is there")
+        self._asking.add(page)
+        try:
+            return await self.dispatcher.ask_patiently(make)
+        finally:
+            self._asking.discard(page)
 
     def shown(self) -> Shown:
         """What pictures show now."""

@@ -38,7 +38,15 @@ RESTARTS = 3
 
 _GIVEN_UP = "the renderer ends again and again (out of memory?); save your edits and restart the editor"
 
+PATIENT = 4
+"""Tasks that wait until no page does, at most."""
+
 Make = Callable[[int], Task]
+_Patient = tuple[Callable[[int, int], Task], asyncio.Future[Any]]
+
+
+class TooManyError(CagefieldError):
+    """More is asked for than is kept waiting."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,9 @@ class Dispatcher:
         self._given_up = False
         self._running: _Running | None = None
         self._queue: deque[_Running] = deque()
+        self._patient: list[_Patient] = []
+        self._asked: _Patient | None = None
+        """Of `_patient` the one that is being done."""
         self._numbers = 0
         self._wake: asyncio.TimerHandle | None = None
         self._losses: list[float] = []
@@ -141,6 +152,50 @@ class Dispatcher:
         self.pump()
         return await future
 
+    async def ask_patiently(self, make: Callable[[int, int], Task]) -> Any:
+        """The same of a task `make(number, generation)` that waits until no page does, and gives way to them.
+
+        Begun anew where a page interrupts it; not done at all where the caller is cancelled before.
+
+        Raises:
+            CagefieldError: it cannot be done.
+            TooManyError: PATIENT of them wait already.
+        """
+        if self._given_up:
+            raise CagefieldError(_GIVEN_UP)
+        if len(self._patient) >= PATIENT:
+            raise TooManyError(f"{PATIENT} pictures are being made already; try again when they are there")
+        future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        waiting = (make, future)
+        self._patient.append(waiting)
+        try:
+            self.pump()
+            return await future
+        finally:
+            self._patient.remove(waiting)
+            if self._asked is waiting:  # nobody waits for what is being done
+                self.interrupt()
+                self.worker.abandon(self.scheduler.generation)
+
+    def _patient_task(self) -> _Running | None:
+        waiting = next((each for each in self._patient if not each[1].done()), None)
+        if waiting is None:
+            return None
+        make, future = waiting
+
+        def done(result: Result) -> None:
+            self._asked = None
+            if future.done() or isinstance(result, Stopped):
+                return
+            if isinstance(result, Answered):
+                future.set_result(result.value)
+            else:
+                text = result.text if isinstance(result, Failed) else "it could not be made; try again"
+                future.set_exception(CagefieldError(text))
+
+        self._asked = waiting
+        return _Running(make(self._number(), self.scheduler.generation), done=done)
+
     def pump(self) -> None:
         """Gives the rendering process its next task, if it is free; abandons what nobody wants any more."""
         now = time.monotonic()
@@ -171,7 +226,12 @@ class Dispatcher:
         if request is not None:
             task, stamp = self._source.picture_task(request, self.scheduler.generation)
             return _Running(task, request, stamp)
-        background_task = self._source.background_task() if self.scheduler.idle() else None
+        if not self.scheduler.idle():
+            return None
+        patient = self._patient_task()
+        if patient is not None:
+            return patient
+        background_task = self._source.background_task()
         return (
             None
             if background_task is None
@@ -248,6 +308,9 @@ class Dispatcher:
         while self._queue:
             waiting = self._queue.popleft()
             self._finish(waiting, Failed(waiting.task.number, _GIVEN_UP))
+        for _, future in self._patient:
+            if not future.done():
+                future.set_exception(CagefieldError(_GIVEN_UP))
 
     def _from_thread(self, method: Callable[..., None]) -> Callable[..., None]:
         """The method, callable from another thread: runs in the event loop."""

@@ -9,9 +9,11 @@ from pathlib import Path
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.keyframes import Still, stills
+from cagefield.rendering.video_encoder import is_ours
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.protocol.common import JobKind
+from cagefield.server.render_worker.job_files import MARK
 from cagefield.server.render_worker.tasks import FrameTask, Shown, values_of
 
 
@@ -67,8 +69,13 @@ def test_views(
         raise CagefieldError("the scene has no cameras to render from; record a camera path instead")
     if out.exists() and not out.is_dir():
         raise CagefieldError(f"{out} is a file; give a folder for the pictures")
-    if out.is_dir() and any(out.iterdir()) and not overwrite:
-        raise CagefieldError(f"folder {out} is not empty; give a new one, or choose to overwrite")
+    if out.is_dir() and any(out.iterdir()):
+        if not overwrite:
+            raise CagefieldError(f"folder {out} is not empty; give a new one, or choose to overwrite")
+        if not (out / MARK).is_file():
+            raise CagefieldError(
+                f"folder {out} holds what no editor rendered, and is left as it is; give a new one"
+            )
     found = tuple(Still(_within(camera, size), {}) for camera in cameras)
     return Job(number, "test_views", out, 24.0, found, document)
 
@@ -83,6 +90,8 @@ def camera_path(
         raise CagefieldError(f"{out} is a folder; give the name of a video, ending in .mp4")
     if out.exists() and not overwrite:
         raise CagefieldError(f"{out} exists already; give another name, or choose to overwrite")
+    if out.exists() and not is_ours(out):
+        raise CagefieldError(f"{out} is a video that cagefield did not make, and stays; give another name")
     found = stills(document.keys, loop=document.loop, fps=fps, width=size[0], height=size[1])
     return Job(number, "camera_path", out, fps, found, document)
 

@@ -12,6 +12,9 @@ from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.encoding import BEHIND
 from cagefield.server.render_worker.tasks import FrameTask
 
+MARK = ".cagefield-pictures"
+"""An empty file in folders of pictures that jobs wrote, and may write again."""
+
 
 class JobFiles:
     """What jobs have written so far."""
@@ -24,6 +27,9 @@ class JobFiles:
         if task.what == "test_views":
             digits = max(4, len(str(task.total - 1)))
             pixels = frame.rgba8() if frame.background is None else frame.rgb8()
+            if task.index == 0:
+                Path(task.out).mkdir(parents=True, exist_ok=True)
+                (Path(task.out) / MARK).touch()
             write_png(Path(task.out) / f"{task.index:0{digits}d}.png", pixels)
             return
         if task.job not in self._videos:

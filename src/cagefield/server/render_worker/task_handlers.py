@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from cagefield.edits import Edit, EditStack
-from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
@@ -65,6 +64,8 @@ class TaskHandlers:
             return self._frame(task, lambda: abandoned(task.generation))
         if isinstance(task, ErrorTask):
             return self._error(task, lambda: abandoned(task.generation))
+        if isinstance(task, StillTask):
+            return self._still(task, lambda: abandoned(task.generation))
         return Answered(task.number, self._answer(task))
 
     def close(self) -> None:
@@ -73,14 +74,12 @@ class TaskHandlers:
 
     def _answer(
         self,
-        task: StillTask | SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
+        task: SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
     ) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
         if isinstance(task, FitTask):
             return self._fit(task)
-        if isinstance(task, StillTask):
-            return self._still(task)
         if isinstance(task, WarmTask):
             return self._renderers.warm(task.stage)
         if isinstance(task, EndJobTask):
@@ -108,12 +107,13 @@ class TaskHandlers:
         self._files.add(task, frame)
         return Answered(task.number)
 
-    def _still(self, task: StillTask) -> bytes:
+    def _still(self, task: StillTask, stop: Callable[[], bool]) -> Result:
         """The picture as a PNG."""
-        frame = self._renderers.still(task.shown, task.camera, task.display)
+        frame = self._renderers.still(task.shown, task.camera, task.display, stop)
         if frame is None:
-            raise CagefieldError("the picture was given up; try again")
-        return png(picture_of(frame, task.display.view, self._renderers.reach(task.camera)))
+            return Stopped(task.number)
+        picture = picture_of(frame, task.display.view, self._renderers.reach(task.camera))
+        return Answered(task.number, png(picture))
 
     def _surface(self, task: SurfaceTask) -> tuple[list[float], list[float]] | None:
         """(point, normal) of the surface at a pixel; None where the picture is half empty."""

@@ -56,12 +56,13 @@ class PictureTask:
 
 @dataclass(frozen=True)
 class StillTask:
-    """A whole picture as a PNG."""
+    """A whole picture as a PNG; abandoned as a picture is."""
 
     number: int
     shown: Shown
     camera: Camera
     display: Display
+    generation: int
 
 
 @dataclass(frozen=True)

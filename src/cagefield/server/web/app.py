@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
+from cagefield.server.render_queue.dispatcher import TooManyError
 from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
 from cagefield.server.web.security import Guard
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
@@ -26,6 +28,9 @@ from cagefield.server.web.websocket import attend
 
 STATIC = Path(__file__).parent / "static"
 """The page as it was built."""
+
+_PAGE = frozenset({"/", *("/" + file.relative_to(STATIC).as_posix() for file in STATIC.rglob("*"))})
+"""Paths of the page itself, which other sites may lead to; all others have data of the scene."""
 
 _READING = ("GET", "HEAD")
 """Methods of requests that change nothing; all others must say their origin, as sockets must."""
@@ -37,6 +42,8 @@ _HEADERS = {
     ),
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-cache",
 }
 
@@ -107,11 +114,24 @@ def application(
         camera, display, shown = page.camera, page.display, coordinator.shown()
         if camera is None:
             return PlainTextResponse("this page has sent no camera yet", 409)
+        made = asyncio.ensure_future(
+            coordinator.ask_patiently(
+                page.number, lambda number, generation: StillTask(number, shown, camera, display, generation)
+            )
+        )
+        gone = asyncio.ensure_future(_gone(request))
         try:
-            content = await coordinator.ask(lambda number: StillTask(number, shown, camera, display))
+            await asyncio.wait((made, gone), return_when=asyncio.FIRST_COMPLETED)
+            if not made.done():
+                return PlainTextResponse("nobody waits for this picture any more", 499)
+            return _download(made.result(), "screenshot.png", "image/png")
+        except TooManyError as error:
+            return PlainTextResponse(str(error), 429, headers={"Retry-After": "2"})
         except CagefieldError as error:
             return PlainTextResponse(str(error), 500)
-        return _download(content, "screenshot.png", "image/png")
+        finally:
+            made.cancel()
+            gone.cancel()
 
     async def field(request: Request) -> Response:
         coordinator, name = editor.coordinator, f'"{editor.hello.field}"'
@@ -139,7 +159,13 @@ def application(
 
 def _number(text: str) -> int:
     """The number, or 0, which no page has."""
-    return int(text) if text.isascii() and text.isdigit() else 0
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
+
+
+async def _gone(request: Request) -> None:
+    """Returns when the client has hung up."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
 
 
 def _download(content: str | bytes, name: str, kind: str) -> Response:
@@ -164,6 +190,7 @@ class _Guarded:
             connection.cookies,
             connection.query_params,
             needs_origin=scope["type"] == "websocket" or scope["method"] not in _READING,
+            has_data=scope["type"] == "websocket" or scope["path"] not in _PAGE,
         )
         if scope["type"] == "websocket":
             if refusal is None:
@@ -187,7 +214,8 @@ class _Guarded:
     async def _keep_token(self, scope: Scope, receive: Receive, send: Send) -> None:
         """The token moves from the address to a cookie; what else the address says stays."""
         others = [(k, v) for k, v in HTTPConnection(scope).query_params.multi_items() if k != "token"]
-        response = RedirectResponse(scope["path"] + (f"?{urlencode(others)}" if others else ""), 303)
+        path = "/" + scope["path"].lstrip("/\\")  # two of them would be another site
+        response = RedirectResponse(path + (f"?{urlencode(others)}" if others else ""), 303)
         response.set_cookie(
             self._guard.cookie, self._guard.token or "", httponly=True, samesite="strict", max_age=30 * 86400
         )

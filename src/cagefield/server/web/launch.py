@@ -31,23 +31,28 @@ from cagefield.server.web.opening import scene_of_file
 from cagefield.server.web.security import Guard
 
 
-def open_scene(path: Path, device: str = "auto") -> tuple[Coordinator, server_messages.Hello]:
+def open_scene(
+    path: Path, device: str = "auto", root: Path | None = None
+) -> tuple[Coordinator, server_messages.Hello]:
     """The editor of a scene folder or a file of splats, and what its pages are told first.
 
-    What a crash left is restored. Raises CagefieldError for a folder that is no scene, a file without splats.
+    What a crash left is restored. `root` is the folder that pages may write into, None for the one that the
+    scene is in. Raises CagefieldError for a folder that is no scene, a file without splats, and a scene that
+    another program edits.
     """
     path = path.parent if path.name == META else path
     if path.is_file() or ((path / META).is_file() and not is_scene(path)):
-        return open_cached(scene_of_file(path), path, device)
-    return open_cached(path, None, device)
+        return open_cached(scene_of_file(path), path, device, root)
+    return open_cached(path, None, device, root)
 
 
 def open_cached(
-    path: Path, source: Path | None, device: str = "auto"
+    path: Path, source: Path | None, device: str = "auto", root: Path | None = None
 ) -> tuple[Coordinator, server_messages.Hello]:
     """The same of a scene folder, which is that of a file `source` where one is given."""
     scene = Scene.open(path)
-    store = SceneStore(scene, path, source)
+    store = SceneStore(scene, path, source, root)
+    store.lock()
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()
@@ -140,7 +145,7 @@ def serve(
     device = coordinator.device
 
     def reopen(scene: Path, source: Path) -> tuple[Coordinator, server_messages.Hello]:
-        return open_cached(scene, source, device)
+        return open_cached(scene, source, device, coordinator.store.root)
 
     config = uvicorn.Config(
         application(coordinator, hello, guard, reopen),

@@ -2,18 +2,24 @@
 
 Pages of other sites can make a browser send requests here, with any path and with our cookies. They cannot
 choose `Origin`; a name of theirs that resolves to this machine (DNS rebinding) shows in `Host`. Both must be
-ours. Other machines reach the server only where it was told to listen to them, and then need the token.
+ours. Other programs can send any header, and other users of this machine reach every port: all need the token
+that is in the printed link. Other machines reach the server only where it was told to listen to them.
 """
 
 from __future__ import annotations
 
 import hmac
 import ipaddress
+import os
 import secrets
 import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from urllib.parse import urlsplit
+
+_LEAST = 32
+"""Characters of a token that is taken from a file of ours."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -21,6 +27,33 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 def new_token() -> str:
     """A token that nobody guesses."""
     return secrets.token_urlsafe(24)
+
+
+def own_token() -> str:
+    """The token of this user's editors on this machine: made once, and kept where no other user reads it.
+
+    Pages that are open come again by themselves when an editor is started again. A new one each time where
+    it cannot be kept.
+    """
+    file = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "token"
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            handle = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        except FileExistsError:
+            pass
+        else:
+            with os.fdopen(handle, "w", encoding="ascii") as out:
+                out.write(new_token())
+        status = file.stat()
+        kept = file.read_text(encoding="ascii").strip()
+        private = os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
+        if private and len(kept) >= _LEAST:
+            return kept
+        file.unlink()  # read by others, or cut off: the next editor makes another
+    except (OSError, ValueError):
+        pass
+    return new_token()
 
 
 def is_loopback(host: str) -> bool:
@@ -53,10 +86,12 @@ class Guard:
         query: Mapping[str, str],
         *,
         needs_origin: bool,
+        has_data: bool = True,
     ) -> str | None:
         """Why a request is refused, in a line, or None. Headers have lower-case names.
 
-        A socket must say its origin; other requests may, and then it must be ours too.
+        A socket must say its origin; other requests may, and then it must be ours too. What `has_data` of the
+        scene is not given to other sites, which browsers name in Sec-Fetch-Site: not even as a picture.
         """
         host = headers.get("host", "")
         if not self._is_ours(host):
@@ -64,9 +99,12 @@ class Guard:
         origin = headers.get("origin")
         if (origin is not None or needs_origin) and not _same_origin(origin, host):
             return f"the page at {origin!r} may not talk to this editor; open the link that was printed"
+        if has_data and headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+            return "another site's page asked for this; open the link that `cagefield view` printed"
         if self.token is None:
             return None
-        given = query.get("token") or cookies.get(self.cookie) or ""
+        bearer = headers.get("authorization", "").removeprefix("Bearer ")
+        given = query.get("token") or cookies.get(self.cookie) or bearer
         if not hmac.compare_digest(given.encode(), self.token.encode()):
             return (
                 "the token is missing or wrong; open the link that `cagefield view` printed, ?token= included"

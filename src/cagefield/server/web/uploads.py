@@ -61,7 +61,9 @@ class OpenEditor:
                 scene = await in_own_process(scene_of_file, folder / file_name)
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
-            await self._enter(await asyncio.to_thread(self._reopen, scene, Path.cwd() / file_name))
+            await self._enter(
+                await asyncio.to_thread(self._reopen, scene, self.coordinator.store.root / file_name)
+            )
 
     async def _enter(self, opened: Opened) -> None:
         """Lets pages into another editor; those of the one before come again."""
@@ -71,6 +73,7 @@ class OpenEditor:
         before.background.exports.close()
         # It may take seconds to end its process, which the loop has not.
         await asyncio.to_thread(before.dispatcher.close)
+        before.store.close()
         self.start()
 
     def close(self) -> None:
