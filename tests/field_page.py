@@ -33,9 +33,10 @@ class Drawn:
 
 @dataclass
 class FieldPage:
-    """An open page with one renderer, `r`."""
+    """An open page with one renderer, `r`, of voxels or of splats."""
 
     page: Any
+    splats: bool = False
 
     def load(self, field: bytes) -> dict[str, Any]:
         """Loads a field; figures of it."""
@@ -55,7 +56,10 @@ class FieldPage:
         """Puts edits in the place of those before."""
         text = None if edits is None else base64.b64encode(edits).decode()
         self.page.evaluate(
-            "async (text) => r.setEdits(text && await cagefieldViewer.readEdits(bytes(text)))", text
+            "async (text) => r.setEdits(text && await cagefieldViewer.EDITS(bytes(text)))".replace(
+                "EDITS", "readSplatEdits" if self.splats else "readEdits"
+            ),
+            text,
         )
 
     def draw(self, camera: Camera, *, normals: bool = True, count: bool = False, repeat: int = 1) -> Drawn:
@@ -64,7 +68,7 @@ class FieldPage:
             """([camera, normals, count, repeat]) => {
                 r.setSize(camera.width, camera.height);
                 r.setCamera(camera);
-                r.render({ normals, count });
+                r.render({ normals, count, sorted: true });
                 const got0 = r.read(normals);
                 const began = performance.now();
                 for (let n = 1; n < repeat; n++) { r.render({ normals, count }); r.read(false); }
@@ -87,7 +91,7 @@ class FieldPage:
 
 
 @contextlib.contextmanager
-def field_page() -> Iterator[FieldPage]:
+def field_page(splats: bool = False) -> Iterator[FieldPage]:
     """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if CHROMIUM is None:
@@ -101,11 +105,12 @@ def field_page() -> Iterator[FieldPage]:
         page.on("console", lambda said: complaints.append(said.text))
         page.set_content("<canvas></canvas>")
         page.add_script_tag(content=VIEWER.read_text())
-        page.evaluate(_START)
-        yield FieldPage(page)
+        page.evaluate(_START, "SplatRenderer" if splats else "FieldRenderer")
+        yield FieldPage(page, splats)
         browser.close()
     # Chromium's own words where a test reads pictures back, and takes the context away.
     usual = ("ReadPixels", "CONTEXT_LOST")
+    print(complaints[:5])
     assert [said for said in complaints if not any(word in said for word in usual)] == []
 
 
@@ -113,9 +118,9 @@ def _array(text: str, kind: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), kind)
 
 
-_START = """() => {
+_START = """(renderer) => {
     window.gl = document.querySelector("canvas").getContext("webgl2", { antialias: false });
-    window.r = new cagefieldViewer.FieldRenderer(gl);
+    window.r = new cagefieldViewer[renderer](gl);
     window.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
     window.base64 = (array) => {
         let text = "";

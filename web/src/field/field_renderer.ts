@@ -17,10 +17,11 @@ import { plainUnpacking, programOf, setFilter } from "./gl";
 import type { Program } from "./gl";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
-import { fragment, VERTEX } from "./march_glsl";
+import { fragment } from "./march_glsl";
 import type { Variant } from "./march_glsl";
 import type { PageEdits } from "./page_edits";
 import type { Bytes, OnArrival } from "./page_file";
+import { plainState, show, showProgram, unbind, WHOLE } from "./present";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
 
@@ -66,13 +67,6 @@ interface EditsOnGpu {
 
 /** Bytes of textures that a field may take unless the caller says otherwise. */
 const MEMORY = 768 * 2 ** 20;
-
-const SHOW = `#version 300 es
-precision highp float;
-uniform sampler2D picture;
-uniform vec2 size;
-out vec4 colour;
-void main() { colour = vec4(texture(picture, gl_FragCoord.xy / size).rgb, 1.0); }`;
 
 export class FieldRenderer {
   background: Vec3 = [1, 1, 1];
@@ -183,7 +177,7 @@ export class FieldRenderer {
     this.targets.bind(variant.normals);
     gl.useProgram(program);
     gl.bindVertexArray(this.vertices);
-    this.plainState();
+    plainState(gl);
     this.setField(uniform, shown);
     this.setView(uniform, camera);
     let unit = 0;
@@ -209,25 +203,16 @@ export class FieldRenderer {
     gl.scissor(0, first, width, count);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
-    this.unbind();
+    unbind(gl);
     return true;
   }
 
   /** Puts the colour that was drawn on the canvas, or in a framebuffer, of this size. */
   show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null): void {
     const { gl } = this;
-    const program = this.cached("show", () => programOf(gl, VERTEX, SHOW));
-    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-    gl.viewport(0, 0, width, height);
-    gl.useProgram(program.program);
     gl.bindVertexArray(this.vertices);
-    this.plainState();
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.targets.colour);
-    gl.uniform1i(program.uniform("picture"), 0);
-    gl.uniform2f(program.uniform("size"), width, height);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-    this.unbind();
+    show(gl, this.cached("show", () => showProgram(gl)), this.targets.colour, width, height, framebuffer);
+    unbind(gl);
   }
 
   /** What was drawn, top row first. */
@@ -282,7 +267,7 @@ export class FieldRenderer {
 
   private program(variant: Variant, brick: number): Program {
     return this.cached(JSON.stringify([variant, brick]), () => {
-      const program = programOf(this.gl, VERTEX, fragment(variant, brick));
+      const program = programOf(this.gl, WHOLE, fragment(variant, brick));
       this.compileTime = program.milliseconds;
       return program;
     });
@@ -332,24 +317,5 @@ export class FieldRenderer {
     gl.uniform1f(uniform("height"), height);
     gl.uniform1f(uniform("near"), this.near);
     gl.uniform3f(uniform("background"), ...this.background);
-  }
-
-  private plainState(): void {
-    const { gl } = this;
-    for (const what of [gl.BLEND, gl.DEPTH_TEST, gl.CULL_FACE, gl.STENCIL_TEST, gl.SCISSOR_TEST, gl.DITHER]) gl.disable(what);
-    gl.colorMask(true, true, true, true);
-    gl.depthMask(false);
-  }
-
-  private unbind(): void {
-    const { gl } = this;
-    for (let unit = 15; unit >= 0; unit--) {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, null);
-      gl.bindTexture(gl.TEXTURE_3D, null);
-    }
-    gl.bindVertexArray(null);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.useProgram(null);
   }
 }

@@ -1,12 +1,16 @@
 /** The script of exported scenes: their viewer, and what tests and other pages need of it under one name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
+import { readSplatEdits } from "../splats/splat_edits";
+import { SplatRenderer } from "../splats/splat_renderer";
 import { SceneViewer } from "./viewer";
 import type { SceneHeader } from "./viewer";
 
 interface ViewerApi {
   FieldRenderer: typeof FieldRenderer;
   readEdits: typeof readEdits;
+  SplatRenderer: typeof SplatRenderer;
+  readSplatEdits: typeof readSplatEdits;
   /** The scene that the page shows. */
   viewer?: SceneViewer;
 }
@@ -17,7 +21,7 @@ declare global {
   }
 }
 
-window.cagefieldViewer = { FieldRenderer, readEdits };
+window.cagefieldViewer = { FieldRenderer, readEdits, SplatRenderer, readSplatEdits };
 
 function element(selector: string): HTMLElement {
   const found = document.querySelector<HTMLElement>(selector);

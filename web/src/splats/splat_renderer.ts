@@ -1,0 +1,385 @@
+/**
+ * Draws splats and what edits changed of them with the page's own GPU, with the methods of `FieldRenderer`. Pictures are
+ * those of `rendering.splat_rasterizer`.
+ *
+ * Splats are projected once a picture, into a buffer by transform feedback, in the order from far to near; then each is
+ * a quad that is blended over what is there. The order of many splats comes from a worker: while the view is turned a
+ * picture has the order of a moment ago, and `onOrder` says when it is worth drawing again.
+ */
+import type { LoadOptions, Picture, PinholeCamera } from "../field/field_renderer";
+import { programOf } from "../field/gl";
+import type { Program } from "../field/gl";
+import type { Vec3 } from "../field/level";
+import type { Bytes } from "../field/page_file";
+import { plainState, show, showProgram, unbind, WHOLE } from "../field/present";
+import { Targets } from "../field/targets";
+import type { Reading } from "../field/targets";
+import { QUADS, RESOLVE, SPLAT, withDefines } from "./blend_glsl";
+import type { Depths, SplatSet } from "./depth_order";
+import { formatsOf, Gathering } from "./gathering";
+import type { Formats } from "./gathering";
+import { NOTHING, OUTPUTS, projecting } from "./project_glsl";
+import { Sorter } from "./sorter";
+import type { Order } from "./sorter";
+import type { SplatEdits } from "./splat_edits";
+import { readSplatLevels } from "./splat_file";
+import { SplatStore } from "./splat_store";
+import { GrowingBuffer, WordTexture } from "./splat_textures";
+
+type GL = WebGL2RenderingContext;
+
+/** Bytes that splats may take of the GPU unless the caller says otherwise. */
+const MEMORY = 768 * 2 ** 20;
+
+/** How far outside the picture, in shares of its half-size, a splat's shape still follows where it is. */
+const OUTSIDE = 0.3;
+
+export interface SplatPicture extends Picture {
+  /** Wants the order of this very camera, and waits for it. */
+  sorted?: boolean;
+}
+
+interface Changed {
+  edits: SplatEdits;
+  texture: WordTexture;
+  /** The splats that are drawn with these edits. */
+  set: SplatSet | null;
+}
+
+/** Splats in their order, and as they are projected; vertex arrays that read them. */
+interface Projected {
+  numbers: GrowingBuffer;
+  splats: GrowingBuffer;
+  feedback: WebGLTransformFeedback;
+  ordered: WebGLVertexArrayObject;
+  quads: WebGLVertexArrayObject;
+}
+
+export class SplatRenderer {
+  background: Vec3 = [1, 1, 1];
+  near = 0;
+  /** Whether the edits are seen; false shows the splats before them. Splats are shown without until all are there. */
+  edited = true;
+  readonly targets: Targets;
+  compileTime = 0;
+  private readonly sorter = new Sorter();
+  private readonly formats: Formats;
+  private gathering: Gathering;
+  private store: SplatStore | null = null;
+  private changed: Changed | null = null;
+  private camera: PinholeCamera | null = null;
+  private loading = 0;
+  private readonly programs = new Map<string, Program>();
+  private projected: Projected | null = null;
+  private vertices: WebGLVertexArrayObject;
+  /** The order whose numbers lie on the GPU. */
+  private ordered: Order | null = null;
+
+  constructor(
+    private readonly gl: GL,
+    private readonly memory = MEMORY,
+    formats: Formats | null = null,
+  ) {
+    this.targets = new Targets(gl);
+    this.vertices = gl.createVertexArray();
+    this.formats = formats ?? formatsOf(gl);
+    this.gathering = new Gathering(gl, this.formats);
+  }
+
+  /** Called when splats have been sorted for the camera, so that another picture would be better. */
+  set onOrder(call: (() => void) | null) {
+    this.sorter.onOrder = call;
+  }
+
+  /** The background that the file says; null where it says nothing, or is not there yet. */
+  get fileBackground(): Vec3 | null {
+    return this.store?.header.background ?? null;
+  }
+
+  /** Splats that can be drawn, without edits. */
+  get count(): number {
+    return this.store?.count ?? 0;
+  }
+
+  get bytes(): number {
+    return this.store?.bytes ?? 0;
+  }
+
+  setSize(width: number, height: number): void {
+    this.targets.setSize(width, height);
+  }
+
+  setCamera(camera: PinholeCamera): void {
+    this.camera = camera;
+  }
+
+  /** Loads splats; a later call takes the place of one that is under way. Throws `TooLarge` beyond the memory. */
+  async load(source: ReadableStream<Bytes> | ArrayBuffer, options: LoadOptions = {}): Promise<void> {
+    const turn = ++this.loading;
+    const wanted = (): boolean => turn === this.loading;
+    let number = 0;
+    let store: SplatStore | null = null;
+    const begin = (header: SplatStore["header"]): void => {
+      if (wanted()) store = new SplatStore(this.gl, header, this.memory);
+    };
+    try {
+      for await (const level of readSplatLevels(source, begin, options.onArrival)) {
+        const own = store as SplatStore | null;
+        if (!wanted() || own === null) return;
+        await own.take(level, wanted);
+        if (!wanted()) return;
+        if (this.store !== own) {
+          this.store?.dispose();
+          this.store = own;
+          this.ordered = null;
+        }
+        options.onLevel?.(++number, level.header.levels.length);
+      }
+    } finally {
+      const own = store as SplatStore | null;
+      if (own !== null && this.store !== own) own.dispose();
+    }
+  }
+
+  /** Uploads what was shown again, after the context was lost and restored. */
+  async restore(): Promise<void> {
+    const { gl, store, changed } = this;
+    this.programs.clear();
+    this.vertices = gl.createVertexArray();
+    this.projected = this.ordered = this.changed = null;
+    this.targets.forget();
+    this.gathering = new Gathering(gl, formatsOf(gl));
+    const turn = ++this.loading;
+    await store?.restore(() => turn === this.loading);
+    this.setEdits(changed?.edits ?? null);
+  }
+
+  /** What edits changed; null for nothing. Throws where it is of other splats. */
+  setEdits(edits: SplatEdits | null): void {
+    this.changed?.texture.dispose();
+    this.changed = null;
+    if (edits === null) return;
+    if (this.store !== null && edits.count !== this.store.header.count)
+      throw new Error(`edits of ${edits.count} splats, the page has ${this.store.header.count}; reload it`);
+    const texture = new WordTexture(this.gl, edits.records.length);
+    if (edits.changed > 0) texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
+    this.changed = { edits, texture, set: null };
+  }
+
+  /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
+  render(picture: SplatPicture = {}): boolean {
+    const { gl, store, camera, gathering } = this;
+    if (!store || store.count === 0 || !camera || gl.isContextLost()) return false;
+    const { width, height } = this.targets;
+    const normals = picture.normals ?? false;
+    const order = this.sorter.of(this.shown(store), this.depths(store, camera), picture.sorted ?? false);
+    plainState(gl);
+    const count = this.project(store, camera, order, normals);
+    const { first, count: rows } = picture.rows ?? { first: 0, count: height };
+    gathering.begin(width, height, normals);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(0, first, width, rows);
+    const unit = gathering.formats.isByte ? 1 / this.farthest(store, camera) : 1;
+    if (count > 0) this.blend(count, normals, unit);
+    this.resolve(normals, unit);
+    gl.disable(gl.SCISSOR_TEST);
+    unbind(gl);
+    return true;
+  }
+
+  /** Puts the colour that was drawn on the canvas, or in a framebuffer, of this size. */
+  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null): void {
+    this.gl.bindVertexArray(this.vertices);
+    show(this.gl, this.cached("show", () => showProgram(this.gl)), this.targets.colour, width, height, framebuffer);
+    unbind(this.gl);
+  }
+
+  /** What was drawn, top row first. */
+  read(normals = false): Reading {
+    return this.targets.read(normals);
+  }
+
+  /** Distances of what was drawn, top row first. */
+  readDepth(): Float32Array {
+    return this.targets.readDepth();
+  }
+
+  /** Frees what lies on the GPU, and ends the worker. */
+  dispose(): void {
+    const { gl, projected } = this;
+    this.loading++;
+    this.setEdits(null);
+    this.store?.dispose();
+    this.store = this.ordered = null;
+    this.sorter.dispose();
+    this.targets.dispose();
+    this.gathering.dispose();
+    projected?.numbers.dispose();
+    projected?.splats.dispose();
+    if (projected) {
+      gl.deleteTransformFeedback(projected.feedback);
+      gl.deleteVertexArray(projected.ordered);
+      gl.deleteVertexArray(projected.quads);
+    }
+    this.projected = null;
+    for (const { program } of this.programs.values()) gl.deleteProgram(program);
+    this.programs.clear();
+    gl.deleteVertexArray(this.vertices);
+  }
+
+  /** The splats that are drawn: the same object while they are the same. */
+  private shown(store: SplatStore): SplatSet {
+    const { changed } = this;
+    if (!this.edited || changed === null || !store.isWhole) return store.set;
+    changed.set ??= { means: store.set.means, hidden: changed.edits.hidden, changed: changed.edits.means };
+    return changed.set;
+  }
+
+  private eye(store: SplatStore, { c2w }: PinholeCamera): Vec3 {
+    const { centre } = store.header;
+    return [c2w[3] - centre[0], c2w[7] - centre[1], c2w[11] - centre[2]];
+  }
+
+  private depths(store: SplatStore, camera: PinholeCamera): Depths {
+    const { c2w } = camera;
+    const [x, y, z] = this.eye(store, camera);
+    const axis: Vec3 = [-c2w[2], -c2w[6], -c2w[10]];
+    return { axis, offset: -(axis[0] * x + axis[1] * y + axis[2] * z), near: Math.max(this.near, store.header.near) };
+  }
+
+  /** A distance beyond the box of interest. */
+  private farthest(store: SplatStore, camera: PinholeCamera): number {
+    const [low, high] = store.header.bounds;
+    return Math.hypot(...this.eye(store, camera)) + Math.hypot(...high.map((value, axis) => value - low[axis]));
+  }
+
+  /** Projects splats in an order into the buffer of quads; how many there are. */
+  private project(store: SplatStore, camera: PinholeCamera, order: Order, normals: boolean): number {
+    const { gl } = this;
+    const { degree, antialiased, steps, log_scales: logs, colour_step: colourStep } = store.header;
+    const count = order.numbers.length;
+    if (count === 0) return 0;
+    const outputs = normals ? [...OUTPUTS, "normal"] : OUTPUTS;
+    const { program, uniform } = this.cached(`project${degree}${antialiased}${normals}`, () => {
+      const made = programOf(gl, projecting({ degree, antialiased, normals }), NOTHING, outputs);
+      this.compileTime = made.milliseconds;
+      return made;
+    });
+    this.projected ??= {
+      numbers: new GrowingBuffer(gl),
+      splats: new GrowingBuffer(gl),
+      feedback: gl.createTransformFeedback(),
+      ordered: gl.createVertexArray(),
+      quads: gl.createVertexArray(),
+    };
+    const { numbers, splats, feedback, ordered } = this.projected;
+    if (this.ordered !== order) numbers.put(order.numbers);
+    this.ordered = order;
+    splats.reserve(16 * outputs.length * count);
+    gl.useProgram(program);
+    this.attributes(ordered, numbers.buffer, 1, (n) => gl.vertexAttribIPointer(n, 1, gl.UNSIGNED_INT, 4, 0), 0);
+    this.setView(uniform, store, camera);
+    if (degree > 0) gl.uniform1fv(uniform("steps"), steps);
+    gl.uniform1ui(uniform("own"), store.count);
+    gl.uniform1f(uniform("logLow"), logs[0]);
+    gl.uniform1f(uniform("logStep"), (logs[1] - logs[0]) / 65535);
+    gl.uniform1f(uniform("colourStep"), colourStep);
+    const textures = { records: store.records, harmonics: store.harmonics, changed: this.changed?.texture ?? store.records };
+    Object.entries(textures).forEach(([name, { texture }], unit) => this.bind(uniform, name, texture, unit));
+    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, feedback);
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, splats.buffer);
+    gl.enable(gl.RASTERIZER_DISCARD);
+    gl.beginTransformFeedback(gl.POINTS);
+    gl.drawArrays(gl.POINTS, 0, count);
+    gl.endTransformFeedback();
+    gl.disable(gl.RASTERIZER_DISCARD);
+    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
+    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
+    return count;
+  }
+
+  private blend(count: number, normals: boolean, unit: number): void {
+    const { gl } = this;
+    const defines = normals ? ["NORMALS"] : [];
+    const { program, uniform } = this.cached(`blend${normals}`, () =>
+      programOf(gl, withDefines(QUADS, defines), withDefines(SPLAT, defines)),
+    );
+    gl.useProgram(program);
+    const floats = 4 * (OUTPUTS.length + (normals ? 1 : 0));
+    const place = (n: number): void => gl.vertexAttribPointer(n, 4, gl.FLOAT, false, 4 * floats, 16 * n);
+    const { quads, splats } = this.projected!;
+    this.attributes(quads, splats.buffer, floats / 4, place, 1);
+    gl.uniform2f(uniform("size"), this.targets.width, this.targets.height);
+    gl.uniform1f(uniform("unit"), unit);
+    gl.enable(gl.BLEND);
+    gl.blendEquation(gl.FUNC_ADD);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+    gl.disable(gl.BLEND);
+  }
+
+  private resolve(normals: boolean, unit: number): void {
+    const { gl } = this;
+    const { program, uniform } = this.cached(`resolve${normals}`, () =>
+      programOf(gl, WHOLE, withDefines(RESOLVE, normals ? ["NORMALS"] : [])),
+    );
+    this.targets.bind(normals);
+    gl.useProgram(program);
+    gl.bindVertexArray(this.vertices);
+    const { colour, distance, normal } = this.gathering.textures!;
+    this.bind(uniform, "gathered", colour, 0);
+    this.bind(uniform, "distances", distance, 1);
+    if (normal && normals) this.bind(uniform, "axes", normal, 2);
+    gl.uniform3f(uniform("background"), ...this.background);
+    gl.uniform1f(uniform("unit"), unit);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Has attributes read a buffer. Each pass has its vertex array: what feedback writes must be bound nowhere else. */
+  private attributes(array: WebGLVertexArrayObject, buffer: WebGLBuffer, count: number, place: (n: number) => void, divisor: number): void {
+    const { gl } = this;
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    for (let n = 0; n < count; n++) {
+      gl.enableVertexAttribArray(n);
+      place(n);
+      gl.vertexAttribDivisor(n, divisor);
+    }
+    for (let n = count; n <= OUTPUTS.length; n++) gl.disableVertexAttribArray(n);
+    gl.bindBuffer(gl.ARRAY_BUFFER, null);
+  }
+
+  private bind(uniform: Program["uniform"], name: string, texture: WebGLTexture, unit: number): void {
+    const { gl } = this;
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1i(uniform(name), unit);
+  }
+
+  private setView(uniform: Program["uniform"], store: SplatStore, camera: PinholeCamera): void {
+    const { gl } = this;
+    const { width, height } = this.targets;
+    const { c2w } = camera;
+    const [fx, cx] = [camera.fx, camera.cx].map((value) => (value * width) / camera.width);
+    const [fy, cy] = [camera.fy, camera.cy].map((value) => (value * height) / camera.height);
+    const [beyondX, beyondY] = [(0.5 * OUTSIDE * width) / fx, (0.5 * OUTSIDE * height) / fy];
+    gl.uniform3f(uniform("eye"), ...this.eye(store, camera));
+    // Rows of W: the camera's x, minus its y, minus its z; read as columns of it where it is not transposed.
+    const W = [c2w[0], -c2w[1], -c2w[2], c2w[4], -c2w[5], -c2w[6], c2w[8], -c2w[9], -c2w[10]];
+    gl.uniformMatrix3fv(uniform("W"), false, W);
+    gl.uniform2f(uniform("focal"), fx, fy);
+    gl.uniform2f(uniform("centre"), cx, cy);
+    gl.uniform2f(uniform("size"), width, height);
+    gl.uniform4f(uniform("limits"), -cx / fx - beyondX, (width - cx) / fx + beyondX, -cy / fy - beyondY, (height - cy) / fy + beyondY);
+    gl.uniform1f(uniform("near"), Math.max(this.near, store.header.near));
+  }
+
+  private cached(key: string, make: () => Program): Program {
+    let program = this.programs.get(key);
+    if (!program) {
+      program = make();
+      this.programs.set(key, program);
+    }
+    return program;
+  }
+}
