@@ -110,7 +110,6 @@ def field_page(splats: bool = False) -> Iterator[FieldPage]:
         browser.close()
     # Chromium's own words where a test reads pictures back, and takes the context away.
     usual = ("ReadPixels", "CONTEXT_LOST")
-    print(complaints[:5])
     assert [said for said in complaints if not any(word in said for word in usual)] == []
 
 

@@ -9,8 +9,7 @@ export interface Program {
   milliseconds: number;
 }
 
-/** `outputs` are the vertex shader's that transform feedback writes, one after the other. */
-export function programOf(gl: GL, vertex: string, fragment: string, outputs: readonly string[] = []): Program {
+export function programOf(gl: GL, vertex: string, fragment: string): Program {
   const began = performance.now();
   const program = gl.createProgram();
   for (const [type, source] of [
@@ -24,7 +23,6 @@ export function programOf(gl: GL, vertex: string, fragment: string, outputs: rea
     gl.attachShader(program, shader);
     gl.deleteShader(shader);
   }
-  if (outputs.length > 0) gl.transformFeedbackVaryings(program, outputs, gl.INTERLEAVED_ATTRIBS);
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const shaders = gl.getAttachedShaders(program) ?? [];

@@ -1,3 +1,5 @@
+import { WIDTH } from "./project_glsl";
+
 /**
  * Projected splats drawn over each other, far ones first, with the rule of `rendering.kernels.splat_blending`: alpha =
  * o exp(-q / 2), at most ALPHA_MAX, nothing below ALPHA_MIN. The kernel ends a tile where less than a thousandth of the
@@ -8,30 +10,34 @@
  */
 export const QUADS = `#version 300 es
 precision highp float;
-layout(location = 0) in vec4 place;
-layout(location = 1) in vec4 shape;
-layout(location = 2) in vec4 tint;
-#ifdef NORMALS
-layout(location = 3) in vec4 normal;
-flat out vec3 axis;
-#endif
+precision highp int;
+precision highp usampler2D;
+uniform usampler2D places, shapes, tints;
 uniform vec2 size;
 flat out vec4 where;
 flat out vec4 how;
 flat out vec4 colour;
+#ifdef NORMALS
+uniform usampler2D normals;
+flat out vec3 axis;
+#endif
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
-  where = place;
-  how = shape;
-  colour = tint;
+  int splat = gl_VertexID / 6, side = gl_VertexID - 6 * splat;
+  ivec2 here = ivec2(splat % ${WIDTH}, splat / ${WIDTH});
+  how = uintBitsToFloat(texelFetch(shapes, here, 0));
+  if (how.y <= 0.0) return;
+  where = uintBitsToFloat(texelFetch(places, here, 0));
+  colour = uintBitsToFloat(texelFetch(tints, here, 0));
 #ifdef NORMALS
-  axis = normal.xyz;
+  axis = uintBitsToFloat(texelFetch(normals, here, 0)).xyz;
 #endif
-  if (shape.y <= 0.0) return;
-  float reach = 2.0 * log(255.0 * shape.y);
-  vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
-  vec2 at = corner * (sqrt(reach / vec2(place.z, shape.x)) + 0.01);
-  at = place.xy + vec2(at.x - place.w * at.y, at.y);
+  float reach = 2.0 * log(255.0 * how.y);
+  // Two triangles: corners 0 1 2 and 3 2 1.
+  int number = side < 3 ? side : 6 - side;
+  vec2 corner = vec2(float(number & 1), float(number >> 1)) * 2.0 - 1.0;
+  vec2 at = corner * (sqrt(reach / vec2(where.z, how.x)) + 0.01);
+  at = where.xy + vec2(at.x - where.w * at.y, at.y);
   gl_Position = vec4(2.0 * at.x / size.x - 1.0, 1.0 - 2.0 * at.y / size.y, 0.0, 1.0);
 }`;
 

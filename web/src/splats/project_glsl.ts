@@ -1,5 +1,5 @@
 /**
- * Splats onto a picture, one vertex each: `rendering.kernels.splat_projection.project` with the names it has there.
+ * Splats onto a picture, one texel each: `rendering.kernels.splat_projection.project` with the names it has there.
  *
  * A covariance is F F^T: F = R diag(s) of the field's splats, the Cholesky factor of changed ones. With N = M F, M the
  * derivative of the pixel by the point, the projected covariance is N N^T, and its determinant the square of the cross
@@ -11,8 +11,8 @@ import { harmonicWords } from "./splat_file";
 /** Texels along a row of the textures. */
 export const WIDTH = 2048;
 
-/** What is written of each splat: four floats each. */
-export const OUTPUTS = ["place", "shape", "tint"];
+/** Texels that are written of each splat, the bits of four floats each: place, shape, tint, and its normal if wanted. */
+export const OUTPUTS = 3;
 
 export interface ProjectVariant {
   degree: number;
@@ -21,7 +21,8 @@ export interface ProjectVariant {
 }
 
 const HEAD = `
-layout(location = 0) in uint splat;
+uniform usampler2D order;       // numbers of splats, from far to near
+uniform uint count;             // of them
 uniform usampler2D records, harmonics, changed;
 uniform uint own;               // splats of the field; numbers from it on are changed ones
 uniform vec3 eye;               // less the field's centre
@@ -30,9 +31,12 @@ uniform vec2 focal, centre, size;
 uniform vec4 limits;            // of (x, y) / z: low, high of x, of y
 uniform float near, logLow, logStep, colourStep;
 
-out vec4 place;                 // mean in pixels, x right and y down; A, k of the conic A (x + k y)^2 + D y^2
-out vec4 shape;                 // D, opacity (0: not shown), distance, its slope along x
-out vec4 tint;                  // colour, slope of the distance along y
+// Mean in pixels, x right and y down; A, k of the conic A (x + k y)^2 + D y^2.
+layout(location = 0) out uvec4 place;
+// D, opacity (0: not shown), distance, its slope along x.
+layout(location = 1) out uvec4 shape;
+// Colour, slope of the distance along y.
+layout(location = 2) out uvec4 tint;
 
 const float BLUR = 0.3, SLOPE_BLUR = 0.02, ALPHA_MIN = 1.0 / 255.0, LEAST_COMPENSATION = 0.005;
 
@@ -64,11 +68,13 @@ mat3 cholesky(float xx, float xy, float xz, float yy, float yz, float zz) {
 
 const MAIN = `
 void main() {
-  gl_Position = vec4(0.0);
-  place = shape = tint = vec4(0.0);
+  place = shape = tint = uvec4(0u);
 #ifdef NORMALS
-  normal = vec4(0.0);
+  normal = uvec4(0u);
 #endif
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  if (uint(here.y * ${WIDTH} + here.x) >= count) return;
+  uint splat = texelFetch(order, here, 0).r;
   uint source = splat;
   vec3 mean;
   mat3 F;
@@ -111,25 +117,25 @@ void main() {
   vec2 at = p.xy / p.z * focal + centre;
   vec2 extent = sqrt(reach * (vec2(a, c) + BLUR));
   if (any(lessThanEqual(at + extent, vec2(0.0))) || any(greaterThanEqual(at - extent, size))) return;
-  place = vec4(at, (c + BLUR) / det, -b / (c + BLUR));
+  place = floatBitsToUint(vec4(at, (c + BLUR) / det, -b / (c + BLUR)));
   float distance = length(offset);
   vec3 d = offset / distance;
   vec3 along = d * F;
   float alongU = dot(along, N0), alongV = dot(along, N1);
   vec2 slope = vec2(alongU * (c + SLOPE_BLUR) - alongV * b, alongV * (a + SLOPE_BLUR) - alongU * b) / slopeDet;
-  shape = vec4(1.0 / (c + BLUR), o, distance, slope.x);
+  shape = floatBitsToUint(vec4(1.0 / (c + BLUR), o, distance, slope.x));
 #ifdef NORMALS
   vec3 axis = flattest(F);
-  normal = vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0);
+  normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
 #endif
   d = rotated(vec4(-turn.xyz, turn.w), d);
-  tint = vec4(max(colourOf(source, d), 0.0), slope.y);
+  tint = floatBitsToUint(vec4(max(colourOf(source, d), 0.0), slope.y));
 }
 `;
 
 /** The axis of least variance of F F^T: powers of the adjugate of it, whose largest one it is. */
 const FLATTEST = `
-out vec4 normal;
+layout(location = 3) out uvec4 normal;
 vec3 flattest(mat3 F) {
   mat3 C = F * transpose(F);
   mat3 B = mat3(cross(C[1], C[2]), cross(C[2], C[0]), cross(C[0], C[1]));
@@ -179,9 +185,3 @@ export function projecting(variant: ProjectVariant): string {
     MAIN,
   ].join("\n");
 }
-
-/** There for the program to be whole: nothing is drawn while splats are projected. */
-export const NOTHING = `#version 300 es
-precision highp float;
-out vec4 none;
-void main() { none = vec4(0.0); }`;

@@ -2,8 +2,8 @@
  * Draws splats and what edits changed of them with the page's own GPU, with the methods of `FieldRenderer`. Pictures are
  * those of `rendering.splat_rasterizer`.
  *
- * Splats are projected once a picture, into a buffer by transform feedback, in the order from far to near; then each is
- * a quad that is blended over what is there. The order of many splats comes from a worker: while the view is turned a
+ * Splats are projected once a picture, each into texels of a texture, in the order from far to near; then each is a quad
+ * that is blended over what is there. The order of many splats comes from a worker: while the view is turned a
  * picture has the order of a moment ago, and `onOrder` says when it is worth drawing again.
  */
 import type { LoadOptions, Picture, PinholeCamera } from "../field/field_renderer";
@@ -18,13 +18,14 @@ import { QUADS, RESOLVE, SPLAT, withDefines } from "./blend_glsl";
 import type { Depths, SplatSet } from "./depth_order";
 import { formatsOf, Gathering } from "./gathering";
 import type { Formats } from "./gathering";
-import { NOTHING, OUTPUTS, projecting } from "./project_glsl";
+import { projecting } from "./project_glsl";
+import { Projection } from "./projection";
 import { Sorter } from "./sorter";
 import type { Order } from "./sorter";
 import type { SplatEdits } from "./splat_edits";
 import { readSplatLevels } from "./splat_file";
 import { SplatStore } from "./splat_store";
-import { GrowingBuffer, WordTexture } from "./splat_textures";
+import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
 
@@ -46,15 +47,6 @@ interface Changed {
   set: SplatSet | null;
 }
 
-/** Splats in their order, and as they are projected; vertex arrays that read them. */
-interface Projected {
-  numbers: GrowingBuffer;
-  splats: GrowingBuffer;
-  feedback: WebGLTransformFeedback;
-  ordered: WebGLVertexArrayObject;
-  quads: WebGLVertexArrayObject;
-}
-
 export class SplatRenderer {
   background: Vec3 = [1, 1, 1];
   near = 0;
@@ -70,7 +62,7 @@ export class SplatRenderer {
   private camera: PinholeCamera | null = null;
   private loading = 0;
   private readonly programs = new Map<string, Program>();
-  private projected: Projected | null = null;
+  private projection: Projection;
   private vertices: WebGLVertexArrayObject;
   /** The order whose numbers lie on the GPU. */
   private ordered: Order | null = null;
@@ -84,6 +76,7 @@ export class SplatRenderer {
     this.vertices = gl.createVertexArray();
     this.formats = formats ?? formatsOf(gl);
     this.gathering = new Gathering(gl, this.formats);
+    this.projection = new Projection(gl);
   }
 
   /** Called when splats have been sorted for the camera, so that another picture would be better. */
@@ -146,7 +139,8 @@ export class SplatRenderer {
     const { gl, store, changed } = this;
     this.programs.clear();
     this.vertices = gl.createVertexArray();
-    this.projected = this.ordered = this.changed = null;
+    this.ordered = this.changed = null;
+    this.projection = new Projection(gl);
     this.targets.forget();
     this.gathering = new Gathering(gl, formatsOf(gl));
     const turn = ++this.loading;
@@ -206,7 +200,7 @@ export class SplatRenderer {
 
   /** Frees what lies on the GPU, and ends the worker. */
   dispose(): void {
-    const { gl, projected } = this;
+    const { gl } = this;
     this.loading++;
     this.setEdits(null);
     this.store?.dispose();
@@ -214,14 +208,7 @@ export class SplatRenderer {
     this.sorter.dispose();
     this.targets.dispose();
     this.gathering.dispose();
-    projected?.numbers.dispose();
-    projected?.splats.dispose();
-    if (projected) {
-      gl.deleteTransformFeedback(projected.feedback);
-      gl.deleteVertexArray(projected.ordered);
-      gl.deleteVertexArray(projected.quads);
-    }
-    this.projected = null;
+    this.projection.dispose();
     for (const { program } of this.programs.values()) gl.deleteProgram(program);
     this.programs.clear();
     gl.deleteVertexArray(this.vertices);
@@ -259,42 +246,29 @@ export class SplatRenderer {
     const { degree, antialiased, steps, log_scales: logs, colour_step: colourStep } = store.header;
     const count = order.numbers.length;
     if (count === 0) return 0;
-    const outputs = normals ? [...OUTPUTS, "normal"] : OUTPUTS;
     const { program, uniform } = this.cached(`project${degree}${antialiased}${normals}`, () => {
-      const made = programOf(gl, projecting({ degree, antialiased, normals }), NOTHING, outputs);
+      const made = programOf(gl, WHOLE, projecting({ degree, antialiased, normals }));
       this.compileTime = made.milliseconds;
       return made;
     });
-    this.projected ??= {
-      numbers: new GrowingBuffer(gl),
-      splats: new GrowingBuffer(gl),
-      feedback: gl.createTransformFeedback(),
-      ordered: gl.createVertexArray(),
-      quads: gl.createVertexArray(),
-    };
-    const { numbers, splats, feedback, ordered } = this.projected;
-    if (this.ordered !== order) numbers.put(order.numbers);
+    const { projection } = this;
+    if (projection.reserve(count, normals) || this.ordered !== order) projection.put(order.numbers);
     this.ordered = order;
-    splats.reserve(16 * outputs.length * count);
+    projection.bind(count, normals);
     gl.useProgram(program);
-    this.attributes(ordered, numbers.buffer, 1, (n) => gl.vertexAttribIPointer(n, 1, gl.UNSIGNED_INT, 4, 0), 0);
+    gl.bindVertexArray(this.vertices);
     this.setView(uniform, store, camera);
     if (degree > 0) gl.uniform1fv(uniform("steps"), steps);
     gl.uniform1ui(uniform("own"), store.count);
     gl.uniform1f(uniform("logLow"), logs[0]);
     gl.uniform1f(uniform("logStep"), (logs[1] - logs[0]) / 65535);
     gl.uniform1f(uniform("colourStep"), colourStep);
-    const textures = { records: store.records, harmonics: store.harmonics, changed: this.changed?.texture ?? store.records };
-    Object.entries(textures).forEach(([name, { texture }], unit) => this.bind(uniform, name, texture, unit));
-    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, feedback);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, splats.buffer);
-    gl.enable(gl.RASTERIZER_DISCARD);
-    gl.beginTransformFeedback(gl.POINTS);
-    gl.drawArrays(gl.POINTS, 0, count);
-    gl.endTransformFeedback();
-    gl.disable(gl.RASTERIZER_DISCARD);
-    gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, null);
-    gl.bindTransformFeedback(gl.TRANSFORM_FEEDBACK, null);
+    gl.uniform1ui(uniform("count"), count);
+    this.bind(uniform, "order", projection.order, 0);
+    this.bind(uniform, "records", store.records.texture, 1);
+    this.bind(uniform, "harmonics", store.harmonics.texture, 2);
+    this.bind(uniform, "changed", (this.changed?.texture ?? store.records).texture, 3);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
     return count;
   }
 
@@ -305,16 +279,15 @@ export class SplatRenderer {
       programOf(gl, withDefines(QUADS, defines), withDefines(SPLAT, defines)),
     );
     gl.useProgram(program);
-    const floats = 4 * (OUTPUTS.length + (normals ? 1 : 0));
-    const place = (n: number): void => gl.vertexAttribPointer(n, 4, gl.FLOAT, false, 4 * floats, 16 * n);
-    const { quads, splats } = this.projected!;
-    this.attributes(quads, splats.buffer, floats / 4, place, 1);
+    gl.bindVertexArray(this.vertices);
+    const names = ["places", "shapes", "tints", ...(normals ? ["normals"] : [])];
+    names.forEach((name, n) => this.bind(uniform, name, this.projection.outputs[n], n));
     gl.uniform2f(uniform("size"), this.targets.width, this.targets.height);
     gl.uniform1f(uniform("unit"), unit);
     gl.enable(gl.BLEND);
     gl.blendEquation(gl.FUNC_ADD);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);
+    gl.drawArrays(gl.TRIANGLES, 0, 6 * count);
     gl.disable(gl.BLEND);
   }
 
@@ -335,21 +308,7 @@ export class SplatRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** Has attributes read a buffer. Each pass has its vertex array: what feedback writes must be bound nowhere else. */
-  private attributes(array: WebGLVertexArrayObject, buffer: WebGLBuffer, count: number, place: (n: number) => void, divisor: number): void {
-    const { gl } = this;
-    gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    for (let n = 0; n < count; n++) {
-      gl.enableVertexAttribArray(n);
-      place(n);
-      gl.vertexAttribDivisor(n, divisor);
-    }
-    for (let n = count; n <= OUTPUTS.length; n++) gl.disableVertexAttribArray(n);
-    gl.bindBuffer(gl.ARRAY_BUFFER, null);
-  }
-
-  private bind(uniform: Program["uniform"], name: string, texture: WebGLTexture, unit: number): void {
+  private bind(uniform: Program["uniform"], name: string, texture: WebGLTexture | null, unit: number): void {
     const { gl } = this;
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, texture);

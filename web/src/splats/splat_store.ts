@@ -8,8 +8,8 @@ import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
 
-/** Bytes of a projected splat, with its normal, and of its place in the order. */
-const PROJECTED = 16 * (OUTPUTS.length + 1) + 4;
+/** Bytes of a projected splat, with its normal, and of its number in the order. */
+const PROJECTED = 16 * (OUTPUTS + 1) + 4;
 
 export class SplatStore {
   /** The splats as they are without edits. */

@@ -1,4 +1,4 @@
-/** Splats on the GPU: records and coefficients in textures of whole numbers, and buffers that grow. */
+/** Splats on the GPU: records and coefficients in textures of whole numbers, four words a texel. */
 import { TooLarge } from "../field/atlas";
 import { plainUnpacking, setFilter } from "../field/gl";
 import { WIDTH } from "./project_glsl";
@@ -8,7 +8,7 @@ type GL = WebGL2RenderingContext;
 /** Rows that are uploaded before the page may breathe: 4 MB. */
 const ROWS = 128;
 
-/** A texture of rows of whole numbers [RGBA32UI], four words a texel. */
+/** Rows of whole numbers [RGBA32UI]. */
 export class WordTexture {
   readonly texture: WebGLTexture;
   private readonly rows: number;
@@ -62,37 +62,5 @@ export class WordTexture {
 
   dispose(): void {
     this.gl.deleteTexture(this.texture);
-  }
-}
-
-/** A buffer that is as large as the largest that it was asked for. */
-export class GrowingBuffer {
-  readonly buffer: WebGLBuffer;
-  private size = 0;
-
-  constructor(private readonly gl: GL) {
-    this.buffer = gl.createBuffer();
-  }
-
-  /** Makes room; what was there is lost where it grows. */
-  reserve(bytes: number): void {
-    const { gl } = this;
-    if (bytes <= this.size) return;
-    this.size = bytes;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, bytes, gl.DYNAMIC_DRAW);
-    gl.bindBuffer(gl.ARRAY_BUFFER, null);
-  }
-
-  put(data: Uint32Array<ArrayBuffer>): void {
-    const { gl } = this;
-    this.reserve(data.byteLength);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffer);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, data);
-    gl.bindBuffer(gl.ARRAY_BUFFER, null);
-  }
-
-  dispose(): void {
-    this.gl.deleteBuffer(this.buffer);
   }
 }
