@@ -62,6 +62,25 @@ class FieldPage:
             text,
         )
 
+    def lose_context(self) -> None:
+        """Takes the GPU's context away, gives it back, and has the renderer restore what it shows."""
+        self.page.evaluate(
+            """async () => {
+                const canvas = document.querySelector("canvas");
+                const extension = gl.getExtension("WEBGL_lose_context");
+                canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+                const event = (name) =>
+                    new Promise((done) => canvas.addEventListener(name, done, { once: true }));
+                const lost = event("webglcontextlost");
+                extension.loseContext();
+                await lost;
+                const restored = event("webglcontextrestored");
+                setTimeout(() => extension.restoreContext(), 50);
+                await restored;
+                await r.restore();
+            }"""
+        )
+
     def draw(self, camera: Camera, *, normals: bool = True, count: bool = False, repeat: int = 1) -> Drawn:
         """The picture of a camera, the last of `repeat`; counts in place of depth where they are wanted."""
         answer = self.page.evaluate(

@@ -27,12 +27,19 @@ TYPES = {"u1": np.uint8, "u2": np.uint16, "i4": np.int32, "f4": np.float32}
 _MOST = 1 << 31
 
 
-def pack(magic: bytes, version: int, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """The file with this header and these arrays (uint8, uint16, int32 or float32)."""
+def pack(
+    magic: bytes,
+    version: int,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, NDArray[Any]],
+    *,
+    level: int = LEVEL,
+) -> bytes:
+    """The file with this header and these arrays (uint8, uint16, int32 or float32); `level` of deflate."""
     names = {np.dtype(kind): name for name, kind in TYPES.items()}
     blobs, entries = [], []
     for name, array in arrays.items():
-        blob = zlib.compress(np.ascontiguousarray(array).tobytes(), LEVEL)
+        blob = zlib.compress(np.ascontiguousarray(array).tobytes(), level)
         blobs.append(blob)
         entries.append(
             {"name": name, "type": names[array.dtype], "shape": list(array.shape), "bytes": len(blob)}

@@ -142,21 +142,28 @@ class RendererCache:
     def page_field(self) -> bytes | None:
         """The field as a page's GPU draws it; None for what pages cannot draw. Raises FieldError."""
         from cagefield.formats.page_field import encode_page_field
+        from cagefield.formats.page_splats import encode_page_splats
 
         field = self.scene.field
+        if isinstance(field, SplatField):
+            return encode_page_splats(field, background=self.scene.background)
         if not isinstance(field, VoxelField):
             return None
         return encode_page_field(field, step=self.plain.step, background=self.scene.background)
 
     def page_edits(self, shown: Shown) -> bytes | None:
-        """The edits as a page's GPU evaluates them; None for what pages cannot draw. Raises EditError."""
+        """The edits as a page's GPU draws them; None for what pages cannot draw. Raises EditError."""
         from cagefield.formats.page_edits import encode_page_edits, for_pages
         from cagefield.rendering.renderer import Renderer
 
+        field = self.scene.field
+        stack = EditStack(self.edits(shown.edits))
+        if isinstance(field, SplatField):
+            return _page_splat_edits(field, stack, shown.preserve_opacity)
         if not isinstance(self.plain, Renderer):
             return None
-        stack = for_pages(EditStack(self.edits(shown.edits)))
-        return encode_page_edits(self.plain.with_edits(stack, preserve_opacity=shown.preserve_opacity))
+        renderer = self.plain.with_edits(for_pages(stack), preserve_opacity=shown.preserve_opacity)
+        return encode_page_edits(renderer)
 
     def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:
         """The renderer of the edits: one that is ready, else an exact or a quick one made now.
@@ -237,6 +244,17 @@ class RendererCache:
         if edit in self._coarse:
             return self._coarse[edit]
         return self._coarse.put(edit, edit.replace(lattice=QUICK_LATTICE))
+
+
+def _page_splat_edits(field: SplatField, edits: EditStack, preserve_opacity: bool) -> bytes:
+    """What edits change of splats, exact and split where they must be."""
+    from cagefield.formats.page_splat_edits import encode_page_splat_edits
+    from cagefield.rendering.deformed_splats import changed_splats
+    from cagefield.rendering.splat_splitting import split_of
+
+    split = split_of(field, edits)
+    changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
+    return encode_page_splat_edits(field, changed)
 
 
 def _warm_splats(stage: WarmStage) -> None:
