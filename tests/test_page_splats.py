@@ -115,6 +115,36 @@ def test_levels_add_up(page: FieldPage, monkeypatch: pytest.MonkeyPatch) -> None
     assert 0.6 * seen[2][2] < seen[0][2] < seen[1][2] < seen[2][2]
 
 
+def test_many_splats_are_sorted_by_a_worker(page: FieldPage) -> None:
+    field = splats(0, 33_000)
+    page.load(encode_page_splats(dataclasses.replace(field, log_scales=field.log_scales - 1.5)))
+    there, back = (
+        {**seen.to_dict(), "c2w": seen.c2w.ravel().tolist()}
+        for seen in turntable((0, 0, 0), 3.2, 2, elevation=0.4, width=48, height=36, fov_x=0.8)
+    )
+    off = page.page.evaluate(
+        """async ([there, back]) => {
+            r.setSize(there.width, there.height);
+            const shot = (camera, sorted) => {
+                r.setCamera(camera);
+                r.render({ sorted });
+                return r.read().rgba;
+            };
+            const off = (one, other) => one.reduce((sum, value, n) => sum + Math.abs(value - other[n]), 0);
+            const wanted = shot(back, true);
+            shot(there, true);
+            const answer = new Promise((done) => { r.onOrder = done; });
+            const before = off(shot(back, false), wanted);
+            await answer;
+            r.onOrder = null;
+            return [before, off(shot(back, false), wanted)];
+        }""",
+        [there, back],
+    )
+    # Seen from the other side, the order of this one is the wrong way round.
+    assert off[0] > 48 * 36 and off[1] == 0
+
+
 def test_eight_bits_do_where_there_are_no_floats(page: FieldPage) -> None:
     field = ball_of_splats()
     page.page.evaluate(
@@ -144,7 +174,9 @@ STRETCHED = Edit(INNER, adjustment="discrete").scale(1.6)
 STACKS = {"moved": [MOVED], "twisted and deleted": [GONE, TWISTED], "copied": [TWISTED, COPIED]}
 
 
-@pytest.mark.parametrize(("name", "preserve_opacity"), [*((name, True) for name in STACKS), ("stretched", False)])
+@pytest.mark.parametrize(
+    ("name", "preserve_opacity"), [*((name, True) for name in STACKS), ("stretched", False)]
+)
 def test_the_page_draws_edits_as_the_rasteriser_does(
     page: FieldPage, name: str, preserve_opacity: bool
 ) -> None:
@@ -152,7 +184,7 @@ def test_the_page_draws_edits_as_the_rasteriser_does(
     renderer = SplatRenderer(field, edits, preserve_opacity=preserve_opacity)
     ours, without = renderer.render(camera(), normals=True), SplatRenderer(field).render(camera())
     assert ours is not None and without is not None
-    assert psnr(ours.rgb, without.rgb) < 25.0
+    assert psnr(ours.rgb, without.rgb) < 30.0
     page.load(encode_page_splats(field))
     page.edit(edited(field, edits, preserve_opacity))
     check_alike(ours, page.draw(camera()), 45.0)

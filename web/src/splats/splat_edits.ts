@@ -18,7 +18,6 @@ interface EditsHeader {
 }
 
 export interface SplatEdits {
-  kind: "splats";
   count: number;
   /** [count], 1 where a splat is not shown at its own place. */
   hidden: Uint8Array<ArrayBuffer>;
@@ -50,5 +49,5 @@ export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
     records[at + 10] = turns[n] | (turns[changed + n] << 16);
     records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
   }
-  return { kind: "splats", count, hidden, changed, means, records };
+  return { count, hidden, changed, means, records };
 }

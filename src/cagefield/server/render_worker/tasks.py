@@ -143,7 +143,7 @@ class PageFieldTask:
 
 @dataclass(frozen=True)
 class PageEditsTask:
-    """Edits as a page's GPU evaluates them; None where pages cannot draw the field."""
+    """Edits as a page's GPU evaluates them, or what they change of splats; None where pages draw neither."""
 
     number: int
     shown: Shown

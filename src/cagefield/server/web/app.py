@@ -119,7 +119,7 @@ def application(
         except CagefieldError as error:
             return PlainTextResponse(str(error), 409)
         if content is None:
-            return PlainTextResponse("the server draws this scene: only voxel fields are drawn by pages", 404)
+            return PlainTextResponse("the server draws this scene: pages draw voxels and splats alone", 404)
         return Response(content, media_type="application/octet-stream")
 
     async def field(_: Request) -> Response:
