@@ -2,13 +2,12 @@
  * Pictures drawn by the page's own GPU while the view is turned, so that they come at the display's rate.
  *
  * The field is loaded once, after the server's first whole picture; the edits each time they are others. Whatever
- * the page cannot draw, or draws more slowly than the server, the server draws: drags, normals and depth, splats and
- * NeRFs, pictures at rest. `?render=server` leaves it all to the server, `?render=page` trusts the page's GPU even
+ * the page cannot draw, or draws more slowly than the server, the server draws: drags, normals and depth, NeRFs,
+ * discs of 2DGS, pictures at rest. `?render=server` leaves it all to the server, `?render=page` trusts the page's GPU even
  * where it is software.
  */
-import { FieldRenderer } from "./field/field_renderer";
 import { Pacing } from "./field/pacing";
-import { readEdits } from "./field/page_edits";
+import { AnyRenderer, readAnyEdits } from "./splats/any_renderer";
 import type { App } from "./app";
 import type { Editor } from "./store";
 
@@ -26,7 +25,7 @@ export class PageRenderer {
   /** Pictures that the page has drawn. */
   drawn = 0;
   private readonly wanted: "page" | "server" | "best";
-  private readonly renderer: FieldRenderer;
+  private readonly renderer: AnyRenderer;
   private readonly pacing = new Pacing();
   private loading: Promise<void> | null = null;
   private isLoaded = false;
@@ -44,7 +43,8 @@ export class PageRenderer {
     const given = new URLSearchParams(location.search).get("render");
     this.wanted = given === "page" || given === "server" ? given : "best";
     const { viewport } = app;
-    this.renderer = new FieldRenderer(viewport.renderer.getContext() as WebGL2RenderingContext);
+    this.renderer = new AnyRenderer(viewport.renderer.getContext() as WebGL2RenderingContext);
+    this.renderer.onOrder = () => viewport.invalidate();
     if (this.wanted === "server") this.close("the page's address says so");
     else if (this.wanted === "best" && viewport.software) this.close("the page has no GPU");
     app.store.watch(["figures", "state", "hello"], (now) => this.follow(now));
@@ -103,7 +103,7 @@ export class PageRenderer {
       await this.renderer.load(answer.body);
       this.app.viewport.renderer.resetState();
       if (scene !== this.scene) return;
-      this.renderer.background = this.renderer.level?.field.background ?? [0, 0, 0];
+      this.renderer.background = this.renderer.fileBackground ?? [0, 0, 0];
       this.isLoaded = true;
       this.why = null;
       this.follow(this.app.store.now);
@@ -126,7 +126,7 @@ export class PageRenderer {
         this.asked = -1;
         return;
       }
-      this.renderer.setEdits(await readEdits(bytes));
+      this.renderer.setEdits(await readAnyEdits(bytes));
       this.app.viewport.renderer.resetState();
       this.edits = revision;
     } catch {
