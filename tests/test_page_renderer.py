@@ -63,6 +63,7 @@ def turned(page: EditorPage, by: tuple[float, float]) -> tuple[NDArray[np.float6
         assert page.page.evaluate("cagefield.camera.seq") == seq, "the server need not know yet"
         assert "drawn here" in page.page.inner_text(".status .figures")
         own = shot(page)
+    page.until(f"cagefield.camera.seq > {seq}")  # else the picture before the turn counts as settled
     page.settle()
     assert "by the server" in page.page.inner_text(".status .figures")
     return own, shot(page)
