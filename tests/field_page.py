@@ -33,9 +33,10 @@ class Drawn:
 
 @dataclass
 class FieldPage:
-    """An open page with one renderer, `r`."""
+    """An open page with one renderer, `r`, of voxels or of splats."""
 
     page: Any
+    splats: bool = False
 
     def load(self, field: bytes) -> dict[str, Any]:
         """Loads a field; figures of it."""
@@ -55,12 +56,32 @@ class FieldPage:
         """Puts edits in the place of those before, of which they may be `changes`."""
         text = None if edits is None else base64.b64encode(edits).decode()
         self.page.evaluate(
-            """async ([text, changes]) => {
-                const read = (file) => cagefieldViewer.readEdits(file, changes ? window.had : null);
+            """async ([text, changes, splats]) => {
+                const { readEdits, readSplatEdits } = cagefieldViewer;
+                const read = splats ? readSplatEdits : (file) => readEdits(file, changes ? window.had : null);
                 window.had = text && await read(bytes(text));
                 r.setEdits(window.had);
             }""",
-            [text, changes],
+            [text, changes, self.splats],
+        )
+
+    def lose_context(self) -> None:
+        """Takes the GPU's context away, gives it back, and has the renderer restore what it shows."""
+        self.page.evaluate(
+            """async () => {
+                const canvas = document.querySelector("canvas");
+                const extension = gl.getExtension("WEBGL_lose_context");
+                canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+                const event = (name) =>
+                    new Promise((done) => canvas.addEventListener(name, done, { once: true }));
+                const lost = event("webglcontextlost");
+                extension.loseContext();
+                await lost;
+                const restored = event("webglcontextrestored");
+                setTimeout(() => extension.restoreContext(), 50);
+                await restored;
+                await r.restore();
+            }"""
         )
 
     def draw(self, camera: Camera, *, normals: bool = True, count: bool = False, repeat: int = 1) -> Drawn:
@@ -69,7 +90,7 @@ class FieldPage:
             """([camera, normals, count, repeat]) => {
                 r.setSize(camera.width, camera.height);
                 r.setCamera(camera);
-                r.render({ normals, count });
+                r.render({ normals, count, sorted: true });
                 const got0 = r.read(normals);
                 const began = performance.now();
                 for (let n = 1; n < repeat; n++) { r.render({ normals, count }); r.read(false); }
@@ -92,7 +113,7 @@ class FieldPage:
 
 
 @contextlib.contextmanager
-def field_page() -> Iterator[FieldPage]:
+def field_page(splats: bool = False) -> Iterator[FieldPage]:
     """A bare page with a renderer; skips where there is no Chromium. The page's errors fail the test."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if CHROMIUM is None:
@@ -106,8 +127,8 @@ def field_page() -> Iterator[FieldPage]:
         page.on("console", lambda said: complaints.append(said.text))
         page.set_content("<canvas></canvas>")
         page.add_script_tag(content=VIEWER.read_text())
-        page.evaluate(_START)
-        yield FieldPage(page)
+        page.evaluate(_START, "SplatRenderer" if splats else "FieldRenderer")
+        yield FieldPage(page, splats)
         browser.close()
     assert [said for said in complaints if not any(word in said for word in USUAL)] == []
 
@@ -116,9 +137,9 @@ def _array(text: str, kind: Any) -> NDArray[Any]:
     return np.frombuffer(base64.b64decode(text), kind)
 
 
-_START = """() => {
+_START = """(renderer) => {
     window.gl = document.querySelector("canvas").getContext("webgl2", { antialias: false });
-    window.r = new cagefieldViewer.FieldRenderer(gl);
+    window.r = new cagefieldViewer[renderer](gl);
     window.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
     window.base64 = (array) => {
         let text = "";

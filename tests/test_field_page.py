@@ -100,22 +100,7 @@ def test_pictures_are_the_same_after_the_context_was_lost(page: FieldPage) -> No
     page.load(encode_page_field(lumps(1, False)))
     seen = camera(False)
     before = page.draw(seen)
-    page.page.evaluate(
-        """async () => {
-            const canvas = document.querySelector("canvas");
-            const extension = gl.getExtension("WEBGL_lose_context");
-            canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-            const event = (name) =>
-                new Promise((done) => canvas.addEventListener(name, done, { once: true }));
-            const lost = event("webglcontextlost");
-            extension.loseContext();
-            await lost;
-            const restored = event("webglcontextrestored");
-            setTimeout(() => extension.restoreContext(), 50);
-            await restored;
-            await r.restore();
-        }"""
-    )
+    page.lose_context()
     after = page.draw(seen)
     np.testing.assert_array_equal(before.rgb, after.rgb)
 

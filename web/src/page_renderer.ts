@@ -8,11 +8,10 @@
  * it is software, and `?render=all` with pictures at rest too.
  */
 import { Choice, memoryLimit } from "./field/choice";
-import { FieldRenderer } from "./field/field_renderer";
 import { Pacing } from "./field/pacing";
-import type { SceneDrawer } from "./field/scene_drawer";
 import { Still } from "./field/still";
 import { PageScene } from "./page_scene";
+import { AnyRenderer } from "./splats/any_renderer";
 import type { App } from "./app";
 import type { EditsHeader, PictureHeader } from "./protocol";
 import type { DrawnHere, Editor } from "./store";
@@ -33,7 +32,7 @@ export class PageRenderer {
   /** Pictures that the page has drawn. */
   drawn = 0;
   readonly scene: PageScene;
-  readonly drawer: SceneDrawer;
+  readonly drawer: AnyRenderer;
   readonly choice = new Choice();
   private readonly wanted: "server" | "page" | "all" | "best";
   private readonly pacing = new Pacing();
@@ -45,6 +44,8 @@ export class PageRenderer {
   private told: { here: DrawnHere; page: number | null } = { here: "nothing", page: null };
   private seen: Seen = [];
   private slow = 0;
+  /** Whether the last picture, or part of one, had its splats in order. */
+  private inOrder = true;
   /** Milliseconds that the last picture, or part of one, took. */
   private took = 0;
   /** Edits that were taken and not acknowledged. */
@@ -55,7 +56,8 @@ export class PageRenderer {
     this.wanted = given === "page" || given === "server" || given === "all" ? given : "best";
     const { viewport } = app;
     const memory = memoryLimit((navigator as { deviceMemory?: number }).deviceMemory);
-    this.drawer = new FieldRenderer(viewport.renderer.getContext() as WebGL2RenderingContext, memory);
+    this.drawer = new AnyRenderer(viewport.renderer.getContext() as WebGL2RenderingContext, memory);
+    this.drawer.onOrder = () => this.ordered();
     this.scene = new PageScene(this.drawer, {
       changed: () => this.changed(),
       arrived: (share) => this.app.store.set({ loading: share }),
@@ -156,6 +158,12 @@ export class PageRenderer {
     return !this.app.viewport.software && this.choice.whole(width * height) ? "all" : "moving";
   }
 
+  /** Splats have been sorted for the camera: the view is drawn anew. */
+  private ordered(): void {
+    this.seen = [];
+    this.app.viewport.invalidate();
+  }
+
   private async restore(): Promise<void> {
     if (this.closed !== null) return;
     await this.drawer.restore();
@@ -187,8 +195,8 @@ export class PageRenderer {
     const { width, height } = this.app.viewport.pixels;
     const scale = this.pacing.scale(width, height);
     const size = [width, height].map((n) => Math.max(16, Math.round(scale * n)));
-    const drawn = this.paint(size[0], size[1], { first: 0, count: size[1] });
-    this.still.moved(performance.now(), drawn && scale === 1);
+    const drawn = this.paint(size[0], size[1], { first: 0, count: size[1] }, false);
+    this.still.moved(performance.now(), drawn && scale === 1 && this.inOrder);
     if (drawn) this.present(size[0], size[1]);
     else this.seen = [];
   }
@@ -202,8 +210,9 @@ export class PageRenderer {
       if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq) app.drew(this.header(width, height, this.took), 0, 0);
       return;
     }
-    const rows = still.next(performance.now(), height, this.pacing.rows(width, height));
-    if (rows !== null && this.paint(width, height, rows) && still.drew(rows, height)) this.present(width, height);
+    const most = this.drawer.inBands ? this.pacing.rows(width, height) : height;
+    const rows = still.next(performance.now(), height, most);
+    if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height)) this.present(width, height);
   }
 
   /** What is to be seen. */
@@ -224,8 +233,8 @@ export class PageRenderer {
     return same && last.revision >= edits.header.revision && (last.final || this.told.here !== "all");
   }
 
-  /** Draws rows of the view; false where there is nothing to draw. */
-  private paint(width: number, height: number, rows: { first: number; count: number }): boolean {
+  /** Draws rows of the view, splats `sorted` for it or as they were; false where there is nothing to draw. */
+  private paint(width: number, height: number, rows: { first: number; count: number }, sorted: boolean): boolean {
     const { drawer, app } = this;
     const { view, before, split } = app.store.now;
     const { viewport } = app;
@@ -237,10 +246,13 @@ export class PageRenderer {
     const left = before || split === null ? 0 : Math.round(split * width);
     const normals = view === "normals";
     let drew = true;
-    drawer.edited = false;
-    if (left > 0) drew = drawer.render({ normals, rows, columns: { first: 0, count: left } });
-    drawer.edited = !before;
-    if (left < width) drew = drawer.render({ normals, rows, columns: { first: left, count: width - left } }) && drew;
+    this.inOrder = true;
+    for (const [edited, first, end] of [[false, 0, left], [!before, left, width]] as const) {
+      if (first === end) continue;
+      drawer.edited = edited;
+      drew = drawer.render({ normals, sorted, rows, columns: { first, count: end - first } }) && drew;
+      this.inOrder &&= drawer.inOrder;
+    }
     if (drew) drawer.wait();
     viewport.renderer.resetState();
     if (!drew) return false;

@@ -1,10 +1,10 @@
 /** The scene as the page's GPU has it: its field, loaded once, and its edits as they come. */
 import { OutOfMemory } from "./field/gl";
 import { TooLarge } from "./field/atlas";
-import { readEdits } from "./field/page_edits";
-import type { PageEdits } from "./field/page_edits";
 import type { SceneDrawer } from "./field/scene_drawer";
 import type { Vec3 } from "./field/level";
+import { readAnyEdits } from "./splats/any_renderer";
+import type { AnyEdits } from "./splats/any_renderer";
 import type { EditsHeader } from "./protocol";
 
 /** What is behind a scene that has no background; as in `render_worker.encoding`. */
@@ -38,11 +38,11 @@ export class PageScene {
   private name: string | null = null;
   /** The page's number when loading it failed; a page that has another one since tries again. */
   private failedAs: number | null = null;
-  private unpacked: PageEdits | null = null;
+  private unpacked: AnyEdits | null = null;
   private chain: Promise<void> = Promise.resolve();
 
   constructor(
-    private readonly drawer: SceneDrawer,
+    private readonly drawer: SceneDrawer<AnyEdits>,
     private readonly events: SceneEvents,
   ) {}
 
@@ -60,7 +60,7 @@ export class PageScene {
     const { name } = this;
     this.chain = this.chain.then(async () => {
       try {
-        const edits = await readEdits(file, this.unpacked);
+        const edits = await readAnyEdits(file, this.unpacked);
         if (name !== this.name) return;
         this.drawer.setEdits(edits);
         this.unpacked = edits;
@@ -95,7 +95,7 @@ export class PageScene {
       await this.drawer.load(answer.body, {
         onArrival: (bytes) => this.events.arrived(length > 0 ? Math.min(1, bytes / length) : 0),
         onLevel: () => {
-          if (name !== this.name) return;
+          if (name !== this.name || !this.drawer.editable) return;
           this.drawer.background = this.drawer.level?.field.background ?? BEHIND;
           this.why = null;
           this.events.changed();

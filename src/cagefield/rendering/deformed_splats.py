@@ -28,7 +28,7 @@ from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
-from cagefield.typing import Float32
+from cagefield.typing import Float32, Mask
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_splitting import Split
@@ -114,23 +114,14 @@ def _deformed(
     base = DeformedSplats.of_field(field)
     if moved.is_at_rest and more is None:
         return base
-    from cagefield.rendering.kernels.splat_deforming import deform
-
-    count = len(moved.source)
-    covariances, rotations = np.empty((count, 6), np.float32), np.empty((count, 3, 3), np.float32)
-    growth = np.empty(count)
-    deform(moved.source, moved.jacobian, field.quaternions, field.log_scales, covariances, rotations, growth)
+    means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     places = Places(moved)
-    own = None
-    if not preserve_opacity:
-        before = field.opacities[moved.source].astype(np.float64)
-        own = (1.0 - (1.0 - before) ** growth).astype(np.float32)
     tangents = None
     if base.tangents is not None:
         along = np.einsum("mij,mtj->mti", moved.jacobian, base.tangents[moved.source].reshape(-1, 2, 3))
         carried = along.reshape(-1, 6).astype(np.float32)
         tangents = places.put(base.tangents, carried, None if more is None else more.tangents)
-    turned = count > 0 and float(np.abs(rotations - _NO_TURN).max()) > _TURNED
+    turned = len(rotations) > 0 and float(np.abs(rotations - _NO_TURN).max()) > _TURNED
     every = None
     if turned or (more is not None and more.rotations is not None):
         after = None
@@ -138,7 +129,6 @@ def _deformed(
             still = np.broadcast_to(_NO_TURN, (len(more), 3, 3))
             after = still if more.rotations is None else more.rotations
         every = places.put(np.broadcast_to(_NO_TURN, (len(field), 3, 3)), rotations, after)
-    means = moved.points.astype(np.float32)
     return DeformedSplats(
         places.put(base.means, means, None if more is None else more.means),
         places.put(base.covariances, covariances, None if more is None else more.covariances),
@@ -148,6 +138,71 @@ def _deformed(
         field.antialiased,
         tangents,
     )
+
+
+def _carried(
+    field: SplatField, moved: MovedSplats, preserve_opacity: bool
+) -> tuple[Float32, Float32, Float32 | None, Float32]:
+    """(means [M,3], covariances [M,6], opacities [M], or None for their own, R [M,3,3]) of what moved."""
+    from cagefield.rendering.kernels.splat_deforming import deform
+
+    count = len(moved.source)
+    covariances, rotations = np.empty((count, 6), np.float32), np.empty((count, 3, 3), np.float32)
+    growth = np.empty(count)
+    deform(moved.source, moved.jacobian, field.quaternions, field.log_scales, covariances, rotations, growth)
+    own = None
+    if not preserve_opacity:
+        before = field.opacities[moved.source].astype(np.float64)
+        own = (1.0 - (1.0 - before) ** growth).astype(np.float32)
+    return moved.points.astype(np.float32), covariances, own, rotations
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedSplats:
+    """What edits change of a field of N splats: M splats that it does not have, and those that go.
+
+    Attributes:
+        hidden: [N], True where the field's splat is not shown as it is.
+        sources: [M] int64, splats of the field that have the harmonics of the new ones.
+        splats: the M new ones; their `sh` are those of their sources.
+    """
+
+    hidden: Mask
+    sources: NDArray[np.int64]
+    splats: DeformedSplats
+
+
+def changed_splats(
+    field: SplatField,
+    edits: EditStack,
+    *,
+    preserve_opacity: bool = True,
+    coarse: bool = False,
+    split: Split | None = None,
+    proceed: Callable[[], None] | None = None,
+) -> ChangedSplats:
+    """How `deformed_splats`, with the same arguments, differ from the field's own."""
+    moved = moved_splats(field, edits, coarse=coarse, proceed=proceed)
+    if split is not None:
+        moved = moved.without(split.parents)
+    means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
+    opacities = field.opacities[moved.source] if own is None else own
+    sources = moved.source
+    if split is not None:
+        others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
+        more = _deformed(split.children, others, preserve_opacity, None)
+        rows = np.concatenate([np.flatnonzero(~others.left), others.source])
+        if others.is_whole:
+            rows = np.arange(len(split.children))
+        turns = np.broadcast_to(_NO_TURN, (len(more), 3, 3)) if more.rotations is None else more.rotations
+        means, covariances = (
+            np.concatenate([means, more.means]),
+            np.concatenate([covariances, more.covariances]),
+        )
+        opacities, rotations = np.concatenate([opacities, more.opacities]), np.concatenate([rotations, turns])
+        sources = np.concatenate([sources, split.sources[rows]])
+    new = DeformedSplats(means, covariances, opacities, field.sh[sources], rotations, field.antialiased)
+    return ChangedSplats(moved.left, sources, new)
 
 
 _NO_TURN = np.eye(3, dtype=np.float32)

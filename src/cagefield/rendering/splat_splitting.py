@@ -88,10 +88,14 @@ MORE = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """What was split of a field: `parents` [N] are True where `children` stand for a splat."""
+    """What was split of a field: `parents` [N] are True where `children` stand for a splat.
+
+    `sources` [C] are the numbers of the children's parents.
+    """
 
     parents: Mask
     children: SplatField
+    sources: NDArray[np.int64]
 
 
 def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
@@ -122,25 +126,31 @@ def split_of(
     most = (MOST - 1.0) * len(field) + MORE
     parents = np.zeros(len(field), bool)
     children: SplatField | None = None
+    sources = np.zeros(0, np.int64)
     for count, edit in enumerate(active):
         before = EditStack(active[:count])
-        parts = []
+        parts: list[_Part] = []
         if children is not None:
             stay, others = _settled(children, before, edit, None, most - len(children), proceed)
-            parts += [children.take(stay), *others]
+            parts = [(children.take(stay), sources[stay]), *((part, sources[rows]) for part, rows in others)]
         stay, others = _settled(
-            field, before, edit, parents, most - sum(len(part) for part in parts), proceed
+            field, before, edit, parents, most - sum(len(part) for part, _ in parts), proceed
         )
         parents |= ~stay
         parts += others
         if parts:
-            children = _joined(parts)
-    split = None if children is None else Split(parents, children)
+            children = _joined([part for part, _ in parts])
+            sources = np.concatenate([rows for _, rows in parts])
+    split = None if children is None else Split(parents, children, sources)
     known_splits[field] = (active, split)
     return split
 
 
 known_splits: WeakKeyDictionary[SplatField, tuple[tuple[Edit, ...], Split | None]] = WeakKeyDictionary()
+
+
+_Part = tuple[SplatField, NDArray[np.int64]]
+"""Children, and the numbers of the splats that they are of."""
 
 
 def _settled(
@@ -150,9 +160,10 @@ def _settled(
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
-) -> tuple[Mask, list[SplatField]]:
+) -> tuple[Mask, list[_Part]]:
     """(which splats stay whole [N], children of the others), children split again where they must be."""
-    stay, done, found = np.ones(len(field), bool), [], field
+    stay, done, found = np.ones(len(field), bool), list[_Part](), field
+    sources = np.arange(len(field))
     for turn in range(CUTS if edit.adjustment == "discrete" else ROUNDS):
         split = _split_once(found, before, edit, gone if turn == 0 else None, room, proceed)
         if split is None:
@@ -160,10 +171,10 @@ def _settled(
         if turn == 0:
             stay = split[0]
         else:
-            done.append(found.take(split[0]))
-        found = split[1]
+            done.append((found.take(split[0]), sources[split[0]]))
+        found, sources = split[1], sources[split[2]]
         room -= len(found)
-    return stay, done if found is field else [*done, found]
+    return stay, done if found is field else [*done, (found, sources)]
 
 
 @dataclass(frozen=True)
@@ -192,8 +203,8 @@ def _split_once(
     gone: Mask | None,
     room: float,
     proceed: Callable[[], None] | None,
-) -> tuple[Mask, SplatField] | None:
-    """(which splats stay whole [N], the children of the others), or None where all do; none of those gone."""
+) -> tuple[Mask, SplatField, NDArray[np.int64]] | None:
+    """(which splats stay whole [N], the others' children, whose they are); None where all do, or are gone."""
     moved = moved_splats(field, before, proceed=proceed)
     if gone is not None and gone.any():
         moved = moved.without(gone)
@@ -351,8 +362,10 @@ def _crossing(
     return n[inside], t[inside], (h / width[:, None])[inside]
 
 
-def _parted(field: SplatField, children: _Children, room: float) -> tuple[Mask, SplatField] | None:
-    """(which splats stay whole, the others' children); of too many, those of the most opaque parents."""
+def _parted(
+    field: SplatField, children: _Children, room: float
+) -> tuple[Mask, SplatField, NDArray[np.int64]] | None:
+    """(which splats stay whole, the others' children, whose); if too many, of the most opaque parents."""
     parents = np.unique(children.parent)
     if len(children.parent) > room:
         order = np.argsort(-field.opacities[parents], kind="stable")
@@ -372,7 +385,7 @@ def _parted(field: SplatField, children: _Children, room: float) -> tuple[Mask, 
     U[:, :, 2] *= np.linalg.det(U)[:, None]
     stay = np.ones(len(field), bool)
     stay[parents] = False
-    return stay, SplatField(
+    parted = SplatField(
         (field.means[n] + along * children.x[:, None]).astype(np.float32),
         np.log(np.maximum(s, 1e-30)).astype(np.float32),
         quaternions_of(U).astype(np.float32),
@@ -383,6 +396,7 @@ def _parted(field: SplatField, children: _Children, room: float) -> tuple[Mask, 
         bounds=field.bounds,
         unbounded=field.unbounded,
     )
+    return stay, parted, n
 
 
 def _joined(parts: list[SplatField]) -> SplatField:

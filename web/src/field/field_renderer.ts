@@ -18,12 +18,13 @@ import { programOf } from "./gl";
 import type { Program } from "./gl";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
-import { fragment, VERTEX } from "./march_glsl";
+import { fragment } from "./march_glsl";
 import type { Variant } from "./march_glsl";
-import { setField, setView } from "./march_uniforms";
+import { reachOf, setField, setView } from "./march_uniforms";
 import type { PinholeCamera } from "./march_uniforms";
 import type { PageEdits } from "./page_edits";
 import type { Bytes, OnArrival } from "./page_file";
+import { plainState, unbind, WHOLE } from "./present";
 import type { SceneDrawer } from "./scene_drawer";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
@@ -40,6 +41,8 @@ export interface LoadOptions {
 
 export interface Picture {
   normals?: boolean;
+  /** Wants splats in the order of this very camera, and waits for it. */
+  sorted?: boolean;
   /** Counts of samples and texture reads in place of depth. */
   count?: boolean;
   /** Rows from the bottom that are drawn: a picture in parts keeps slow GPUs responsive. */
@@ -67,6 +70,9 @@ export class FieldRenderer implements SceneDrawer {
   /** Distance between samples in voxels; null is the file's. */
   step: number | null = null;
   readonly targets: Targets;
+  readonly inBands = true;
+  readonly inOrder = true;
+  readonly editable = true;
   /** Milliseconds that the last new shader took to compile. */
   compileTime = 0;
   compiled = 0;
@@ -164,7 +170,7 @@ export class FieldRenderer implements SceneDrawer {
     this.targets.bind(variant.normals);
     gl.useProgram(program);
     gl.bindVertexArray(this.vertices);
-    this.plainState();
+    plainState(this.gl);
     const occupancy = active && level.last ? active.occupancy : level.occupancy;
     setField(gl, uniform, level, textures.layout, occupancy, this.step ?? level.field.step);
     setView(gl, uniform, camera, this.targets);
@@ -192,7 +198,7 @@ export class FieldRenderer implements SceneDrawer {
     gl.scissor(across.first, first, across.count, count);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);
-    this.unbind();
+    unbind(gl);
     return true;
   }
 
@@ -201,9 +207,9 @@ export class FieldRenderer implements SceneDrawer {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.bindVertexArray(this.vertices);
-    this.plainState();
+    plainState(this.gl);
     this.views.show(view, this.reach, width, height);
-    this.unbind();
+    unbind(this.gl);
   }
 
   /** What was drawn, top row first. */
@@ -214,9 +220,9 @@ export class FieldRenderer implements SceneDrawer {
   /** At most about `most` distances of what was drawn, top row first. */
   distances(most: number): Distances {
     this.gl.bindVertexArray(this.vertices);
-    this.plainState();
+    plainState(this.gl);
     const found = this.views.distances(most);
-    this.unbind();
+    unbind(this.gl);
     return found;
   }
 
@@ -261,40 +267,18 @@ export class FieldRenderer implements SceneDrawer {
   private get reach(): [number, number] {
     const { shown, camera } = this;
     if (!shown || !camera) return [0, 1];
-    const [low, high] = shown.level.field.bounds;
-    const radius = 0.5 * Math.hypot(...high.map((x, axis) => x - low[axis]));
-    const distance = Math.hypot(...high.map((x, axis) => 0.5 * (x + low[axis]) - camera.c2w[4 * axis + 3]));
-    return [Math.max(0, distance - radius), distance + radius];
+    return reachOf(shown.level.field.bounds, camera);
   }
 
   private program(variant: Variant, brick: number): Program {
     const key = JSON.stringify([variant, brick]);
     let program = this.programs.get(key);
     if (!program) {
-      program = programOf(this.gl, VERTEX, fragment(variant, brick));
+      program = programOf(this.gl, WHOLE, fragment(variant, brick));
       this.programs.set(key, program);
       this.compileTime = program.milliseconds;
       this.compiled += 1;
     }
     return program;
-  }
-
-  private plainState(): void {
-    const { gl } = this;
-    for (const what of [gl.BLEND, gl.DEPTH_TEST, gl.CULL_FACE, gl.STENCIL_TEST, gl.SCISSOR_TEST, gl.DITHER]) gl.disable(what);
-    gl.colorMask(true, true, true, true);
-    gl.depthMask(false);
-  }
-
-  private unbind(): void {
-    const { gl } = this;
-    for (let unit = 15; unit >= 0; unit--) {
-      gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, null);
-      gl.bindTexture(gl.TEXTURE_3D, null);
-    }
-    gl.bindVertexArray(null);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.useProgram(null);
   }
 }

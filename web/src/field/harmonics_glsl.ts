@@ -1,7 +1,7 @@
 /** Colour from spherical harmonics in RGBA textures of 8 bits: coefficient k of channel c is number 3 k + c. */
 
 /** The real spherical harmonics of the unit direction d, as `cagefield.sh.sh_basis`. */
-const BASIS = [
+export const BASIS = [
   "0.28209479177387814",
   "-0.4886025119029199 * d.y",
   "0.4886025119029199 * d.z",
@@ -11,6 +11,22 @@ const BASIS = [
   "0.31539156525252005 * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
   "-1.0925484305920792 * d.x * d.z",
   "0.5462742152960396 * (d.x * d.x - d.y * d.y)",
+  "-0.5900435899266435 * d.y * (3.0 * d.x * d.x - d.y * d.y)",
+  "2.890611442640554 * d.x * d.y * d.z",
+  "-0.4570457994644658 * d.y * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
+  "0.3731763325901154 * d.z * (2.0 * d.z * d.z - 3.0 * d.x * d.x - 3.0 * d.y * d.y)",
+  "-0.4570457994644658 * d.x * (4.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
+  "1.445305721320277 * d.z * (d.x * d.x - d.y * d.y)",
+  "-0.5900435899266435 * d.x * (d.x * d.x - 3.0 * d.y * d.y)",
+  "2.5033429417967046 * d.x * d.y * (d.x * d.x - d.y * d.y)",
+  "-1.7701307697799304 * d.y * d.z * (3.0 * d.x * d.x - d.y * d.y)",
+  "0.9461746957575601 * d.x * d.y * (6.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
+  "-0.6690465435572892 * d.y * d.z * (4.0 * d.z * d.z - 3.0 * (d.x * d.x + d.y * d.y))",
+  "0.10578554691520431 * (8.0 * d.z * d.z * d.z * d.z - 24.0 * d.z * d.z * (d.x * d.x + d.y * d.y) + 3.0 * (d.x * d.x + d.y * d.y) * (d.x * d.x + d.y * d.y))",
+  "-0.6690465435572892 * d.x * d.z * (4.0 * d.z * d.z - 3.0 * (d.x * d.x + d.y * d.y))",
+  "0.47308734787878004 * (d.x * d.x - d.y * d.y) * (6.0 * d.z * d.z - d.x * d.x - d.y * d.y)",
+  "-1.7701307697799304 * d.x * d.z * (d.x * d.x - 3.0 * d.y * d.y)",
+  "0.6258357354491761 * (d.x * d.x * (d.x * d.x - 3.0 * d.y * d.y) - d.y * d.y * (3.0 * d.x * d.x - d.y * d.y))",
 ];
 
 /** The function colourAt(place in the atlas, unit direction), before the clamp, and how many textures it reads. */

@@ -19,12 +19,6 @@ export interface Variant {
   count?: boolean;
 }
 
-export const VERTEX = `#version 300 es
-void main() {
-  vec2 at = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  gl_Position = vec4(at, 0.0, 1.0);
-}`;
-
 const HEAD = `
 uniform sampler3D densityAtlas;
 uniform usampler3D brickIndex;

@@ -1,7 +1,7 @@
 /** The uniforms of the march: where the field lies, and what sees it. */
 import type { Layout } from "./atlas";
 import type { Program } from "./gl";
-import type { Level, Occupancy } from "./level";
+import type { Level, Occupancy, Vec3 } from "./level";
 
 type GL = WebGL2RenderingContext;
 
@@ -46,4 +46,11 @@ export function setView(gl: GL, uniform: Program["uniform"], camera: PinholeCame
   gl.uniformMatrix3fv(uniform("rotation"), true, [c2w[0], c2w[1], c2w[2], c2w[4], c2w[5], c2w[6], c2w[8], c2w[9], c2w[10]]);
   gl.uniform4f(uniform("lens"), camera.fx * across, camera.fy * down, camera.cx * across, camera.cy * down);
   gl.uniform1f(uniform("height"), height);
+}
+
+/** The nearest and farthest distance of a box from a camera. */
+export function reachOf([low, high]: readonly [Vec3, Vec3], camera: PinholeCamera): [number, number] {
+  const radius = 0.5 * Math.hypot(...high.map((x, axis) => x - low[axis]));
+  const distance = Math.hypot(...high.map((x, axis) => 0.5 * (x + low[axis]) - camera.c2w[4 * axis + 3]));
+  return [Math.max(0, distance - radius), distance + radius];
 }

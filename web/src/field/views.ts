@@ -1,7 +1,7 @@
 /** What was drawn, as the editor's views show it (as `render_worker.encoding` does), and its distances read back. */
 import { programOf } from "./gl";
 import type { Program } from "./gl";
-import { VERTEX } from "./march_glsl";
+import { WHOLE } from "./present";
 import type { Targets } from "./targets";
 
 type GL = WebGL2RenderingContext;
@@ -111,7 +111,7 @@ export class Views {
   }
 
   private get cached(): { show: Program; distances: Program } {
-    this.programs ??= { show: programOf(this.gl, VERTEX, SHOW), distances: programOf(this.gl, VERTEX, DISTANCES) };
+    this.programs ??= { show: programOf(this.gl, WHOLE, SHOW), distances: programOf(this.gl, WHOLE, DISTANCES) };
     return this.programs;
   }
 

@@ -1,6 +1,8 @@
 /** The script of exported scenes: their viewer, and what tests and other pages need of it under one name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
+import { readSplatEdits } from "../splats/splat_edits";
+import { SplatRenderer } from "../splats/splat_renderer";
 import { take } from "./sources";
 import { SceneViewer } from "./viewer";
 import type { SceneHeader } from "./viewer";
@@ -8,6 +10,8 @@ import type { SceneHeader } from "./viewer";
 interface ViewerApi {
   FieldRenderer: typeof FieldRenderer;
   readEdits: typeof readEdits;
+  SplatRenderer: typeof SplatRenderer;
+  readSplatEdits: typeof readSplatEdits;
   /** Takes parts of files that are in the page itself. */
   take: typeof take;
   /** The scene that the page shows. */
@@ -20,7 +24,7 @@ declare global {
   }
 }
 
-window.cagefieldViewer = { FieldRenderer, readEdits, take };
+window.cagefieldViewer = { FieldRenderer, readEdits, SplatRenderer, readSplatEdits, take };
 
 function element(selector: string): HTMLElement {
   const found = document.querySelector<HTMLElement>(selector);

@@ -5,14 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from cagefield.edits import Edit
+from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_edits import encode_changed_edits, for_page
 from cagefield.formats.page_field import encode_page_field
 from cagefield.formats.page_file import LEVEL, QUICK_LEVEL
+from cagefield.formats.page_splat_edits import encode_page_splat_edits
+from cagefield.formats.page_splats import encode_page_splats
+from cagefield.rendering.deformed_splats import changed_splats
 from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.splat_splitting import split_of
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
 from cagefield.server.render_worker.edited_renderers import EditedRenderers
@@ -22,11 +27,11 @@ from cagefield.server.render_worker.tasks import EditsDone, PageEditsTask, Stopp
 KEPT_OCCUPANCIES = 6
 """Occupancies of which pages may be sent the changed part, those that were sent last."""
 
-NOT_DRAWN = "only voxel fields are drawn by pages; the server draws this scene"
+NOT_DRAWN = "pages draw voxels and splats alone; the server draws this scene"
 
 
 class PageFiles:
-    """See the module. Makes the files of one scene; what pages have of the edits is not sent again."""
+    """See the module. Makes the files of one scene; of voxels, what pages have is not sent again."""
 
     def __init__(self, renderers: RendererCache) -> None:
         self._renderers = renderers
@@ -38,6 +43,8 @@ class PageFiles:
     def field(self) -> bytes:
         """The field's file. Raises CagefieldError for what pages cannot draw, and for an empty field."""
         scene, plain = self._renderers.scene, self._renderers.plain
+        if isinstance(scene.field, SplatField):
+            return encode_page_splats(scene.field, background=scene.background)
         if not isinstance(scene.field, VoxelField) or not isinstance(plain, Renderer):
             raise CagefieldError(NOT_DRAWN)
         return encode_page_field(scene.field, step=plain.step, background=scene.background)
@@ -46,6 +53,9 @@ class PageFiles:
         """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
         began = time.perf_counter()
         edits = self._renderers.edits(task.shown.edits)
+        field = self._renderers.scene.field
+        if isinstance(field, SplatField):
+            return self._splat_edits(field, EditStack(edits), task, stop)
         drawn = [self._prepared(edit) for edit in edits]
         same = all(one is other for one, other in zip(edits, drawn, strict=True))
         renderers = self._renderers.edited if same else self._own
@@ -62,6 +72,27 @@ class PageFiles:
         while len(self._occupancies) > KEPT_OCCUPANCIES:
             del self._occupancies[next(iter(self._occupancies))]
         return EditsDone(task.number, found.data, found.keys, mapped - began, time.perf_counter() - mapped)
+
+    @staticmethod
+    def _splat_edits(
+        field: SplatField, edits: EditStack, task: PageEditsTask, stop: Stop
+    ) -> EditsDone | Stopped:
+        """All that edits change of splats, whatever the page has; none is split while something moves."""
+        began, proceed = time.perf_counter(), giving_up(stop)
+        try:
+            changed = changed_splats(
+                field,
+                edits,
+                preserve_opacity=task.shown.preserve_opacity,
+                coarse=not task.exact,
+                split=split_of(field, edits, proceed=proceed) if task.exact else None,
+                proceed=proceed,
+            )
+        except GivenUpError:
+            return Stopped(task.number)
+        mapped = time.perf_counter()
+        content = encode_page_splat_edits(field, changed)
+        return EditsDone(task.number, content, (), mapped - began, time.perf_counter() - mapped)
 
     def _renderer(
         self, renderers: EditedRenderers, edits: Sequence[Edit], task: PageEditsTask, stop: Stop

@@ -144,7 +144,7 @@ class PageFieldTask:
 
 @dataclass(frozen=True)
 class PageEditsTask:
-    """Edits as a page's GPU evaluates them, without what the page `has` (see `formats.page_edits`).
+    """Edits as a page's GPU draws them, of voxels without what the page `has` (see `formats.page_edits`).
 
     Abandoned once the shared generation is past `generation`.
     """

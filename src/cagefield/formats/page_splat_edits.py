@@ -1,0 +1,109 @@
+"""What edits change of a page's splats: those that go, and those that come, as the rasteriser draws them.
+
+The page keeps the splats that it has loaded (`page_splats`) and lays these over them. With N splats of the
+field, in the page's order, and M that come (moved ones, copies, the children of split ones):
+
+    hidden       [ceil(N / 8)] uint8, bit n mod 8 of byte n / 8 is set where splat n is not shown as it is
+    sources      [M] int32, the splat whose colours splat m has
+    means        [M, 3] float32, in deformed space, less the field's centre
+    covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
+    opacities    [2, M] uint8, high bytes first, of 65535 o
+    turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
+                 along R^T d
+
+A whole difference to the field without edits is sent each time, so that the newest is right whatever came
+before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import FieldError
+from cagefield.fields.splat import SplatField
+from cagefield.formats.page_file import pack, unpack
+from cagefield.formats.page_splats import (
+    byte_pairs,
+    decode_rotations,
+    encode_rotations,
+    from_byte_pairs,
+    page_order,
+)
+from cagefield.quaternions import quaternions_of
+from cagefield.rendering.deformed_splats import ChangedSplats
+from cagefield.typing import Float32
+
+MAGIC, VERSION = b"cagesped", 1
+
+LEVEL = 1
+"""Of deflate: floats hardly get smaller, and a drag waits for them."""
+
+
+@dataclass(frozen=True)
+class PageSplatEdits:
+    """What a file holds: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
+    [M], turns [M,4] (w, x, y, z)."""
+
+    hidden: NDArray[np.bool_]
+    sources: NDArray[np.int32]
+    means: Float32
+    covariances: Float32
+    opacities: Float32
+    turns: Float32
+
+
+def encode_page_splat_edits(field: SplatField, changed: ChangedSplats) -> bytes:
+    """The file of what edits changed of a field."""
+    order = page_order(field)
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    splats = changed.splats
+    header = {"count": len(field), "changed": len(splats)}
+    turns = np.eye(3)[None] if splats.rotations is None else splats.rotations
+    arrays: dict[str, NDArray[Any]] = {
+        "hidden": np.packbits(changed.hidden[order], bitorder="little"),
+        "sources": place[changed.sources],
+        "means": (splats.means.astype(np.float64) - field.center).astype(np.float32),
+        "covariances": splats.covariances,
+        "opacities": byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64))),
+        "turns": encode_rotations(np.broadcast_to(quaternions_of(turns), (len(splats), 4)), bits=15),
+    }
+    return pack(MAGIC, VERSION, header, arrays, level=LEVEL)
+
+
+def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
+    """What a file holds, its numbers as the page has them.
+
+    Raises:
+        FieldError: the file is of another kind or version, truncated or garbled.
+    """
+    header, arrays = unpack(data, MAGIC, VERSION, "edits of splats for pages")
+    try:
+        count, changed = int(header["count"]), int(header["changed"])
+        shapes: dict[str, tuple[int, ...]] = {
+            "hidden": (-(-count // 8),),
+            "sources": (changed,),
+            "means": (changed, 3),
+            "covariances": (changed, 6),
+            "opacities": (2, changed),
+            "turns": (2, 3, changed),
+        }
+        parts: dict[str, Any] = {name: arrays[name] for name in shapes}
+    except (ValueError, KeyError, TypeError) as error:
+        raise FieldError("garbled edits of splats for pages; write them again") from error
+    if any(parts[name].shape != shape for name, shape in shapes.items()):
+        raise FieldError("arrays of edits of splats for pages do not fit each other; write them again")
+    if changed and not (parts["sources"].min() >= 0 and parts["sources"].max() < count):
+        raise FieldError(f"sources of edits of splats must be 0 to {count - 1}; write them again")
+    return PageSplatEdits(
+        np.unpackbits(parts["hidden"], count=count, bitorder="little").astype(bool),
+        parts["sources"],
+        parts["means"],
+        parts["covariances"],
+        (from_byte_pairs(parts["opacities"]) / 65535.0).astype(np.float32),
+        decode_rotations(parts["turns"]),
+    )

@@ -1,0 +1,187 @@
+/**
+ * Splats onto a picture, one texel each: `rendering.kernels.splat_projection.project` with the names it has there.
+ *
+ * A covariance is F F^T: F = R diag(s) of the field's splats, the Cholesky factor of changed ones. With N = M F, M the
+ * derivative of the pixel by the point, the projected covariance is N N^T, and its determinant the square of the cross
+ * product of N's rows: no difference of large numbers.
+ */
+import { BASIS } from "../field/harmonics_glsl";
+import { harmonicWords } from "./splat_file";
+
+/** Texels along a row of the textures. */
+export const WIDTH = 2048;
+
+/** Texels that are written of each splat, the bits of four floats each: place, shape, tint, and its normal if wanted. */
+export const OUTPUTS = 3;
+
+export interface ProjectVariant {
+  degree: number;
+  antialiased: boolean;
+  normals: boolean;
+}
+
+const HEAD = `
+uniform usampler2D order;       // numbers of splats, from far to near
+uniform uint count;             // of them
+uniform usampler2D records, harmonics, changed;
+uniform uint own;               // splats of the field; numbers from it on are changed ones
+uniform vec3 eye;               // less the field's centre
+uniform mat3 W;                 // rows: x right, y down, z forward
+uniform vec2 focal, centre, size;
+uniform vec4 limits;            // of (x, y) / z: low, high of x, of y
+uniform float near, logLow, logStep, colourStep;
+
+// Mean in pixels, x right and y down; A, k of the conic A (x + k y)^2 + D y^2.
+layout(location = 0) out uvec4 place;
+// D, opacity (0: not shown), distance, its slope along x.
+layout(location = 1) out uvec4 shape;
+// Colour, slope of the distance along y.
+layout(location = 2) out uvec4 tint;
+
+const float BLUR = 0.3, SLOPE_BLUR = 0.02, ALPHA_MIN = 1.0 / 255.0, LEAST_COMPENSATION = 0.005;
+
+uvec4 texel(usampler2D from, uint n) { return texelFetch(from, ivec2(n % ${WIDTH}u, n / ${WIDTH}u), 0); }
+
+// The quaternion (w, x, y, z as its y, z, w, x: xyz and w) of three numbers of 15 bits; see page_splats.encode_rotations.
+vec4 rotation(uvec2 words) {
+  uvec3 codes = uvec3(words.x & 65535u, words.x >> 16, words.y & 65535u);
+  uint left = (codes.x >> 15) | (codes.y >> 15) << 1;
+  vec3 c = (vec3(codes & 32767u) - 16384.0) / (16383.0 * sqrt(2.0));
+  float most = sqrt(max(0.0, 1.0 - dot(c, c)));
+  if (left == 0u) return vec4(c, most);
+  if (left == 1u) return vec4(most, c.y, c.z, c.x);
+  if (left == 2u) return vec4(c.y, most, c.z, c.x);
+  return vec4(c.y, c.z, most, c.x);
+}
+
+vec3 rotated(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+
+mat3 cholesky(float xx, float xy, float xz, float yy, float yz, float zz) {
+  float a = sqrt(max(xx, 1e-38));
+  float b = xy / a, c = xz / a;
+  float d = sqrt(max(yy - b * b, 0.0));
+  float e = d > 1e-6 * a ? (yz - b * c) / d : 0.0;
+  float f = sqrt(max(zz - c * c - e * e, 0.0));
+  return mat3(a, b, c, 0.0, d, e, 0.0, 0.0, f);
+}
+`;
+
+const MAIN = `
+void main() {
+  place = shape = tint = uvec4(0u);
+#ifdef NORMALS
+  normal = uvec4(0u);
+#endif
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  if (uint(here.y * ${WIDTH} + here.x) >= count) return;
+  uint splat = texelFetch(order, here, 0).r;
+  uint source = splat;
+  vec3 mean;
+  mat3 F;
+  float o;
+  vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
+  if (splat < own) {
+    uvec4 first = texel(records, 2u * splat), second = texel(records, 2u * splat + 1u);
+    mean = uintBitsToFloat(first.xyz);
+    o = float(second.y >> 16) / 65535.0;
+    vec3 s = exp(logLow + logStep * vec3(second.z & 65535u, second.z >> 16, second.w & 65535u));
+    vec4 q = rotation(second.xy);
+    F = mat3(s.x * rotated(q, vec3(1, 0, 0)), s.y * rotated(q, vec3(0, 1, 0)), s.z * rotated(q, vec3(0, 0, 1)));
+  } else {
+    uint n = 3u * (splat - own);
+    uvec4 first = texel(changed, n), second = texel(changed, n + 1u), third = texel(changed, n + 2u);
+    mean = uintBitsToFloat(first.xyz);
+    source = first.w;
+    vec4 C = uintBitsToFloat(second);
+    F = cholesky(C.x, C.y, C.z, C.w, uintBitsToFloat(third.x), uintBitsToFloat(third.y));
+    turn = rotation(third.zw);
+    o = float(third.w >> 16) / 65535.0;
+  }
+  vec3 offset = mean - eye;
+  vec3 p = W * offset;
+  if (p.z < near || o <= ALPHA_MIN) return;
+  vec2 n = clamp(p.xy / p.z, limits.xz, limits.yw);
+  vec3 rowX = vec3(W[0].x, W[1].x, W[2].x), rowY = vec3(W[0].y, W[1].y, W[2].y), rowZ = vec3(W[0].z, W[1].z, W[2].z);
+  vec3 N0 = (focal.x / p.z * (rowX - n.x * rowZ)) * F;
+  vec3 N1 = (focal.y / p.z * (rowY - n.y * rowZ)) * F;
+  float a = dot(N0, N0), b = dot(N0, N1), c = dot(N1, N1);
+  vec3 area = cross(N0, N1);
+  float sharp = dot(area, area);
+  float det = sharp + BLUR * (a + c + BLUR);
+  float slopeDet = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR);
+#ifdef ANTIALIASED
+  o *= max(LEAST_COMPENSATION, sqrt(sharp / det));
+#endif
+  float reach = 2.0 * log(o / ALPHA_MIN);
+  if (!(reach > 0.0)) return;
+  vec2 at = p.xy / p.z * focal + centre;
+  vec2 extent = sqrt(reach * (vec2(a, c) + BLUR));
+  if (any(lessThanEqual(at + extent, vec2(0.0))) || any(greaterThanEqual(at - extent, size))) return;
+  place = floatBitsToUint(vec4(at, (c + BLUR) / det, -b / (c + BLUR)));
+  float distance = length(offset);
+  vec3 d = offset / distance;
+  vec3 along = d * F;
+  float alongU = dot(along, N0), alongV = dot(along, N1);
+  vec2 slope = vec2(alongU * (c + SLOPE_BLUR) - alongV * b, alongV * (a + SLOPE_BLUR) - alongU * b) / slopeDet;
+  shape = floatBitsToUint(vec4(1.0 / (c + BLUR), o, distance, slope.x));
+#ifdef NORMALS
+  vec3 axis = flattest(F);
+  normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
+#endif
+  d = rotated(vec4(-turn.xyz, turn.w), d);
+  tint = floatBitsToUint(vec4(max(colourOf(source, d), 0.0), slope.y));
+}
+`;
+
+/** The axis of least variance of F F^T: powers of the adjugate of it, whose largest one it is. */
+const FLATTEST = `
+layout(location = 3) out uvec4 normal;
+vec3 flattest(mat3 F) {
+  mat3 C = F * transpose(F);
+  mat3 B = mat3(cross(C[1], C[2]), cross(C[2], C[0]), cross(C[0], C[1]));
+  for (int n = 0; n < 8; n++) {
+    B /= max(B[0][0] + B[1][1] + B[2][2], 1e-37);
+    B = B * B;
+  }
+  vec3 length2 = vec3(dot(B[0], B[0]), dot(B[1], B[1]), dot(B[2], B[2]));
+  vec3 axis = length2.x >= length2.y && length2.x >= length2.z ? B[0] : length2.y >= length2.z ? B[1] : B[2];
+  return axis / max(length(axis), 1e-37);
+}
+`;
+
+/** colourOf(splat of the field, canonical unit direction), before the clamp. */
+function colours(degree: number): string {
+  const texels = harmonicWords(degree) / 4;
+  const terms = (degree + 1) ** 2;
+  const lines = [
+    ...(degree > 0 ? [`uniform float steps[${terms - 1}];`] : []),
+    "vec3 colourOf(uint splat, vec3 d) {",
+    "  uvec2 last = texel(records, 2u * splat + 1u).zw;",
+    "  uint both = texel(records, 2u * splat).w;",
+    `  vec3 rgb = 0.5 + ${BASIS[0]} * colourStep * (vec3(both & 65535u, both >> 16, last.y >> 16) - 32768.0);`,
+    ...Array.from({ length: texels }, (_, n) => `  uvec4 t${n} = texel(harmonics, ${texels}u * splat + ${n}u);`),
+  ];
+  for (let k = 1; k < terms; k++) {
+    const bytes = [0, 1, 2].map((channel) => {
+      const byte = 3 * (k - 1) + channel;
+      return `(t${byte >> 4}.${"xyzw"[(byte >> 2) & 3]} >> ${8 * (byte & 3)} & 255u)`;
+    });
+    lines.push(`  rgb += (steps[${k - 1}] * (${BASIS[k]})) * (vec3(${bytes.join(", ")}) - 128.0);`);
+  }
+  return [...lines, "  return rgb;", "}"].join("\n");
+}
+
+export function projecting(variant: ProjectVariant): string {
+  return [
+    "#version 300 es",
+    "precision highp float;",
+    "precision highp int;",
+    "precision highp usampler2D;",
+    ...(variant.antialiased ? ["#define ANTIALIASED"] : []),
+    ...(variant.normals ? ["#define NORMALS"] : []),
+    HEAD,
+    variant.normals ? FLATTEST : "",
+    colours(variant.degree),
+    MAIN,
+  ].join("\n");
+}

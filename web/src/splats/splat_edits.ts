@@ -1,0 +1,53 @@
+/** Splats that edits changed, as they come over the wire (see `cagefield.formats.page_splat_edits`). */
+import { ByteReader, PageFile } from "../field/page_file";
+import { wholes } from "./splat_file";
+
+export const EDITS_MAGIC = "cagesped";
+const VERSION = 1;
+
+/**
+ * Words of a changed splat's record: the mean's floats, whose harmonics it has; its covariance's floats (xx, xy, xz,
+ * yy | yz, zz); its turn and opacity.
+ */
+export const CHANGED = 12;
+
+interface EditsHeader {
+  /** Splats of the field that was edited. */
+  count: number;
+  changed: number;
+}
+
+export interface SplatEdits {
+  count: number;
+  /** [count], 1 where a splat is not shown at its own place. */
+  hidden: Uint8Array<ArrayBuffer>;
+  changed: number;
+  /** [changed, 3], less the field's centre. */
+  means: Float32Array<ArrayBuffer>;
+  /** [changed, CHANGED] */
+  records: Uint32Array<ArrayBuffer>;
+}
+
+export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
+  const file = await PageFile.open<EditsHeader>(new ByteReader(source), EDITS_MAGIC, VERSION);
+  const { count, changed } = file.header;
+  const bits = (await file.read("hidden")) as Uint8Array;
+  const hidden = new Uint8Array(count);
+  for (let n = 0; n < count; n++) hidden[n] = (bits[n >> 3] >> (n & 7)) & 1;
+  const sources = (await file.read("sources")) as Int32Array;
+  const means = (await file.read("means")) as Float32Array<ArrayBuffer>;
+  const covariances = (await file.read("covariances")) as Float32Array<ArrayBuffer>;
+  const opacities = wholes((await file.read("opacities")) as Uint8Array);
+  const turns = wholes((await file.read("turns")) as Uint8Array);
+  const records = new Uint32Array(CHANGED * changed);
+  const [mean, covariance] = [new Uint32Array(means.buffer), new Uint32Array(covariances.buffer)];
+  for (let n = 0; n < changed; n++) {
+    const at = CHANGED * n;
+    for (let k = 0; k < 3; k++) records[at + k] = mean[3 * n + k];
+    records[at + 3] = sources[n];
+    for (let k = 0; k < 6; k++) records[at + 4 + k] = covariance[6 * n + k];
+    records[at + 10] = turns[n] | (turns[changed + n] << 16);
+    records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
+  }
+  return { count, hidden, changed, means, records };
+}

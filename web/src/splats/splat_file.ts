@@ -1,0 +1,140 @@
+/** Splats as they come over the wire (see `cagefield.formats.page_splats`), packed as they lie on the GPU. */
+import type { Vec3 } from "../field/level";
+import { ByteReader, PageFile } from "../field/page_file";
+import type { Bytes, OnArrival } from "../field/page_file";
+
+export const MAGIC = "cagespla";
+const VERSION = 1;
+
+const CHUNK = 256;
+
+/** Words of 32 bits that a splat's record has: the mean's floats, first colours, rotation, opacity, scales. */
+export const RECORD = 8;
+
+export interface SplatHeader {
+  count: number;
+  degree: number;
+  antialiased: boolean;
+  bounds: [Vec3, Vec3];
+  /** What means are less. */
+  centre: Vec3;
+  /** Depth from which splats are drawn. */
+  near: number;
+  background: Vec3 | null;
+  /** Logarithms of scales from 0 to 65535. */
+  log_scales: [number, number];
+  colour_step: number;
+  /** Colour coefficient of one step of 8 bits, for those from degree 1 on. */
+  steps: number[];
+  /** Splats with which each level ends. */
+  levels: number[];
+}
+
+/** Some of the splats: those from `first` on. */
+export interface SplatLevel {
+  header: SplatHeader;
+  first: number;
+  count: number;
+  last: boolean;
+  /** [count, 3] */
+  means: Float32Array<ArrayBuffer>;
+  /** [count, RECORD] */
+  records: Uint32Array<ArrayBuffer>;
+  /** [count, harmonicWords(degree)]: coefficient k of channel c from degree 1 on is byte 3 (k - 1) + c. */
+  harmonics: Uint32Array<ArrayBuffer>;
+}
+
+/** Words of a splat's coefficients from degree 1 on, whole texels of four. */
+export function harmonicWords(degree: number): number {
+  return 4 * Math.ceil((3 * ((degree + 1) ** 2 - 1)) / 16);
+}
+
+/** The levels of a file as they arrive; each adds its splats to those before. */
+export async function* readSplatLevels(
+  source: ReadableStream<Bytes> | ArrayBuffer,
+  onHeader: (header: SplatHeader) => void,
+  onArrival?: OnArrival,
+): AsyncGenerator<SplatLevel> {
+  const reader = new ByteReader(source, onArrival);
+  try {
+    const file = await PageFile.open<SplatHeader>(reader, MAGIC, VERSION);
+    const { header } = file;
+    onHeader(header);
+    let first = 0;
+    for (const [number, end] of header.levels.entries()) {
+      const count = end - first;
+      const bytes = async (name: string): Promise<Uint8Array> => (await file.read(`${number}.${name}`)) as Uint8Array;
+      const chunks = (await file.read(`${number}.chunks`)) as Float32Array;
+      const means = meansOf(chunks, await bytes("means"), count);
+      const rotations = await bytes("rotations");
+      const scales = await bytes("scales");
+      const opacities = await bytes("opacities");
+      const colours = await bytes("colours");
+      const records = recordsOf(means, wholes(rotations), wholes(scales), wholes(opacities), wholes(colours));
+      const harmonics = harmonicsOf(await bytes("sh"), count, header.degree);
+      yield { header, first, count, last: number === header.levels.length - 1, means, records, harmonics };
+      first = end;
+    }
+  } finally {
+    reader.cancel();
+  }
+}
+
+/** Numbers of 16 bits whose high bytes come first, then their low ones. */
+export function wholes(planes: Uint8Array): Uint16Array {
+  const count = planes.length / 2;
+  const out = new Uint16Array(count);
+  for (let n = 0; n < count; n++) out[n] = (planes[n] << 8) | planes[count + n];
+  return out;
+}
+
+/** Means [count, 3] of chunks' bounds [C, 2, 3] and bytes [B, 3, count], high ones first. */
+export function meansOf(chunks: Float32Array, planes: Uint8Array, count: number): Float32Array<ArrayBuffer> {
+  const bytes = planes.length / (3 * count);
+  const most = 256 ** bytes - 1;
+  const out = new Float32Array(3 * count);
+  for (let n = 0; n < count; n++) {
+    const chunk = 6 * Math.floor(n / CHUNK);
+    for (let axis = 0; axis < 3; axis++) {
+      let whole = 0;
+      for (let byte = 0; byte < bytes; byte++) whole = 256 * whole + planes[(3 * byte + axis) * count + n];
+      const low = chunks[chunk + axis];
+      out[3 * n + axis] = low + ((chunks[chunk + 3 + axis] - low) * whole) / most;
+    }
+  }
+  return out;
+}
+
+function recordsOf(
+  means: Float32Array<ArrayBuffer>,
+  rotations: Uint16Array,
+  scales: Uint16Array,
+  opacities: Uint16Array,
+  colours: Uint16Array,
+): Uint32Array<ArrayBuffer> {
+  const count = opacities.length;
+  const bits = new Uint32Array(means.buffer);
+  const out = new Uint32Array(RECORD * count);
+  for (let n = 0; n < count; n++) {
+    const at = RECORD * n;
+    out[at] = bits[3 * n];
+    out[at + 1] = bits[3 * n + 1];
+    out[at + 2] = bits[3 * n + 2];
+    out[at + 3] = colours[n] | (colours[count + n] << 16);
+    out[at + 4] = rotations[n] | (rotations[count + n] << 16);
+    out[at + 5] = rotations[2 * count + n] | (opacities[n] << 16);
+    out[at + 6] = scales[n] | (scales[count + n] << 16);
+    out[at + 7] = scales[2 * count + n] | (colours[2 * count + n] << 16);
+  }
+  return out;
+}
+
+function harmonicsOf(rows: Uint8Array, count: number, degree: number): Uint32Array<ArrayBuffer> {
+  const stride = 4 * harmonicWords(degree);
+  const out = new Uint8Array(stride * count);
+  const terms = 3 * ((degree + 1) ** 2 - 1);
+  for (let term = 0; term < terms; term++) {
+    for (let n = 0; n < count; n++) out[stride * n + term] = rows[count * term + n];
+  }
+  return new Uint32Array(out.buffer);
+}
