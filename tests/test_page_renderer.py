@@ -44,7 +44,7 @@ def turned(page: EditorPage, by: tuple[float, float]) -> tuple[NDArray[np.float6
         assert "drawn here" in page.page.inner_text(".status .figures")
         own = shot(page)
     page.settle()
-    assert "by the server" in page.page.inner_text(".status .figures")
+    page.until("document.querySelector('.status .figures').textContent.includes('by the server')")
     return own, shot(page)
 
 
