@@ -51,7 +51,7 @@ def pair(server: EditorServer) -> Iterator[tuple[EditorPage, EditorPage]]:
         )
         first.page.goto(asking(server.link, "all"))
         first.ready()
-        own = f"{server.link}?render=server"
+        own = asking(server.link, "server")
         second = first.tab(own)
         second.ready()
         for page in (second, first):

@@ -146,7 +146,7 @@ def test_pages_that_are_closed_leave_nothing_in_the_server(server: EditorServer)
 def test_splats_are_drawn_by_the_server(tmp_path: Path) -> None:
     scene = tmp_path / "splats"
     splat_scene().save(scene)
-    usual = (*USUAL, "status of 404")
+    usual = (*USUAL, "status of 409")
     with (
         editor_server(scene) as server,
         editor_page(asking(server.link, "page"), 500, 420, usual=usual) as page,
