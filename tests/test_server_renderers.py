@@ -288,7 +288,7 @@ def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
     handlers.do(EndJobTask(1, 2, keep=True), lambda _: False)
     handlers.do(EndJobTask(1, 3, keep=False), lambda _: False)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "views"]
-    shots = sorted((tmp_path / "views").iterdir())
+    shots = sorted((tmp_path / "views").glob("*.png"))
     assert [file.name for file in shots] == ["0000.png", "0001.png", "0002.png"]
     expected = renderers.scene.render(CAMERA).rgb8()
     np.testing.assert_array_equal(np.asarray(Image.open(shots[0])), expected)
