@@ -132,11 +132,11 @@ def chromium() -> list[int]:
 
 
 def cpu(pids: list[int]) -> float:
-    """CPU seconds of processes."""
+    """CPU seconds of processes, and of those that they have started and that have ended."""
     total = 0.0
     for pid in pids:
         fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-        total += (int(fields[11]) + int(fields[12])) / TICK
+        total += sum(int(field) for field in fields[11:15]) / TICK
     return total
 
 

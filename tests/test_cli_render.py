@@ -151,6 +151,8 @@ def test_existing_results_are_kept_unless_told(
         (["--background", "pink"], "is no colour"),
         (["--background", "0,0,7"], "three numbers in [0, 1]"),
         (["--size", "0"], "out of range"),
+        (["--size", ""], "is no size"),
+        (["--size", "9" * 5000], "is no size"),
         (["--size", "10x20x30"], "is no size"),
         (["--size", "99999"], "out of range"),
         (["--fps", 0], "--fps is 0"),

@@ -86,7 +86,11 @@ def test_undoing_everything_removes_the_autosave(path: Path) -> None:
 def test_a_damaged_autosave_is_passed_over(path: Path, text: str) -> None:
     store, _ = opened(path)
     store.autosave_path.write_text(text)
-    assert store.recovered() is None
+    with pytest.warns(UserWarning, match="they are kept as"):
+        assert store.recovered() is None
+    assert (
+        store.autosave_path.with_suffix(".damaged").read_text() == text and not store.autosave_path.exists()
+    )
 
 
 def test_keyframes_name_edits_by_their_place_in_files(path: Path) -> None:

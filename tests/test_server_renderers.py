@@ -17,12 +17,14 @@ from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
 from cagefield.keyframes import Keyframe, Still
+from cagefield.rendering.images import write_video
 from cagefield.server.editor.cage_placement import PROBES, fitted, probes
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
+from cagefield.server.render_worker.job_files import MARK
 from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.task_handlers import SAMPLES, TaskHandlers
@@ -288,7 +290,7 @@ def test_jobs_write_pictures_and_a_video_that_is_there_when_it_is_whole(
     handlers.do(EndJobTask(1, 2, keep=True), lambda _: False)
     handlers.do(EndJobTask(1, 3, keep=False), lambda _: False)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "views"]
-    shots = sorted((tmp_path / "views").iterdir())
+    shots = sorted((tmp_path / "views").glob("*.png"))
     assert [file.name for file in shots] == ["0000.png", "0001.png", "0002.png"]
     expected = renderers.scene.render(CAMERA).rgb8()
     np.testing.assert_array_equal(np.asarray(Image.open(shots[0])), expected)
@@ -331,6 +333,12 @@ def test_jobs_refuse_what_they_could_not_write(tmp_path: Path) -> None:
         jobs.test_views(1, document, (CAMERA,), tmp_path / "a.mp4", (8, 8), overwrite=False)
     with pytest.raises(CagefieldError, match="no cameras to render from"):
         jobs.test_views(1, document, (), tmp_path / "new", (8, 8), overwrite=False)
+    with pytest.raises(CagefieldError, match="is a video that cagefield did not make, and stays"):
+        path(1, document, tmp_path / "a.mp4", (8, 8), 24.0, overwrite=True)
+    with pytest.raises(CagefieldError, match="holds what no editor rendered"):
+        jobs.test_views(1, document, (CAMERA,), tmp_path / "full", (24, 96), overwrite=True)
+    write_video(tmp_path / "a.mp4", [np.zeros((8, 8, 3), np.uint8)])
+    (tmp_path / "full" / MARK).touch()
     assert path(1, document, tmp_path / "a.mp4", (8, 8), 24.0, overwrite=True).total == 25
     job = jobs.test_views(1, document, (CAMERA,), tmp_path / "full", (24, 96), overwrite=True)
     assert (job.stills[0].camera.width, job.stills[0].camera.height) == (24, 24)

@@ -38,7 +38,8 @@ BALL = {"inner": {"center": [0, 0, 0], "size": 1.1}, "outer": {"margin": 0.4}, "
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
     path = tmp_path_factory.mktemp("editor") / "ball"
     ball_scene().save(path)
-    with editor_server(path) as running:
+    # Tests save into folders of their own.
+    with editor_server(path, "--root", str(tmp_path_factory.getbasetemp())) as running:
         yield running
 
 
@@ -402,7 +403,7 @@ def test_a_video_and_the_test_views_are_rendered_in_the_background(
         while not video.exists() and time.monotonic() < end:
             time.sleep(0.1)
         assert video.stat().st_size > 500
-        assert sorted(file.name for file in folder.iterdir()) == ["0000.png", "0001.png"]
+        assert sorted(file.name for file in folder.glob("*.png")) == ["0000.png", "0001.png"]
         client.send("render", what="camera_path", out=str(video), width=32, height=32)
         assert "exists already" in client.notice()["text"]
 

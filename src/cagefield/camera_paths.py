@@ -117,9 +117,9 @@ def _path_camera(entry: object, where: str, width: int, height: int, to_dataset:
             f'{where}: "camera_to_world" holds a value that is not finite; export the path again'
         )
     fov = entry.get("fov")
-    if not _is_number(fov) or not 0.0 < fov < 180.0:
+    if not _is_number(fov) or not 0.1 <= fov <= 179.0:
         raise CameraError(
-            f'{where}: "fov" is {fov!r}; give the vertical field of view in degrees, between 0 and 180'
+            f'{where}: "fov" is {fov!r}; give the vertical field of view in degrees, from 0.1 to 179'
         )
     focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
     pose = to_dataset @ c2w

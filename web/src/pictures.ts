@@ -121,6 +121,11 @@ export class Pictures {
     this.surface.visible = false;
     viewport.scene.add(this.surface);
     viewport.beforeFrame.push(() => this.follow());
+    // What a lost context had cannot be freed in the one that comes after it.
+    viewport.canvas.addEventListener("webglcontextlost", () => {
+      this.depthTexture.dispose();
+      this.target?.dispose();
+    });
   }
 
   /** Shows a part of a picture: all of it, or a tile. */

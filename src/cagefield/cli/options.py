@@ -101,9 +101,10 @@ def parse_size(text: str | None, width: int, height: int) -> tuple[int, int]:
     if text is None:
         return width, height
     parts = text.lower().split("x")
-    if len(parts) > 2 or not all(part.strip().isascii() and part.strip().isdigit() for part in parts):
+    parts = [part.strip() for part in parts]
+    if len(parts) > 2 or not all(part.isascii() and part.isdigit() and len(part) < 10 for part in parts):
         raise CagefieldError(
-            f"--size {text!r} is no size; give WIDTHxHEIGHT or the longer side, such as 800x600 or 800"
+            f"--size {text[:40]!r} is no size; give WIDTHxHEIGHT or the longer side, such as 800x600 or 800"
         )
     sides = [int(part) for part in parts]
     if len(sides) == 1:

@@ -134,8 +134,9 @@ class Render:
             return list(orbit(seen, self.turntable, width=width, height=height)), self.fps or fps
         else:
             cameras = self._split_cameras(scene)
-        sized = [c.resized(*parse_size(self.size, c.width, c.height)) if self.size else c for c in cameras]
-        return sized, self.fps or fps
+        if self.size is None:
+            return list(cameras), self.fps or fps
+        return [c.resized(*parse_size(self.size, c.width, c.height)) for c in cameras], self.fps or fps
 
     def _split_cameras(self, scene: Scene) -> tuple[Camera, ...]:
         cameras = scene.cameras.get(self.split, ())

@@ -11,6 +11,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import warnings
 from pathlib import Path
 
 from cagefield import json_text
@@ -66,11 +67,25 @@ class SceneStore:
         )
 
     def recovered(self) -> Document | None:
-        """What an editor that ended without saving left behind; None where that is nothing new."""
+        """What an editor that ended without saving left behind; None where that is nothing new.
+
+        What cannot be read is put aside under another name, with a warning.
+        """
         try:
             content = json_text.loads(self.autosave_path.read_text(encoding="utf-8"))
             document = _parsed(content)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+            aside = self.autosave_path.with_suffix(".damaged")
+            with contextlib.suppress(OSError):
+                self.autosave_path.replace(aside)
+            reason = " ".join(str(error).split())[:120]
+            warnings.warn(
+                f"unsaved changes in {self.autosave_path} cannot be read ({reason}); "
+                f"they are kept as {aside.name}",
+                stacklevel=2,
+            )
             return None
         return None if document == self.document() else document
 

@@ -125,6 +125,8 @@ def application(
             if not made.done():
                 return PlainTextResponse("nobody waits for this picture any more", 499)
             return _download(made.result(), "screenshot.png", "image/png")
+        except asyncio.CancelledError:
+            return PlainTextResponse("the editor is ended", 503)
         except TooManyError as error:
             return PlainTextResponse(str(error), 429, headers={"Retry-After": "2"})
         except CagefieldError as error:
