@@ -157,7 +157,8 @@ def read_yaml(text: str, source: str, *, halves: bool = False) -> Node:
         root = yaml.compose(text, Loader=loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else 0
+        # The fast loader counts the end of the text as a line of its own.
+        line = min(mark.line + 1, len(text.splitlines())) if mark else 0
         problem = error.problem or error.context
         raise Node(None, source, line, "").error(f"not valid YAML: {problem}") from None
     except (yaml.YAMLError, UnicodeError) as error:
