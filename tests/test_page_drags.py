@@ -147,9 +147,7 @@ def test_edits_that_a_page_cannot_draw_are_the_servers_and_the_page_says_why(
     own.until("cagefield.page.here === 'nothing'")
     own.settle()
     assert own.page.evaluate("cagefield.picture.picture") > 0
-    assert "24 edits are more than a page's GPU takes" in str(
-        own.page.get_attribute(".status .figures", "title")
-    )
+    own.until("document.querySelector('.figures').title.includes('24 edits are more than a page')")
     own.changed(lambda: own.press("Control+z"))
     own.until("cagefield.page.here === 'all' && cagefield.page.draws")
     assert alike(pair) > ALIKE
