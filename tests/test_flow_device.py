@@ -36,8 +36,8 @@ def compare(edits: list[Edit], n: int) -> None:
     d = unit_vectors(rng, n).astype(np.float32)
     expected = stack.to_canonical(p, d)
     assert expected.viewdirs is not None and expected.stretch is not None
-    points, viewdirs, stretch, emptied = DeviceStack.from_stack(stack).to_canonical(p, d)
-    assert not emptied.any()
+    points, viewdirs, stretch, places = DeviceStack.from_stack(stack).to_canonical(p, d)
+    assert not places.any()
     # Some hundred stages each round once, and what they leave grows with the stretch of the rest of the way.
     size = np.abs(p).max()
     J = np.linalg.norm(expected.jacobian, axis=(1, 2))

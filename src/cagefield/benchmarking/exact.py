@@ -24,7 +24,7 @@ class KernelSamples:
     points: NDArray[np.float32]
     viewdirs: NDArray[np.float32]
     stretch: NDArray[np.float32]
-    emptied: NDArray[np.bool_]
+    layer: NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class KernelMap:
         """Canonical samples of deformed points [N,3] and unit view directions [N,3] (+z where left out)."""
         p = np.asarray(points, np.float32)
         d = np.broadcast_to(np.array([0, 0, 1], np.float32), p.shape) if viewdirs is None else viewdirs
-        return KernelSamples(*self._packed.to_canonical(p, np.asarray(d, np.float32)))
+        points, along, stretch, places = self._packed.to_canonical(p, np.asarray(d, np.float32))
+        return KernelSamples(points, along, stretch, np.minimum(places, 0))
 
 
 def exact(edits: EditStack) -> PointMap:

@@ -18,8 +18,10 @@ from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import Adjustment, problem_of_options
+from cagefield.edits.patch import Patch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.errors import CageError, DeviceError, EditError
+from cagefield.fields.voxel import VoxelField
 from cagefield.typing import Array
 from cagefield.warps import SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
@@ -61,6 +63,8 @@ class Edit:
     - width: how much of the flow shell moves, in (0, 1]: from "only near the inner cage" to the whole shell.
     - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
       sheets is shown.
+    - patch: of a discrete edit, what the field that it was made for shows where something was taken away
+      (`cagefield.patches.patched`); no part of edit files.
 
     Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
     shells are reported by `check`, which every evaluation calls.
@@ -79,6 +83,7 @@ class Edit:
     deleted: bool = False
     falloff: str = "smooth"
     width: float = 1.0
+    patch: Patch | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -157,6 +162,11 @@ class Edit:
         return self.deleted or not np.array_equal(self.inner.corners, self.deformed.corners)
 
     @property
+    def layers(self) -> tuple[VoxelField, ...]:
+        """The layers of its patch, if it has one."""
+        return () if self.patch is None else self.patch.layers
+
+    @property
     def boxes(self) -> Array:
         """Deformed-space boxes [B,2,3] (min, max), B 0 to 2, outside which the edit changes nothing."""
         cages: list[Cage] = []
@@ -165,7 +175,10 @@ class Edit:
                 cages = [self.outer]
             else:
                 cages = [] if self.deleted else [self.deformed]
-                cages += [] if self.keep_source else [self.inner]
+                if self.patch is not None:
+                    cages.append(self.patch.region)
+                elif not self.keep_source:
+                    cages.append(self.inner)
         return np.array([cage.aabb for cage in cages]).reshape(-1, 2, 3)
 
     @property
@@ -179,7 +192,8 @@ class Edit:
         self.check()
         inner = HexahedronMap(self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
-            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source)
+            region = None if self.patch is None else self.patch.region
+            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region)
         return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property

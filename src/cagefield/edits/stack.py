@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import SupportsIndex
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.edits.edit import Edit, bounds_of
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
+from cagefield.fields.layers import places_of
+from cagefield.fields.voxel import VoxelField
 from cagefield.typing import Array, Mask
 
 
@@ -20,15 +22,20 @@ class CanonicalSamples:
     """Samples of deformed space, taken to canonical space.
 
     points [N,3]; viewdirs [N,3] unit, d^c = J d / |J d|, and stretch [N], |J d| for unit d (both None where
-    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); emptied [N], True where the
-    field must be read as empty.
+    no view directions were given); jacobian [N,3,3], d(canonical)/d(deformed); layer [N], what is read at the
+    point: 0 the field, n the n-th of `EditStack.layers`, -1 nothing.
     """
 
     points: Array
     viewdirs: Array | None
     stretch: Array | None
     jacobian: Array
-    emptied: Mask
+    layer: NDArray[np.int64]
+
+    @property
+    def emptied(self) -> Mask:
+        """[N], True where the field must be read as empty."""
+        return np.asarray(self.layer < 0)
 
 
 @dataclass(frozen=True)
@@ -111,6 +118,16 @@ class EditStack:
         return EditStack(edits)
 
     @property
+    def layers(self) -> tuple[VoxelField, ...]:
+        """The layers of the active edits' patches, in order."""
+        return tuple(layer for edit in self.active for layer in edit.layers)
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """The places of the layers (`fields.layers`)."""
+        return places_of(self.layers)
+
+    @property
     def boxes(self) -> Array:
         """Boxes [B,2,3] (min, max) outside all of which no active edit changes anything.
 
@@ -173,19 +190,24 @@ class EditStack:
         """
         p = _points(points, "points").copy()
         J = np.tile(np.eye(3), (len(p), 1, 1))
-        emptied = np.zeros(len(p), dtype=bool)
+        layer = np.zeros(len(p), dtype=np.int64)
+        number = 1 + len(self.layers)
         for edit in reversed(self.active):
-            rows = np.flatnonzero(_in_any(edit.boxes, p) & ~emptied)
+            rows = np.flatnonzero(_in_any(edit.boxes, p) & (layer == 0))
             mapped = edit.warp.to_canonical(p[rows])
-            p[rows], J[rows], emptied[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
+            p[rows], J[rows] = mapped.points, mapped.jacobian @ J[rows]
+            number -= len(edit.layers)
+            layer[rows[mapped.lost]] = number if edit.layers else -1
+            if len(edit.layers) > 1:
+                layer[rows[mapped.inside]] = number + 1
         if viewdirs is None:
-            return CanonicalSamples(p, None, None, J, emptied)
+            return CanonicalSamples(p, None, None, J, layer)
         d = _points(viewdirs, "viewdirs")
         if d.shape != p.shape:
             raise EditError(f"viewdirs must have the shape of points, {list(p.shape)}, got {list(d.shape)}")
         along = np.einsum("nij,nj->ni", J, d)
         length = np.linalg.norm(along, axis=1)
-        return CanonicalSamples(p, along / length[:, None], length / np.linalg.norm(d, axis=1), J, emptied)
+        return CanonicalSamples(p, along / length[:, None], length / np.linalg.norm(d, axis=1), J, layer)
 
     def to_deformed(self, points: ArrayLike) -> DeformedPoints:
         """Deformed positions of canonical points [N,3]; the forward map.

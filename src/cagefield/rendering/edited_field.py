@@ -32,13 +32,17 @@ class EditedField:
 
     def __call__(self, positions: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
         """(sigma [N], rgb [N,3]) at deformed positions [N,3] along unit viewdirs [N,3]."""
-        points, along, stretch, emptied = self._stack.to_canonical(
+        points, along, stretch, places = self._stack.to_canonical(
             np.asarray(positions, np.float32), np.asarray(viewdirs, np.float32)
         )
         sigma, rgb = self.field(points, along)
+        for layer, place in zip(self.edits.layers, self.edits.places, strict=True):
+            rows = np.flatnonzero(places == place)
+            if len(rows):
+                sigma[rows], rgb[rows] = layer(points[rows], along[rows])
         if self.preserve_opacity:
             sigma = sigma * stretch
-        return np.where(emptied, 0.0, sigma).astype(np.float32), rgb
+        return np.where(places < 0, 0.0, sigma).astype(np.float32), rgb
 
 
 def edited_bounds(bounds: Array, edits: EditStack) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ lookup needs no branch. Records are padded: `sh` has `sh_stride(K)` floats a slo
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.devices import floats, ints
+from cagefield.fields.layers import places_of, slices_of
 from cagefield.fields.voxel import VoxelField
 from cagefield.rendering.kernels.grid import GridArgs
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
@@ -48,15 +50,18 @@ class DeviceGrid:
 
     Attributes:
         field: the field they come from.
-        index: [nx*ny*nz] int32, slot of each vertex, 0 where empty.
+        index: [nx*ny*nz] int32, slot of each vertex, 0 where empty; then those of the layers.
         density: [M+1] float32.
         sh: [(M+1) * K * 3] float32.
+        layers: the field's layers behind it (`fields.layers`), and `base`, the grid without them.
     """
 
     field: VoxelField
     index: qd.ndarray
     density: qd.ndarray
     sh: qd.ndarray
+    layers: tuple[VoxelField, ...] = ()
+    base: DeviceGrid | None = None
 
     @cached_property
     def args(self) -> GridArgs:
@@ -68,12 +73,42 @@ class DeviceGrid:
     @classmethod
     def from_field(cls, field: VoxelField) -> DeviceGrid:
         """The arrays of a field, its slots ordered by brick so that neighbours lie close in memory."""
-        order = brick_order(field.vertices, field.resolution)
+        vertices, density, sh = _by_brick(field)
         index = np.zeros(int(np.prod(field.resolution)), np.int32)
-        index[field.vertices[order]] = np.arange(1, len(order) + 1, dtype=np.int32)
-        density = np.concatenate([np.zeros(1, np.float32), field.density[order]])
-        sh = np.concatenate([np.zeros((1, *field.sh.shape[1:]), np.float32), field.sh[order]])
+        index[vertices] = np.arange(1, len(vertices) + 1, dtype=np.int32)
+        density = np.concatenate([np.zeros(1, np.float32), density])
+        sh = np.concatenate([np.zeros((1, *sh.shape[1:]), np.float32), sh])
         return cls(field, to_device(index), to_device(density), to_device(sh))
+
+    def with_layers(self, layers: tuple[VoxelField, ...]) -> DeviceGrid:
+        """The grid with these layers in place of its own; itself where they are the same ones."""
+        if len(layers) == len(self.layers) and all(map(operator.is_, layers, self.layers)):
+            return self
+        base = self.base or self
+        if not layers:
+            return base
+        _, ny, nz = self.field.resolution
+        places = places_of(layers)
+        slices = max(slices_of(layer)[1] + place for layer, place in zip(layers, places, strict=True))
+        first = int(np.prod(self.field.resolution))
+        index = np.zeros(slices * ny * nz, np.int32)
+        index[:first] = base.index.to_numpy()
+        densities, colours = [base.density.to_numpy()], [base.sh.to_numpy()]
+        stored = len(densities[0])
+        for layer, place in zip(layers, places, strict=True):
+            vertices, density, sh = _by_brick(layer)
+            index[vertices + place * ny * nz] = np.arange(stored, stored + len(vertices), dtype=np.int32)
+            stored += len(vertices)
+            densities.append(density)
+            colours.append(sh.reshape(-1))
+        every = (index, np.concatenate(densities), np.concatenate(colours))
+        return DeviceGrid(self.field, *map(to_device, every), layers, base)
+
+
+def _by_brick(field: VoxelField) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+    """(vertices [M], density [M], sh [M,K,3]) of a field, brick by brick."""
+    order = brick_order(field.vertices, field.resolution)
+    return field.vertices[order], field.density[order], field.sh[order]
 
 
 def brick_order(vertices: NDArray[np.int64], resolution: tuple[int, int, int]) -> NDArray[np.int64]:

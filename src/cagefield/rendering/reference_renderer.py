@@ -45,7 +45,7 @@ class Canonical(Protocol):
     def stretch(self) -> NDArray[Any] | None: ...
 
     @property
-    def emptied(self) -> NDArray[Any]: ...
+    def layer(self) -> NDArray[Any]: ...
 
 
 class PointMap(Protocol):
@@ -174,16 +174,22 @@ class _Probe:
         if mapped.viewdirs is None or mapped.stretch is None:
             raise FieldError("edits.to_canonical must return viewdirs and stretch when it is given viewdirs")
         sigma, rgb = np.zeros(len(points), np.float32), np.zeros((len(points), 3), np.float32)
-        kept = np.flatnonzero(~mapped.emptied)
-        sigma[kept], rgb[kept] = self._evaluate(
-            mapped.points[kept].astype(np.float32), mapped.viewdirs[kept].astype(np.float32)
-        )
-        if self.preserve_opacity:
-            sigma[kept] *= mapped.stretch[kept].astype(np.float32)
+        fields = (self.field, *getattr(self.edits, "layers", ()))
+        for number, field in enumerate(fields):
+            kept = np.flatnonzero(mapped.layer == number)
+            if not len(kept):
+                continue
+            sigma[kept], rgb[kept] = self._evaluate(
+                mapped.points[kept].astype(np.float32), mapped.viewdirs[kept].astype(np.float32), field
+            )
+            if self.preserve_opacity:
+                sigma[kept] *= mapped.stretch[kept].astype(np.float32)
         return sigma, rgb
 
-    def _evaluate(self, points: Float32, viewdirs: Float32) -> tuple[Float32, Float32]:
-        sigma, rgb = self.field(points, viewdirs)
+    def _evaluate(
+        self, points: Float32, viewdirs: Float32, field: Field | None = None
+    ) -> tuple[Float32, Float32]:
+        sigma, rgb = (field or self.field)(points, viewdirs)
         if sigma.shape != (len(points),) or rgb.shape != (len(points), 3):
             raise FieldError(
                 f"field must return sigma [{len(points)}] and rgb [{len(points)}, 3], "

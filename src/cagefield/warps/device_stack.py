@@ -19,7 +19,19 @@ from cagefield.warps.edit_lattice import nodes_of
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.kernels.device_stack import map_samples
 from cagefield.warps.kernels.edit_maps import EditArgs
-from cagefield.warps.packing import ALONE, BOX, FLOW, OFFSET, RESOLUTION, WIDTH, PackedEdit, row_of, widened
+from cagefield.warps.packing import (
+    ALONE,
+    BOX,
+    FLOW,
+    OFFSET,
+    PART,
+    RESOLUTION,
+    UNDER,
+    WIDTH,
+    PackedEdit,
+    row_of,
+    widened,
+)
 from cagefield.warps.weak_memo import kept
 
 _pool = BufferPool()
@@ -30,6 +42,9 @@ class PackedStack(Protocol):
 
     @property
     def active(self) -> Sequence[PackedEdit]: ...
+
+    @property
+    def places(self) -> Sequence[int]: ...
 
 
 @dataclass(frozen=True)
@@ -67,6 +82,10 @@ class DeviceStack:
         nodes = np.zeros((1, 3), dtype=np.float32)
         if lattices:
             nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
+        places = iter(stack.places)
+        for number, edit in enumerate(edits):
+            for column, _ in zip((UNDER, PART), edit.layers, strict=False):
+                params[number, column] = next(places)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))
@@ -87,15 +106,15 @@ class DeviceStack:
 
     def to_canonical(
         self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_]]:
-        """(points [N,3], viewdirs [N,3], stretch [N], emptied [N]) of samples, by `map_sample`."""
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+        """(points [N,3], viewdirs [N,3], stretch [N], places [N]) of samples, by `map_sample`."""
         devices.start()
         n = len(points)
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
             map_samples(samples, deal_of(len(samples)), out, self.args, self.has_flows)
-        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7] > 0.5
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7].astype(np.int32)
 
 
 @kept

@@ -1,4 +1,4 @@
-"""Discrete adjustment: only the inner region changes. Move, copy and delete."""
+"""Discrete adjustment: only the inner region changes. Move, copy and delete, and what takes the place."""
 
 from __future__ import annotations
 
@@ -16,22 +16,30 @@ from cagefield.warps.interfaces import Mapped
 class DiscreteWarp:
     """Move (V shows what was in V^c, the rest of V^c is empty), copy (V^c stays), delete (V^c is empty).
 
-    `inner` maps V onto V^c; None deletes, and then `source` is the cage that is emptied.
+    `inner` maps V onto V^c; None deletes, and then `source` is the cage that is emptied. `patched` is the
+    region, V^c and what lies around it, where a patch takes the place of the field (`edits.patch`).
     """
 
     source: Cage
     inner: HexahedronMap | None
     keep_source: bool = False
+    patched: Cage | None = None
+
+    @property
+    def region(self) -> Cage | None:
+        """Where the field is not read outside of V: the patched region, V^c, or nothing for a copy."""
+        return self.patched or (None if self.keep_source else self.source)
 
     def to_canonical(self, points: Array) -> Mapped:
-        """In V: phi. In V^c minus V: lost (empty), or unchanged for a copy. Elsewhere unchanged."""
+        """In V: phi. In the region minus V: lost (empty, or read from a patch). Elsewhere unchanged."""
         mapped = Mapped.identity(points)
         inside = np.zeros(len(points), dtype=bool)
         if self.inner is not None:
             inside, canonical, J = self.inner(points)
             mapped.put(inside, canonical, J)
-        if not self.keep_source:
-            mapped.lost[:] = self.source.contains(points) & ~inside
+            mapped.inside[:] = inside
+        if self.region is not None:
+            mapped.lost[:] = self.region.contains(points) & ~inside
         return mapped
 
     def to_deformed(self, points: Array) -> Mapped:

@@ -17,18 +17,20 @@ class Mapped:
 
     points [N,3]; jacobian [N,3,3], d(mapped)/d(given); lost [N]: to canonical space, deformed points that are
     empty; to deformed space, canonical points that nothing in the deformed scene shows. Lost points are
-    returned where they were, with the identity as Jacobian.
+    returned where they were, with the identity as Jacobian. inside [N]: the deformed points of V of a
+    discrete edit, taken to canonical space; False otherwise.
     """
 
     points: Array
     jacobian: Array
     lost: Mask
+    inside: Mask
 
     @classmethod
     def identity(cls, points: Array) -> Mapped:
         """The points as they are (the same values, bit for bit), each with the identity as Jacobian."""
         jacobian = np.tile(np.eye(3), (len(points), 1, 1))
-        return cls(points.copy(), jacobian, np.zeros(len(points), dtype=bool))
+        return cls(points.copy(), jacobian, *np.zeros((2, len(points)), dtype=bool))
 
     def put(self, rows: NDArray[np.intp] | Mask, points: Array, jacobian: Array) -> None:
         """Write the map's values for some rows."""

@@ -4,11 +4,13 @@ Its regions are hexahedra, each a record of `RECORD` numbers: an affine flag; W 
 y = W (p - c); the box of the hexahedron in y; the bend K [4,3] of
 y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta, xi in [-1,1]^3; and the monomial coefficients
 C [8,3] of its image in canonical space (see `cagefield.trilinear_hex`). Records: 0 is V with its image V^c,
-1 is V^o for a continuous edit and V^c for a discrete one, 2 to 7 are the sides of the trilinear shell.
+1 is V^o for a continuous edit and the region of a discrete one (V^c, or larger), 2 to 7 are the sides of the
+trilinear shell.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -35,7 +37,10 @@ TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
 NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
 SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
 ALONE = 31  # 1 where no earlier edit reaches into the edit's box
-RECORDS = 32
+UNDER = 32  # where samples of a discrete edit's region are read: `EMPTY`, or the place of a layer
+PART = 33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
+RECORDS = 34
+EMPTY = -1.0
 AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
 WIDTH = RECORDS + 8 * RECORD
 
@@ -57,6 +62,9 @@ class PackedEdit(Protocol):
 
     @property
     def boxes(self) -> Array: ...
+
+    @property
+    def layers(self) -> Sequence[object]: ...
 
 
 @kept
@@ -84,10 +92,11 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
     row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
     warp = edit.exact_warp
     if isinstance(warp, DiscreteWarp):
-        row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.keep_source else 2
+        row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
+        row[UNDER] = EMPTY
         if warp.inner is not None:
             _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
-        _record(row, 1, warp.source.corners)
+        _record(row, 1, (warp.region or warp.source).corners)
         return
     if not isinstance(warp, ContinuousWarp):
         raise EditError(f"a {type(warp).__name__} has no kernel")

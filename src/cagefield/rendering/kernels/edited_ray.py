@@ -95,7 +95,7 @@ def map_along(
     """As `map_sample` for p = o + t d on the ray, and 1 where p was moved, else 0."""
     q = p
     v = d
-    emptied = 0
+    place = 0
     moved = 0
     if ray.edit >= 0:
         if t >= ray.inner.x and t <= ray.inner.y:
@@ -110,7 +110,7 @@ def map_along(
             v = d + along
             moved = 1
     else:
-        q, v, emptied = map_sample(p, d, edits, flows)
+        q, v, place = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
             moved = 1
-    return q, v, emptied, moved
+    return q, v, place, moved

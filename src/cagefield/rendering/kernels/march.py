@@ -21,6 +21,7 @@ from cagefield.rendering.kernels.grid import (
     corner_weights,
     gather_density,
     gather_rgb,
+    ivec3,
     sh_basis,
     to_grid,
     vec3,
@@ -149,24 +150,25 @@ def march_tiles(
                     t += leap
                 else:
                     moved = 0
-                    alive = 1
+                    place = 0
                     view = d
                     if qd.static(edited):
                         if t >= edit_in and t <= edit_out:
                             p = camera.origin + t * d
-                            canonical, view, emptied, moved = map_along(ray, t, p, d, edits, flows)
-                            if emptied == 1:
-                                alive = 0
+                            canonical, view, place, moved = map_along(ray, t, p, d, edits, flows)
                             if moved == 1:
                                 g = to_grid(canonical, grid, contracted)
-                                outside = (
-                                    g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0
-                                )
-                                if outside or not is_occupied(canonical_bricks, g):
-                                    alive = 0
-                    if alive == 1:
+                    # The last bricks reach beyond the grid, and an edit may map samples there.
+                    if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
+                        place = -1
+                    if qd.static(edited):
+                        if moved == 1 and place == 0 and not is_occupied(canonical_bricks, g):
+                            place = -1
+                    if place >= 0:
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
-                        slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
+                        slots = corner_slots(
+                            grid.index, cell + ivec3(place, 0, 0), grid.resolution.y, grid.resolution.z
+                        )
                         f = g - qd.cast(cell, qd.f32)
                         b = corner_weights(f)
                         raw = gather_density(grid.density, slots, b)
@@ -227,7 +229,7 @@ def through_edits(slope: vec3, p: vec3, edits: EditArgs, flows: qd.template()):
             axis.y = 1.0
         else:
             axis.z = 1.0
-        _q, v, _emptied = map_sample(p, axis, edits, flows)
+        _q, v, _place = map_sample(p, axis, edits, flows)
         along = slope.dot(v)
         if a == 0:
             out.x = along

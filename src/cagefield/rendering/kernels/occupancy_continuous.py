@@ -97,6 +97,6 @@ def dense_blocks(
                     w = qd.abs(1.0 - up - part)
                     for a in qd.static(range(3)):
                         image[a] += w.x * w.y * w.z * corners[corner, a]
-                found = is_dense(image, r, grid)
+                found = is_dense(image, r, 0, grid)
                 at += 1
             out[c] = qd.cast(found, qd.u8)

@@ -41,10 +41,12 @@ def occupied_corners(
             j = (n // count.z) % count.y
             k = n % count.z
             g = qd.cast(lower + spacing * ivec3(i, j, k), qd.f32)
-            image, reach, empty = probe(g, grid, edits, contracted, flows)
+            image, reach, place = probe(g, grid, edits, contracted, flows)
             found = 0
-            if empty == 0:
-                r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
+            r = qd.min(reach * (0.5 * qd.cast(spacing, qd.f32)) + 0.5, MOST_CELLS)
+            if place > 0:
+                found = is_dense(image, r, place, grid)
+            elif place == 0:
                 found = is_blocked(image, r, bricks)
             out[n] = qd.cast(found, qd.u8)
 
@@ -68,22 +70,22 @@ def dense_blocks(
             k = 0
             while k < 27 and found == 0:
                 g = qd.cast(lower + 2 * block + ivec3(k % 3, (k // 3) % 3, k // 9), qd.f32)
-                image, reach, empty = probe(g, grid, edits, contracted, flows)
-                if empty == 0:
+                image, reach, place = probe(g, grid, edits, contracted, flows)
+                if place >= 0:
                     r = qd.min(0.5 * reach, MOST_CELLS) + 1e-3
-                    found = is_dense(image, r, grid)
+                    found = is_dense(image, r, place, grid)
                 k += 1
             out[n] = qd.cast(found, qd.u8)
 
 
 @qd.func
 def probe(g: vec3, grid: GridArgs, edits: EditArgs, contracted: qd.template(), flows: qd.template()):
-    """(image, reach, empty) of grid coordinates g: image in grid coordinates, reach = row sums of |J|."""
+    """(image, reach, place) of grid coordinates g: image in grid coordinates, reach = row sums of |J|."""
     p = to_world(g, grid, contracted)
     c = g / grid.half - 2.0
     reach = vec3(0.0, 0.0, 0.0)
     image = g
-    empty = 0
+    place = 0
     for a in range(3):
         # One cell along grid axis a, as a world-space displacement.
         e = vec3(0.0, 0.0, 0.0)
@@ -101,11 +103,10 @@ def probe(g: vec3, grid: GridArgs, edits: EditArgs, contracted: qd.template(), f
                 / grid.scale
             )
         length = qd.max(d.norm(), 1e-20)
-        q, v, emptied = map_sample(p, d / length, edits, flows)
-        empty = emptied
+        q, v, place = map_sample(p, d / length, edits, flows)
         along = v * length * grid.scale
         if qd.static(contracted):
             along = contract_velocity((q - grid.lower) * grid.scale, along) * grid.half
         image = to_grid(q, grid, contracted)
         reach += qd.abs(along)
-    return image, reach, empty
+    return image, reach, place

@@ -47,8 +47,11 @@ def axis_mask(brick: qd.i32, first: qd.i32, last: qd.i32, upper: qd.i32):
 
 
 @qd.func
-def is_dense(image: vec3, r: vec3, grid: GridArgs):
-    """1 where a cell within r of an image, grid coordinates, holds density, else 0."""
+def is_dense(image: vec3, r: vec3, place: qd.i32, grid: GridArgs):
+    """1 where a cell within r of an image, grid coordinates, holds density, else 0.
+
+    The place is that of the layer that is searched, 0 for the field.
+    """
     first = qd.max(qd.cast(qd.floor(image - r), qd.i32), 0)
     last = qd.min(qd.cast(qd.floor(image + r), qd.i32) + 1, grid.resolution - 1)
     found = 0
@@ -56,7 +59,7 @@ def is_dense(image: vec3, r: vec3, grid: GridArgs):
     while x <= last.x and found == 0:
         for y in range(first.y, last.y + 1):
             for z in range(first.z, last.z + 1):
-                if grid.density[grid.index[(x * grid.resolution.y + y) * grid.resolution.z + z]] > 0.0:
+                if grid.density[grid.index[((x + place) * grid.resolution.y + y) * grid.resolution.z + z]] > 0.0:
                     found = 1
         x += 1
     return found

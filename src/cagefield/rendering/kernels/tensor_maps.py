@@ -22,13 +22,15 @@ def map_tensors(
         i = dealt(turn, deal)
         if i < samples.shape[0]:
             d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, edits, flows)
+            q, v, place = map_sample(read3(samples, i, 0), d, edits, flows)
             length = qd.max(v.norm(), 1e-20)
             unchanged = (v - d).norm() == 0.0
             for a in qd.static(range(3)):
                 out[i, a] = q[a]
                 out[i, 3 + a] = d[a] if unchanged else v[a] / length
-            gain = 1.0 - qd.cast(emptied, qd.f32)
+            gain = 1.0
+            if place < 0:
+                gain = 0.0
             if qd.static(preserve_opacity):
                 if not unchanged:
                     gain *= length / qd.max(d.norm(), 1e-20)

@@ -21,7 +21,7 @@ def map_samples(
         i = dealt(turn, deal)
         if i < samples.shape[0]:
             d = read3(samples, i, 3)
-            q, v, emptied = map_sample(read3(samples, i, 0), d, edits, flows)
+            q, v, place = map_sample(read3(samples, i, 0), d, edits, flows)
             stretch = 1.0
             if (v - d).norm() > 0.0:
                 stretch = v.norm()
@@ -29,4 +29,4 @@ def map_samples(
                 out[i, a] = q[a]
                 out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
             out[i, 6] = stretch
-            out[i, 7] = qd.cast(emptied, qd.f32)
+            out[i, 7] = qd.cast(place, qd.f32)

@@ -22,5 +22,5 @@ def sample_lattice(
             j = (n // resolution) % resolution
             k = n // (resolution * resolution)
             p = origin + frame @ (vec3(i, j, k) / qd.cast(resolution - 1, qd.f32))
-            q, _v, _emptied = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
+            q, _v, _place = map_edit(p, vec3(1.0, 0.0, 0.0), params, none, 0, False)
             nodes[n] = q - p

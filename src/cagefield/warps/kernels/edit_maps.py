@@ -23,10 +23,12 @@ from cagefield.warps.packing import (
     LAST,
     MATRIX,
     NODE_BOX,
+    PART,
     RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
+    UNDER,
 )
 
 vec3 = qd.math.vec3
@@ -45,30 +47,31 @@ class EditArgs:
 
 @qd.func
 def map_sample(p: vec3, d: vec3, edits: EditArgs, flows: qd.template()):
-    """(canonical point, J d, emptied 0 or 1) of a deformed sample and a direction d.
+    """(canonical point, J d, place) of a deformed sample and a direction d.
 
-    An emptied sample is returned where it was when it was found empty.
+    The place is 0 where the field is read there, that of a layer (`fields.layers`) where this is, and -1
+    where an edit left nothing; such a sample is returned where it was when that was found.
     """
     q = p
     v = d
-    emptied = 0
+    place = 0
     for n in range(edits.count):
         e = edits.count - 1 - n
-        if emptied == 0 and in_box(q, edits.params, e, BOX):
-            q, v, emptied = map_edit(q, v, edits.params, edits.lattice, e, flows)
-    return q, v, emptied
+        if place == 0 and in_box(q, edits.params, e, BOX):
+            q, v, place = map_edit(q, v, edits.params, edits.lattice, e, flows)
+    return q, v, place
 
 
 @qd.func
 def map_edit(
     p: vec3, d: vec3, params: qd.template(), lattice: qd.template(), e: qd.i32, flows: qd.template()
 ):
-    """(canonical point, J d, emptied) of a sample through edit e alone; flows: `DeviceStack.has_flows`."""
+    """(canonical point, J d, place) of a sample through edit e alone; flows: `DeviceStack.has_flows`."""
     first = qd.cast(params[e, FIRST], qd.i32)
     last = qd.cast(params[e, LAST], qd.i32)
     resolution = qd.cast(params[e, RESOLUTION], qd.i32)
     continuous = params[e, CONTINUOUS] > 0.5
-    emptied = 0
+    place = 0
     use_lattice = 0
     use_flow = 0
     hit = -1
@@ -107,7 +110,8 @@ def map_edit(
             else:
                 inside = error <= EDGE
                 if not continuous:
-                    emptied = qd.cast(inside, qd.i32)
+                    if inside:
+                        place = qd.cast(params[e, UNDER], qd.i32)
                 elif not inside:
                     break
                 elif resolution > 0:
@@ -122,10 +126,12 @@ def map_edit(
         q, v = interpolate(p, d, params, lattice, e, resolution)
     elif hit >= 0:
         q, v = image(at, d, params, e, RECORDS + hit * RECORD)
+        if hit == 0:
+            place = qd.cast(params[e, PART], qd.i32)
     if qd.static(flows):
         if use_flow == 1:
             q, v = flow_sample(p, d, lattice, first_node(params, e))
-    return q, v, emptied
+    return q, v, place
 
 
 @qd.func

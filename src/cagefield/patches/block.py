@@ -1,0 +1,212 @@
+"""A block of a voxel field's grid, as the edits before a patch make it: what patches are worked out on.
+
+Notation: vertices of the block are numbered from its lowest one; `low` is that one's grid coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.edits import EditStack
+from cagefield.fields.contraction import uncontract
+from cagefield.fields.voxel import VoxelField
+from cagefield.sh import C0
+from cagefield.sh_rotation import rotated_sh
+from cagefield.typing import Array, Float32, Mask
+
+AT_ONCE = 1 << 18
+"""Vertices that are taken through the edits at a time."""
+
+SOLID = 0.3
+"""Optical depth per voxel from which on a vertex counts as solid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Vertices [X,Y,Z] of a field's grid: density per world unit, and colours where there is density.
+
+    slot [X,Y,Z] is the row of `sh` [M,K,3], -1 where a vertex has no colour.
+    """
+
+    field: VoxelField
+    low: NDArray[np.int64]
+    density: Float32
+    slot: NDArray[np.int64]
+    sh: Float32
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.density.shape
+
+    @cached_property
+    def vertices(self) -> NDArray[np.int64]:
+        """Linear indices [X,Y,Z] of the vertices in the field's grid."""
+        at = [np.arange(n) + first for n, first in zip(self.shape, self.low, strict=True)]
+        _, ny, nz = self.field.resolution
+        return np.asarray((at[0][:, None, None] * ny + at[1][:, None]) * nz + at[2])
+
+    @cached_property
+    def depth(self) -> Float32:
+        """Optical depth [X,Y,Z] over a voxel's edge."""
+        return np.maximum(self.density, 0.0) * np.float32(self.field.sample_spacing)
+
+    @property
+    def solid(self) -> Mask:
+        """[X,Y,Z], True where the vertex is opaque."""
+        return np.asarray(self.depth > SOLID)
+
+    @cached_property
+    def normals(self) -> Float32:
+        """Unit normals [X,Y,Z,3], against the gradient of a smoothed opacity; 0 where that is flat."""
+        smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
+        slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
+        length = np.linalg.norm(slope, axis=-1, keepdims=True)
+        return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
+
+    def positions(self, where: Mask) -> Array:
+        """World positions [N,3] of the vertices of a mask [X,Y,Z]."""
+        return world_of(self.field, np.argwhere(where) + self.low)
+
+    def lookup(self, values: AnyField, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
+        """Values [X,Y,Z] of the block interpolated at world positions [N,3]."""
+        g = self.field.grid_coordinates(points) - self.low
+        return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=outside))
+
+    def with_density(self, where: Mask, density: Float32) -> Block:
+        """The block with the densities [N] at the vertices of a mask; those without colour become grey."""
+        values = self.density.copy()
+        values[where] = density
+        fresh = where & (values > 0.0) & (self.slot < 0)
+        slot = self.slot.copy()
+        slot[fresh] = len(self.sh) + np.arange(int(fresh.sum()))
+        sh = np.concatenate([self.sh, np.zeros((int(fresh.sum()), *self.sh.shape[1:]), np.float32)])
+        return replace(self, density=values, slot=slot, sh=sh)
+
+    def with_colours(self, where: Mask, rgb: Array) -> Block:
+        """The block with colours [N,3], the same in all directions, at the vertices of a mask with slots."""
+        sh = self.sh.copy()
+        rows = self.slot[where]
+        sh[rows] = 0.0
+        sh[rows, 0] = (rgb - 0.5) / C0
+        return replace(self, sh=sh)
+
+    def relit(self, where: Mask, ratio: Array) -> Block:
+        """The block with the colours at the vertices of a mask multiplied by ratios [N]."""
+        sh = self.sh.copy()
+        rows = self.slot[where]
+        sh[rows] *= ratio[:, None, None].astype(np.float32)
+        sh[rows, 0] += (0.5 * (ratio[:, None] - 1.0) / C0).astype(np.float32)
+        return replace(self, sh=sh)
+
+    def colours(self, where: Mask) -> Array:
+        """Colours [N,3], the mean over directions, at the vertices of a mask with slots."""
+        return np.asarray(0.5 + C0 * self.sh[self.slot[where], 0], np.float64)
+
+    def layer(self) -> VoxelField:
+        """The block as a layer of the field: the vertices with colours."""
+        kept = self.slot >= 0
+        return VoxelField(
+            self.field.bounds,
+            self.field.resolution,
+            self.vertices[kept],
+            self.density[kept],
+            self.sh[self.slot[kept]],
+            self.field.contracted,
+        )
+
+
+AnyField = NDArray[np.floating] | NDArray[np.bool_]
+
+
+def block_of(field: VoxelField, below: EditStack, box: Array) -> Block:
+    """The block that holds a world-space box [2,3], as edits make the field.
+
+    Where these leave the field alone its vertices are taken as they are. Where they move it, density and
+    colours are interpolated, and colours turned; where they leave nothing, density is 0.
+    """
+    corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    g = field.grid_coordinates(corners)
+    low = np.maximum(np.floor(g.min(axis=0)).astype(np.int64) - 1, 0)
+    high = np.minimum(np.ceil(g.max(axis=0)).astype(np.int64) + 1, np.array(field.resolution) - 1)
+    shape = np.maximum(high - low + 1, 1)
+    block = _stored(field, low, shape)
+    for first in range(0, int(shape.prod()) if below.active else 0, AT_ONCE):
+        block = _through(block, below, np.arange(first, min(first + AT_ONCE, int(shape.prod()))))
+    return block
+
+
+def world_of(field: VoxelField, g: AnyField | NDArray[np.int64]) -> Array:
+    """World positions [N,3] of grid coordinates [N,3]."""
+    lower, upper = field.grid_bounds
+    points = lower + np.asarray(g, np.float64) / (np.array(field.resolution) - 1) * (upper - lower)
+    if not field.contracted:
+        return np.asarray(points)
+    return np.asarray(field.center + uncontract(points) * field.half_size)
+
+
+def _stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64]) -> Block:
+    """The block of the field itself."""
+    _, ny, nz = field.resolution
+    rows = slice(*np.searchsorted(field.vertices, [low[0] * ny * nz, (low[0] + shape[0]) * ny * nz]))
+    vertices = field.vertices[rows]
+    at = np.stack([vertices // (ny * nz), vertices // nz % ny, vertices % nz], axis=1) - low
+    inside = ((at >= 0) & (at < shape)).all(axis=1)
+    place = tuple(at[inside].T)
+    density, slot = np.zeros(shape, np.float32), np.full(shape, -1, np.int64)
+    density[place] = field.density[rows][inside]
+    slot[place] = np.arange(int(inside.sum()))
+    return Block(field, low, density, slot, field.sh[rows][inside])
+
+
+def _through(block: Block, below: EditStack, rows: NDArray[np.int64]) -> Block:
+    """The block with some of its vertices (flat indices) as the edits make them."""
+    points = world_of(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
+    changed = np.zeros(len(rows), bool)
+    for box in below.boxes:
+        changed |= ((points >= box[0]) & (points <= box[1])).all(axis=1)
+    rows, points = rows[changed], points[changed]
+    mapped = below.to_canonical(points)
+    changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
+    rows, points, layer = rows[changed], mapped.points[changed], mapped.layer[changed]
+    density, slot = block.density.copy(), block.slot.copy()
+    density.flat[rows], slot.flat[rows] = 0.0, -1
+    colours = [block.sh]
+    count = len(block.sh)
+    for number, source in enumerate((block.field, *below.layers)):
+        here = np.flatnonzero(layer == number)
+        raw, sh = interpolated(source, points[here])
+        kept = np.flatnonzero(raw > 0.0)
+        here = here[kept]
+        density.flat[rows[here]] = raw[kept]
+        slot.flat[rows[here]] = count + np.arange(len(here))
+        count += len(here)
+        colours.append(rotated_sh(sh[kept], _turns(mapped.jacobian[changed][here])))
+    return replace(block, density=density, slot=slot, sh=np.concatenate(colours))
+
+
+def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
+    """(density [N] before its clamp, sh [N,K,3]) of a field at canonical points; 0 outside of its grid."""
+    n = np.array(field.resolution)
+    g = field.grid_coordinates(points)
+    inside = ((g >= 0) & (g <= n - 1)).all(axis=1)
+    base = np.clip(np.floor(g).astype(np.int64), 0, n - 2)
+    fraction = g - base
+    raw, sh, total = np.zeros(len(g)), np.zeros((len(g), *field.sh.shape[1:])), np.zeros(len(g))
+    for corner in range(8):
+        offset = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1])
+        slot, stored = field.lookup(base + offset)
+        weight = np.where(offset == 1, fraction, 1 - fraction).prod(axis=1) * stored * inside
+        raw += weight * field.density[slot]
+        sh += weight[:, None, None] * field.sh[slot]
+    return raw.astype(np.float32), sh.astype(np.float32)
+
+
+def _turns(jacobian: Array) -> Array:
+    """Rotations [N,3,3] of colours from canonical to deformed space: of J's polar decomposition, inverted."""
+    u, _, v = np.linalg.svd(jacobian)
+    return np.asarray(np.swapaxes(u @ v, 1, 2))

@@ -1,0 +1,279 @@
+"""What a thing stood on, or hung from: the surface that goes on under it, which no photo showed.
+
+A support is found as a plane through surfaces around the part, which the part touches on its upper side; its
+height over that plane is a thin-plate spline through those surfaces. In the part's footprint the
+densities are those of the surfaces around, at the same height over the support, and the colours are the
+membrane that spans the hole: each coefficient solves Laplace's equation between those at the hole's rim.
+Columns of the footprint belong to the support where it closes around them: a table ends at its edge.
+
+Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membrane (without guidance).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+from scipy.interpolate import RBFInterpolator
+from scipy.sparse.linalg import factorized
+
+from cagefield.patches.block import Block
+from cagefield.typing import Array, Float32, Mask
+
+TRIALS = 200
+"""Planes that are tried."""
+
+NEAR = 1.5
+"""A surface vertex belongs to a plane within this distance, voxels."""
+
+ALONG = 0.9
+"""Least cosine between its normal and the plane's."""
+
+LEAST = 60
+"""Vertices of a support, at least."""
+
+DEEP, HIGH = -4.0, 3.0
+"""Heights over a support, in voxels, between which its density is made anew."""
+
+KNOTS = 1500
+"""Vertices through which the spline goes, at most."""
+
+
+@dataclass(frozen=True)
+class Support:
+    """A plane with normal [3], u and v axes [2,3], through a point, in units of voxels of a block."""
+
+    point: Array
+    normal: Array
+    axes: Array
+    members: NDArray[np.int64]
+
+    def local(self, at: Array) -> tuple[Array, Array]:
+        """(u and v [N,2], height [N]) of block coordinates [N,3]."""
+        away = at - self.point
+        return away @ self.axes.T, away @ self.normal
+
+
+def support_of(block: Block, part: Mask, ring: Mask, *, seed: int = 0) -> Support | None:
+    """The plane that most surface vertices of the ring [X,Y,Z] lie on, with the part [X,Y,Z] resting on it."""
+    at = np.argwhere(ring).astype(np.float64)
+    content = np.argwhere(part)
+    if len(at) < LEAST or not len(content):
+        return None
+    normals = block.normals[ring]
+    chance = np.random.default_rng(seed)
+    some = chance.choice(len(at), min(len(at), 4000), replace=False)
+    probes = content[chance.choice(len(content), min(len(content), 2000), replace=False)]
+    best, most = None, 0
+    for row in chance.choice(len(at), min(TRIALS, len(at)), replace=False):
+        n = normals[row].astype(np.float64)
+        height = (at[some] - at[row]) @ n
+        found = (np.abs(height) < NEAR) & (normals[some] @ n > ALONG)
+        if found.sum() <= most:
+            continue
+        above = (probes - at[row]) @ n
+        # It stands on it: little of the part lies below, and some of it close above.
+        if (above < -NEAR - 1.0).mean() < 0.05 and np.percentile(above, 3) < 4.0:
+            best, most = row, int(found.sum())
+    if best is None or most * len(at) / len(some) < LEAST:
+        return None
+    n = normals[best].astype(np.float64)
+    for _ in range(3):
+        member = np.flatnonzero((np.abs((at - at[best]) @ n) < NEAR) & (normals @ n > ALONG))
+        if len(member) < LEAST:
+            return None
+        centre = at[member].mean(axis=0)
+        spread = np.linalg.eigh(np.cov((at[member] - centre).T))[1][:, 0]
+        n = spread if spread @ n > 0.0 else -spread
+    aside = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    aside /= np.linalg.norm(aside)
+    member = np.flatnonzero((np.abs((at - centre) @ n) < 2.0 * NEAR) & (normals @ n > ALONG))
+    return Support(centre, n, np.stack([aside, np.cross(n, aside)]), at[member].astype(np.int64))
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Columns of a support on a grid [U,V] a voxel apart: those in the hole, and those around it."""
+
+    support: Support
+    first: NDArray[np.int64]
+    hole: Mask
+    around: Mask
+    height: Array
+
+    def column(self, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """(u [N], v [N], height over the support [N]) of block coordinates [N,3]; u is -1 outside."""
+        uv, height = self.support.local(at)
+        cell = np.round(uv).astype(np.int64) - self.first
+        inside = ((cell >= 0) & (cell < self.hole.shape)).all(axis=1)
+        cell[~inside] = 0
+        height = height - self.height[cell[:, 0], cell[:, 1]]
+        return np.where(inside, cell[:, 0], -1), cell[:, 1], height
+
+
+def footprint_of(block: Block, support: Support, part: Mask, shaded: Mask) -> Footprint | None:
+    """The columns under the part, and of the surface vertices [X,Y,Z] that it shaded from close by."""
+    uv, own = support.local(support.members.astype(np.float64))
+    content = np.argwhere(part).astype(np.float64)
+    where, above = support.local(content)
+    tall = float(np.percentile(above, 98))
+    low = where[above < max(4.0, 0.25 * tall)]
+    dark = support.local(np.argwhere(shaded).astype(np.float64))
+    low = np.concatenate([low, dark[0][np.abs(dark[1]) < 2.0 * NEAR]])
+    if len(low) < 4:
+        return None
+    every = np.concatenate([uv, low])
+    first = np.floor(every.min(axis=0)).astype(np.int64) - 3
+    size = np.ceil(every.max(axis=0)).astype(np.int64) + 4 - first
+    hole, around = np.zeros(size, bool), np.zeros(size, bool)
+    hole[tuple((np.round(low).astype(np.int64) - first).T)] = True
+    hole = ndimage.binary_dilation(ndimage.binary_closing(hole, iterations=2), iterations=2)
+    around[tuple((np.round(uv).astype(np.int64) - first).T)] = True
+    around = ndimage.binary_closing(np.pad(around, 2), iterations=2)[2:-2, 2:-2] & ~hole
+    # What the support closes around belongs to it: a disc as wide as the hole is deep decides.
+    reach = int(np.ceil(ndimage.distance_transform_edt(np.pad(hole, 1)).max())) + 3
+    wide = np.pad(around, reach)
+    grown = ndimage.distance_transform_edt(~wide) <= reach
+    closed = (ndimage.distance_transform_edt(grown) > reach)[reach:-reach, reach:-reach]
+    hole &= closed
+    if not hole.any() or not around.any():
+        return None
+    chance = np.random.default_rng(0)
+    near = around[tuple((np.round(uv).astype(np.int64) - first).T)]
+    knots = np.flatnonzero(near)
+    if len(knots) < LEAST:
+        return None
+    knots = chance.choice(knots, min(KNOTS, len(knots)), replace=False)
+    surface = own + _crossing(block, support)[:, None][:, 0]
+    spline = RBFInterpolator(uv[knots], surface[knots], neighbors=64, smoothing=4.0, kernel="thin_plate_spline")
+    cells = np.argwhere(hole | around)
+    height = np.zeros(size)
+    height[tuple(cells.T)] = spline((cells + first).astype(np.float64))
+    return Footprint(support, first, hole, around, height)
+
+
+def _crossing(block: Block, support: Support) -> Array:
+    """How far above each member [N] its surface is, voxels: where the optical depth falls to a half."""
+    steps = np.arange(-2.0, 3.5, 0.5)
+    depth = []
+    for step in steps:
+        at = support.members + step * support.normal
+        depth.append(ndimage.map_coordinates(block.depth, at.T, order=1, mode="nearest"))
+    rows = np.stack(depth)
+    most = np.maximum(rows[:5].max(axis=0), 1e-6)
+    full = rows > 0.5 * np.minimum(most, 2.0)
+    last = np.where(full.any(axis=0), len(steps) - 1 - np.argmax(full[::-1], axis=0), 4)
+    return np.asarray(steps[last])
+
+
+def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
+    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c."""
+    voxels = np.argwhere(np.ones(block.shape, bool))
+    u, v, height = footprint.column(voxels.astype(np.float64))
+    known = u >= 0
+    voxels, u, v, height = voxels[known], u[known], v[known], height[known]
+    hole = footprint.hole[u, v]
+    around = footprint.around[u, v] & ~removed[tuple(voxels.T)]
+    level = (height >= DEEP) & (height <= HIGH)
+    profile = _profile(block, voxels[around & level], height[around & level])
+    # Crusts of what was taken away, between the support and V^c.
+    nearby = ndimage.binary_dilation(removed, iterations=4)
+    crust = hole & (height > HIGH) & nearby[tuple(voxels.T)]
+    new = hole & level
+    where = np.zeros(block.shape, bool)
+    where[tuple(voxels[crust].T)] = True
+    block = block.with_density(where, np.zeros(int(where.sum()), np.float32))
+    where[:] = False
+    where[tuple(voxels[new].T)] = True
+    values = np.zeros(block.shape, np.float32)
+    heights = np.arange(DEEP, HIGH + 0.25, 0.5)
+    values[tuple(voxels[new].T)] = np.interp(height[new], heights, profile)
+    below = where & (block.density > values)
+    deep = np.zeros(block.shape, bool)
+    deep[tuple(voxels[new & (height < -1.5)].T)] = True
+    values = np.where(below & deep, block.density, values)
+    block = block.with_density(where, values[where])
+    return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], (u[around], v[around], height[around]))
+
+
+def _profile(block: Block, at: NDArray[np.int64], height: Array) -> Array:
+    """Median densities at heights DEEP, DEEP + 1/2, ... HIGH over the support."""
+    heights = np.arange(DEEP, HIGH + 0.25, 0.5)
+    values = block.density[tuple(at.T)]
+    profile = np.zeros(len(heights))
+    for number, level in enumerate(heights):
+        here = np.abs(height - level) <= 0.3
+        profile[number] = np.median(values[here]) if here.any() else profile[number - 1]
+    # Photos do not say how dense it is inside; above, nothing rises again.
+    top = int(np.argmax(profile))
+    profile[:top] = np.maximum(profile[:top], profile[top])
+    profile[top:] = np.minimum.accumulate(profile[top:])
+    return profile
+
+
+def _coloured(
+    block: Block,
+    footprint: Footprint,
+    new: NDArray[np.int64],
+    column: tuple[NDArray[np.int64], NDArray[np.int64]],
+    known: NDArray[np.int64],
+    above: tuple[NDArray[np.int64], NDArray[np.int64], Array],
+) -> Block:
+    """The block with the membrane's coefficients in the hole."""
+    u, v, height = above
+    shape = footprint.hole.shape
+    slot = block.slot[tuple(known.T)]
+    rows = (np.abs(height) < 1.6) & (slot >= 0)
+    weight = (block.depth[tuple(known.T)] + 1e-4)[rows]
+    cell = np.ravel_multi_index((u[rows], v[rows]), shape)
+    total = np.bincount(cell, weight, minlength=int(np.prod(shape)))
+    given = total > 0.0
+    width = int(np.prod(block.sh.shape[1:]))
+    table = np.zeros((len(total), width))
+    values = block.sh[slot[rows]].reshape(-1, width)
+    for channel in range(width):
+        table[:, channel] = np.bincount(cell, weight * values[:, channel], minlength=len(total))
+    table[given] /= total[given][:, None]
+    given &= footprint.around.reshape(-1)
+    table = membrane(footprint.hole, given.reshape(shape), table)
+    sh = block.sh.copy()
+    place = block.slot[tuple(new.T)]
+    kept = place >= 0
+    cells = np.ravel_multi_index((column[0][kept], column[1][kept]), shape)
+    sh[place[kept]] = table[cells].reshape(-1, *block.sh.shape[1:])
+    return Block(block.field, block.low, block.density, block.slot, sh)
+
+
+def membrane(hole: Mask, given: Mask, table: Array) -> Array:
+    """Rows [U*V,C] with those of the hole [U,V] solved for: each is the mean of its neighbours.
+
+    Neighbours that are neither given nor in the hole do not count.
+    """
+    unknown = np.flatnonzero(hole.reshape(-1) & ~given.reshape(-1))
+    number = np.full(hole.size, -1, np.int64)
+    number[unknown] = np.arange(len(unknown))
+    height, width = hole.shape
+    pulls, sources, degree = [], np.zeros((len(unknown), table.shape[1])), np.full(len(unknown), 1e-6)
+    y, x = np.divmod(unknown, width)
+    for dy, dx in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+        there = (y + dy >= 0) & (y + dy < height) & (x + dx >= 0) & (x + dx < width)
+        other = np.where(there, (y + dy) * width + x + dx, 0)
+        known = there & given.reshape(-1)[other]
+        inner = there & (number[other] >= 0)
+        degree += known.astype(float) + inner
+        np.add.at(sources, np.flatnonzero(known), table[other[known]])
+        pulls.append((np.flatnonzero(inner), number[other[inner]]))
+    rows, columns = (np.concatenate(part) for part in zip(*pulls, strict=True))
+    pull = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), (len(unknown),) * 2)
+    solve = factorized((sparse.diags(degree) - pull).tocsc())
+    out = table.copy()
+    mean = table[given.reshape(-1)].mean(axis=0) if given.any() else np.zeros(table.shape[1])
+    sources += 1e-6 * mean
+    for channel in range(table.shape[1]):
+        out[unknown, channel] = solve(sources[:, channel])
+    return out
+
+
+__all__ = ["Float32", "Footprint", "Support", "footprint_of", "membrane", "rebuilt", "support_of"]
