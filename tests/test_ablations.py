@@ -12,7 +12,7 @@ from cagefield.benchmarking.ablations import Subject, around
 from cagefield.benchmarking.cases import chosen
 from cagefield.benchmarking.compare import continuous
 from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.limits import limits, resettled
+from cagefield.benchmarking.limits import limits
 from cagefield.benchmarking.strips import difference, strip
 from cagefield.benchmarking.workbench import Settings, Workbench, beside
 from cagefield.cli import main
@@ -101,19 +101,6 @@ def test_limits(bench: Workbench) -> None:
     (other,) = chosen(["plant"], ["taller"])
     with pytest.raises(CagefieldError, match="plant taller moves no part; choose a discrete edit"):
         limits(other, bench, PICTURE)
-
-
-def test_shadows_follow_a_resettled_scene_and_nothing_else_changes() -> None:
-    still = procedural_scene("digger")
-    camera = eye("digger", 48)
-    before, again = (s.photograph(camera, background="white").rgb8() for s in (still, resettled(still)))
-    np.testing.assert_array_equal(before, again)
-    moved = still.move("cone", translate=(0, -0.97, 0))
-    old, new = (
-        s.photograph(camera, background="white").rgb8().astype(int) for s in (moved, resettled(moved))
-    )
-    apart = np.abs(old - new).max(axis=2)
-    assert 0.001 < (apart > 8).mean() < 0.1  # the ground where the cone stood and where it stands
 
 
 def test_cameras_beside_each_other(bench: Workbench) -> None:

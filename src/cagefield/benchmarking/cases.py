@@ -134,12 +134,3 @@ def chosen(scenes: Sequence[str] = (), names: Sequence[str] = ()) -> tuple[Case,
     return tuple(
         case for case in CASES if (not scenes or case.scene in scenes) and (not names or case.name in names)
     )
-
-
-def relit(moved: ProceduralScene) -> bool:
-    """True where a part was turned or stretched: light falls on it in another way than in the photos."""
-    for part in moved.parts:
-        linear = part.motion[:3, :3]
-        if not np.allclose(linear, np.eye(3) * linear[0, 0], atol=1e-9):
-            return True
-    return False

@@ -6,7 +6,7 @@ Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
     return _Shots(
         edited=seen(scene.with_edits(case.edits), cameras),
         old_shadows=photos(moved, cameras),
-        new_shadows=photos(resettled(moved), cameras),
+        new_shadows=photos(moved.with_its_own_occlusion(), cameras),
         one_side=seen(one_side, cameras),
         one_side_turned=seen(one_side.with_edits(EditStack([turn])), cameras),
         all_round_turned=seen(scene.with_edits(EditStack([turn])), cameras),
@@ -134,18 +134,3 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
 def photos(model: ProceduralScene, cameras: Sequence[Camera]) -> AnyArray:
     """Photos [V,H,W,3] of a scene over white."""
     return stacked([model.photograph(camera, background="white").rgb8() for camera in cameras])
-
-
-def resettled(moved: ProceduralScene) -> ProceduralScene:
-    """The scene as if modelled with its parts where they are now: ambient occlusion is theirs there."""
-    parts = tuple(
-        replace(
-            part,
-            primitives=tuple(
-                replace(primitive, poses=part.motion @ primitive.poses) for primitive in part.primitives
-            ),
-            motion=np.eye(4),
-        )
-        for part in moved.parts
-    )
-    return replace(moved, parts=parts, modelled=parts)

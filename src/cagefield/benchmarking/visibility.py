@@ -1,4 +1,4 @@
-"""Which surfaces of an edited scene the photos of the scene as it was can have shown."""
+"""Which surfaces of an edited scene were hidden before: by what was moved, or from all photos."""
 
 from __future__ import annotations
 
@@ -61,6 +61,26 @@ def unseen_pixels(
     result = np.zeros(shape, bool)
     result.reshape(-1)[pixels[met[hidden]]] = True
     return result
+
+
+def uncovered_pixels(moved: ProceduralScene, camera: Camera, before: ProceduralScene) -> Mask:
+    """Pixels [H,W] of `moved` that show a surface which a part hid in `before` that was moved or removed.
+
+    The ray through the pixel's centre met that part, and now meets another.
+    """
+    known = {part.name: part for part in moved.parts}
+    gone = {
+        part.name
+        for part in before.parts
+        if part.name not in known or not np.array_equal(known[part.name].motion, part.motion)
+    }
+    directions = apply(camera.c2w[:3, :3], camera.local_directions().T)
+    first, now = (trace(scene.placed, camera.origin, directions).primitive for scene in (before, moved))
+    # the last name is that of no surface, whose index is -1
+    names = np.array([item.part.name for item in before.placed] + [""])[first]
+    others = np.array([item.part.name for item in moved.placed] + [""])[now]
+    uncovered: Mask = np.isin(names, list(gone)) & (now >= 0) & (names != others)
+    return uncovered.reshape(camera.height, camera.width)
 
 
 def _original(part: Part, scene: ProceduralScene) -> Part:

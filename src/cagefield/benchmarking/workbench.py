@@ -25,14 +25,14 @@ import cagefield
 from cagefield.atomic_files import replaced_file
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
-from cagefield.benchmarking.visibility import unseen_pixels
+from cagefield.benchmarking.mapped_photographs import MappedScene
+from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
 from cagefield.cameras import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
-from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.splat_config import SplatConfig
@@ -45,12 +45,12 @@ Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("datasets/procedural", "cameras.py")
 _MAPPED = (
-    "edits", "warps", "cages.py", "trilinear_hex.py", "rendering/reference_renderer.py",
+    "edits", "warps", "cages.py", "trilinear_hex.py", "benchmarking/mapped_photographs.py",
     "benchmarking/exact.py", "benchmarking/peers", "benchmarking/methods.py",
 )  # fmt: skip
 
-SOFTNESS = 0.004
-"""Softness of the surfaces of a scene that is rendered as a field, in world units: half a voxel or less."""
+_TRULY_MOVED = (*_MODELLED, "benchmarking/cases.py")
+_HIDDEN = (*_TRULY_MOVED, "benchmarking/visibility.py")
 
 BAKED = 64
 """Voxels along the longest axis that are baked of a NeRF; its pictures are its own."""
@@ -60,10 +60,10 @@ BAKED = 64
 class Settings:
     """What is photographed, how the fields are trained, and how the exact maps are rendered.
 
-    Photos are size x size pixels. The truth of continuous edits is rendered at exact_size x exact_size for
-    the first `exact_views` test cameras, with `exact_samples` samples a ray; that of the methods that are
-    compared at compared_size x compared_size for the first `compared_views`. Discrete edits are measured on
-    the first `discrete_views` test photos, None for all.
+    Photos are size x size pixels. The truth of continuous edits is photographed at exact_size x exact_size
+    for the first `exact_views` test cameras; that of the methods that are compared at compared_size x
+    compared_size for the first `compared_views`. Discrete edits are measured on the first `discrete_views`
+    test photos, None for all.
 
     Raises:
         CagefieldError: sizes and numbers that are too small.
@@ -73,9 +73,8 @@ class Settings:
     size: int = 400
     test_views: int = 20
     config: VoxelConfig | NerfConfig | SplatConfig = field(default_factory=lambda: VoxelConfig(minutes=5.0))
-    exact_size: int = 128
+    exact_size: int = 200
     exact_views: int = 6
-    exact_samples: int = 768
     compared_size: int = 64
     compared_views: int = 3
     discrete_views: int | None = None
@@ -87,7 +86,6 @@ class Settings:
             ("test_views", 1),
             ("exact_size", 16),
             ("exact_views", 1),
-            ("exact_samples", 1),
             ("compared_size", 16),
             ("compared_views", 1),
             ("discrete_views", 1),
@@ -115,17 +113,33 @@ class Workbench:
 
     def photos(self, name: str) -> Dataset:
         """The data set of a built-in scene."""
-        settings = self.settings
-        shape = [settings.views, settings.size, settings.test_views]
-        path = self.folder / name / f"photos-{digest(shape, _MODELLED)}"
+        return self._photographed(
+            name, procedural_scene(name), f"{name}: photos", digest(self._shape, _MODELLED)
+        )
+
+    def taught(self, case: Case) -> Scene:
+        """A scene trained on photos of the truth of a discrete case: what its edit could know at best."""
+        what, key = f"{case.scene}, {case.name}", digest([*self._shape, case.name], _TRULY_MOVED)
+        dataset = self._photographed(case.scene, self._moved(case), f"{what}: photos", key)
+        return self._trained(what, dataset)
+
+    @property
+    def _shape(self) -> list[int]:
+        return [self.settings.views, self.settings.size, self.settings.test_views]
+
+    def _photographed(self, name: str, scene: ProceduralScene, what: str, key: str) -> Dataset:
+        """The data set of photos of a scene, in the folder of a built-in one."""
+        views, size, test_views = self._shape
+        path = self.folder / name / f"photos-{key}"
         if not path.is_dir():
-            with self.bar(f"{name}: photos") as move:
+            with self.bar(what) as move:
                 make_scene(
                     name,
                     path,
-                    views=settings.views,
-                    size=settings.size,
-                    test_views=settings.test_views,
+                    views=views,
+                    size=size,
+                    test_views=test_views,
+                    scene=scene,
                     progress=lambda i, n: move(i, n, f"{i}/{n}"),
                 )
         return load_dataset(path, downscale=1)
@@ -160,37 +174,44 @@ class Workbench:
         scene.save(path, overwrite=True)
         return scene
 
-    def moved(self, case: Case, cameras: Sequence[Camera], *, carried: bool = False) -> UInt8:
+    def moved(self, case: Case, cameras: Sequence[Camera], *, old_shadows: bool = False) -> UInt8:
         """Photos [V,H,W,3] of the scene whose part was really moved, over white.
 
-        With `carried` the parts keep the colours they had before they were moved.
+        With `old_shadows` ambient occlusion stays as modelled: on what the part left, and on the part.
         """
+        scene = self._moved(case, old_shadows)
+        key = digest([case.scene, case.name, old_shadows, _poses(cameras)], _TRULY_MOVED)
+        what = f"{case.scene}, {case.name}: photos of the truth"
+        return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
+
+    @staticmethod
+    def _moved(case: Case, old_shadows: bool = False) -> ProceduralScene:
         if case.moved is None:
             raise CagefieldError(
                 f"no part of {case.scene} is moved by {case.name}; its truth is the exact map"
             )
         scene = case.moved(procedural_scene(case.scene))
-        if carried:
-            scene = scene.carrying_light()
-        key = digest([case.scene, case.name, carried, _poses(cameras)], (*_MODELLED, "benchmarking/cases.py"))
-        what = f"{case.scene}, {case.name}: photos of the truth"
-        return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
+        return scene if old_shadows else scene.with_its_own_occlusion()
 
     def unseen_pixels(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
         """Pixels [V,H,W] in `where`, of `moved`, that show what none of the photos of the scene showed."""
-        if case.moved is None:
-            raise CagefieldError(f"no part of {case.scene} is moved by {case.name}")
-        scene = procedural_scene(case.scene)
-        moved, photos = case.moved(scene), self.scene(case.scene).cameras["train"]
-        key = digest(
-            ["unseen", case.scene, case.name, _poses(cameras), _poses(photos)],
-            (*_MODELLED, "benchmarking/cases.py", "benchmarking/visibility.py"),
-        )
+        moved, scene = self._moved(case, old_shadows=True), procedural_scene(case.scene)
+        photos = self.scene(case.scene).cameras["train"]
+        shown = hashlib.sha256(np.packbits(where).tobytes()).hexdigest()
+        key = digest(["unseen", case.scene, case.name, shown, _poses(cameras), _poses(photos)], _HIDDEN)
         masks = (
             unseen_pixels(moved, camera, scene, photos, mask).astype(np.uint8)
             for camera, mask in zip(cameras, where, strict=True)
         )
         what = f"{case.scene}, {case.name}: what no photo showed"
+        return self._kept(case.scene, key, what, lambda: masks, len(cameras)).astype(bool)
+
+    def uncovered_pixels(self, case: Case, cameras: Sequence[Camera]) -> Mask:
+        """Pixels [V,H,W] of `moved` that show a surface which the part hid before."""
+        moved, scene = self._moved(case, old_shadows=True), procedural_scene(case.scene)
+        key = digest(["uncovered", case.scene, case.name, _poses(cameras)], _HIDDEN)
+        masks = (uncovered_pixels(moved, camera, scene).astype(np.uint8) for camera in cameras)
+        what = f"{case.scene}, {case.name}: what was uncovered"
         return self._kept(case.scene, key, what, lambda: masks, len(cameras)).astype(bool)
 
     def modelled(self, name: str, cameras: Sequence[Camera]) -> UInt8:
@@ -202,22 +223,17 @@ class Workbench:
         )
 
     def mapped(self, name: str, edits: EditStack | None, cameras: Sequence[Camera]) -> UInt8:
-        """Pictures [V,H,W,3] of a built-in scene seen through the exact map of edits, over white."""
-        field_ = procedural_scene(name).field(SOFTNESS)
-        stack = None if edits is None else EditStack(edit.replace(lattice=None) for edit in edits)
-        text = "" if stack is None else dump_edits(stack)
-        points = None if stack is None else exact(stack)
-        samples = self.settings.exact_samples
-        key = digest([name, text, samples, SOFTNESS, _poses(cameras)], (*_MODELLED, *_MAPPED))
-
-        def pictures() -> Iterator[UInt8]:
-            for camera in cameras:
-                yield render_sampled(field_, camera, samples=samples, edits=points).rgb8()
-
-        return self._kept(name, key, f"{name}: exact maps", pictures, len(cameras))
+        """Photos [V,H,W,3] of a built-in scene seen through the exact map of edits, over white."""
+        if edits is None:
+            return self.modelled(name, cameras)
+        stack = EditStack(edit.replace(lattice=None) for edit in edits)
+        key = digest([name, dump_edits(stack), _poses(cameras)], (*_MODELLED, *_MAPPED))
+        scene = MappedScene(procedural_scene(name), exact(stack))
+        what = f"{name}: exact maps"
+        return self._kept(name, key, what, lambda: self._photographs(scene, cameras), len(cameras))
 
     @staticmethod
-    def _photographs(scene: ProceduralScene, cameras: Sequence[Camera]) -> Iterator[UInt8]:
+    def _photographs(scene: ProceduralScene | MappedScene, cameras: Sequence[Camera]) -> Iterator[UInt8]:
         return (scene.photograph(camera, background="white").rgb8() for camera in cameras)
 
     def _kept(self, name: str, key: str, what: str, make: Callable[[], Iterator[UInt8]], count: int) -> UInt8:

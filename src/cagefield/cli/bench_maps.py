@@ -72,8 +72,6 @@ class BenchAblation:
     """Width and height of the pictures that figures are taken from, whose truth is slow to render."""
     compared_views: int = 3
     """Number of them."""
-    exact_samples: int = 768
-    """Samples a ray in the truth."""
     picture_size: int = 320
     """Width and height of each panel of the picture in pixels."""
     device: Device = "auto"
@@ -110,7 +108,6 @@ class BenchAblation:
             self.size,
             self.test_views,
             self.training.config(),
-            exact_samples=self.exact_samples,
             compared_size=self.compared_size,
             compared_views=self.compared_views,
         )

@@ -28,9 +28,20 @@ class Occlusion:
 
     taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
 
-    def __init__(self, parts: tuple[Part, ...], around: Around | None = None, spacing: float = 0.025) -> None:
-        """`around`: a closed surface that the parts stand in, as a room's walls; `spacing`: the lattice's."""
-        self._parts, self._around, self.spacing = parts, around, spacing
+    def __init__(
+        self,
+        parts: tuple[Part, ...],
+        around: Around | None = None,
+        spacing: float = 0.025,
+        *,
+        beside: Occlusion | None = None,
+    ) -> None:
+        """`around`: a closed surface that the parts stand in, as a room's walls; `spacing`: the lattice's.
+
+        `beside`: another of the same spacing, whose lattice this one's continues: where both know the same
+        surfaces they are equal.
+        """
+        self._parts, self._around, self.spacing, self._beside = parts, around, spacing, beside
 
     @cached_property
     def _lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -38,6 +49,9 @@ class Occlusion:
         reach = self.reach
         lows = np.min([part.bounds[0] for part in self._parts], 0) - reach
         highs = np.max([part.bounds[1] for part in self._parts], 0) + reach
+        if self._beside is not None:
+            node = self._beside._lattice[0].astype(np.float64)
+            lows = node + np.floor((lows - node) / self.spacing + 1e-3) * self.spacing
         axes = [np.arange(lo, hi + self.spacing, self.spacing) for lo, hi in zip(lows, highs, strict=True)]
         lattice = np.full([len(axis) for axis in axes], reach, np.float32)
         for part in self._parts:

@@ -6,7 +6,7 @@ A part is a list of primitives; a primitive is a shape with a texture, placed on
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -84,6 +84,11 @@ class Part:
             lows.append((poses[:, :3, 3] - reach).min(0))
             highs.append((poses[:, :3, 3] + reach).max(0))
         return np.stack([np.min(lows, 0), np.max(highs, 0)])
+
+    def settled(self) -> Part:
+        """The part as if modelled where it is now: its motion is in its primitives' poses."""
+        primitives = tuple(replace(item, poses=self.motion @ item.poses) for item in self.primitives)
+        return replace(self, primitives=primitives, motion=np.eye(4))
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.occlusion import Occlusion
-from cagefield.datasets.procedural.parts import Part, Placed, affine, apply
+from cagefield.datasets.procedural.parts import Part, Placed, affine
 from cagefield.datasets.procedural.room_light import Room, RoomLight
 from cagefield.datasets.procedural.shading import Light, shade
+from cagefield.datasets.procedural.supersampling import photograph
 from cagefield.datasets.procedural.surfaces import SHELL, SurfaceField, surface
-from cagefield.datasets.procedural.tracing import Hits, trace
+from cagefield.datasets.procedural.tracing import Hits, along, trace
 from cagefield.errors import SceneError
 from cagefield.rendering.render_result import Background, RenderResult
-from cagefield.typing import Array
+from cagefield.typing import Array, Float32
 
 
 @dataclass(frozen=True)
@@ -119,65 +120,51 @@ class ProceduralScene:
 
     def carrying_light(self) -> ProceduralScene:
         """This scene with `relit` False: moved parts keep the colours they had as modelled."""
-        return replace(self, relit=False)
+        return self._lit_alike(replace(self, relit=False))
+
+    def with_its_own_occlusion(self) -> ProceduralScene:
+        """This scene as if modelled with its parts where they are now: ambient occlusion is theirs there.
+
+        So are the shadows in a room. What no part came near or left looks as it did.
+        """
+        parts = tuple(part.settled() for part in self.parts)
+        scene = replace(self, parts=parts, modelled=parts)
+        scene.__dict__["occlusion"] = scene._occlusion(beside=self.occlusion)
+        return scene
 
     def photograph(
         self, camera: Camera, *, supersample: int = 2, background: Background = "none"
     ) -> RenderResult:
-        """Frame of the surfaces, each pixel the mean of supersample^2 rays.
-
-        opacity is the share of rays that meet a surface, depth and normals the means over those.
-        Raises SceneError for supersample < 1.
-        """
-        if supersample < 1:
-            raise SceneError(f"supersample must be at least 1, not {supersample}")
-        height, width = camera.height, camera.width
-        fine = camera if supersample == 1 else camera.resized(width * supersample, height * supersample)
-        directions = apply(camera.c2w[:3, :3], fine.local_directions().T)
-        rgb, normals, hits = self.shoot(camera.origin, directions)
-        seen = np.isfinite(hits.t)
-
-        def mean(values: NDArray[np.float32]) -> NDArray[np.float32]:
-            blocks = values.reshape(height, supersample, width, supersample, -1)
-            averaged: NDArray[np.float32] = blocks.mean((1, 3), dtype=np.float32)
-            return averaged
-
-        opacity = mean(seen.astype(np.float32))[..., 0]
-        depth = mean(np.where(seen, hits.t, np.float32(0)))[..., 0]
-        depth[opacity > 0] /= opacity[opacity > 0]
-        depth[opacity == 0] = np.inf
-        normal = mean(normals)
-        normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-        return RenderResult.from_premultiplied(
-            mean(rgb), opacity, depth, normals=normal, background=background
-        )
+        """Frame of the surfaces, as `supersampling.photograph` makes it."""
+        return photograph(self.shoot, camera, supersample=supersample, background=background)
 
     def shoot(
         self, origin: Array, directions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], Hits]:
         """(rgb [N,3], normals [N,3], hits) of rays from one origin [3] with unit directions [3,N]."""
         hits = trace(self.placed, origin, directions)
-        rgb, normals = self._colours(self.placed, hits, origin, directions)
+        rgb, normals = self.colours(hits, along(origin, directions, hits.t), directions)
         for index, item in enumerate(self.placed):
             if item.primitive.mirror:
                 self._reflect(index, hits, origin, directions, rgb, normals)
         return rgb, normals, hits
 
-    def _colours(
-        self, placed: Sequence[Placed], hits: Hits, origin: Array, directions: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """(rgb [N,3], normals [N,3]) of the surfaces that rays [3,N] hit, 0 where they hit none."""
-        rgb, normals = np.zeros((2, directions.shape[1], 3), np.float32)
-        start = origin.astype(np.float32)[:, None]
-        for index, item in enumerate(placed):
+    def colours(
+        self, hits: Hits, points: Float32, viewdirs: Float32, placed: Sequence[Placed] | None = None
+    ) -> tuple[Float32, Float32]:
+        """(rgb [N,3], normals [N,3]) of hits at points [3,N] seen in directions [3,N], 0 where none was hit.
+
+        The hits are of `placed`, all primitives where it is left out. Nothing is reflected.
+        """
+        rgb, normals = np.zeros((2, len(hits.t), 3), np.float32)
+        for index, item in enumerate(self.placed if placed is None else placed):
             rows = np.flatnonzero(hits.primitive == index)
             if len(rows):
-                toward = directions[:, rows]
                 rgb[rows], normals[rows] = surface(
                     item,
-                    start + hits.t[rows] * toward,
+                    points[:, rows],
                     hits.instance[rows],
-                    toward,
+                    viewdirs[:, rows],
                     openness=self.occlusion,
                     relit=self.relit,
                     light=self.light,
@@ -212,7 +199,7 @@ class ProceduralScene:
         mirrored = directions[:, rows] - 2 * cosine * up.astype(np.float32)[:, None]
         others = self.placed[:index] + self.placed[index + 1 :]
         found = trace(others, image, mirrored, hits.t[rows])
-        reflected, _ = self._colours(others, found, image, mirrored)
+        reflected, _ = self.colours(found, along(image, mirrored, found.t), mirrored, others)
         base = np.float32(item.primitive.mirror)
         share = (base + (1 - base) * (1 - np.abs(cosine)) ** 5)[:, None]
         rgb[rows] = rgb[rows] * (1 - share) + share * reflected
@@ -246,8 +233,10 @@ class ProceduralScene:
         return affine(translate, rotate, factors, center)
 
     def _with(self, parts: Iterable[Part]) -> ProceduralScene:
-        scene = replace(self, parts=tuple(parts))
-        # what light the modelled parts get is shared by all scenes made from them
+        return self._lit_alike(replace(self, parts=tuple(parts)))
+
+    def _lit_alike(self, scene: ProceduralScene) -> ProceduralScene:
+        """A scene of the same modelled parts, with which it shares what light those get."""
         scene.__dict__["occlusion"], scene.__dict__["light"] = self.occlusion, self.light
         return scene
 
@@ -259,9 +248,13 @@ class ProceduralScene:
     @cached_property
     def occlusion(self) -> Occlusion:
         """Baked occlusion of the scene as modelled (computed on first use)."""
+        return self._occlusion()
+
+    def _occlusion(self, beside: Occlusion | None = None) -> Occlusion:
         if self.room is None:
-            return Occlusion(self.modelled)
-        return Occlusion(self.room.furniture(self.modelled), self.room, self.room.detail)
+            return Occlusion(self.modelled, beside=beside)
+        parts = self.room.furniture(self.modelled)
+        return Occlusion(parts, self.room, self.room.detail, beside=beside)
 
     @cached_property
     def light(self) -> Light:

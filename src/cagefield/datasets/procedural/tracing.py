@@ -32,6 +32,13 @@ class Hits:
     instance: Int
 
 
+def along(origin: NDArray[np.float64], directions: Float32, t: Float32) -> Float32:
+    """Points [3,N] at distances t [N] along rays from one origin [3], the origin where t is inf."""
+    reached: Float32 = np.where(np.isfinite(t), t, np.float32(0)) * directions
+    reached += np.asarray(origin, np.float32)[:, None]
+    return reached
+
+
 def trace(
     placed: Sequence[Placed],
     origin: NDArray[np.float64],
