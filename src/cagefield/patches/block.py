@@ -108,16 +108,14 @@ class Block:
         return np.asarray(0.5 + C0 * self.sh[self.slot[where], 0], np.float64)
 
     def layer(self) -> VoxelField:
-        """The block as a layer of the field: the vertices with colours."""
+        """The block as a layer of the field: the vertices with colours, and its two corners."""
         kept = self.slot >= 0
-        return VoxelField(
-            self.field.bounds,
-            self.field.resolution,
-            self.vertices[kept],
-            self.density[kept],
-            self.sh[self.slot[kept]],
-            self.field.contracted,
-        )
+        kept[0, 0, 0] = kept[-1, -1, -1] = True
+        slot = self.slot[kept]
+        sh = np.where((slot >= 0)[:, None, None], self.sh[slot], np.float32(0.0))
+        density = np.where(slot >= 0, self.density[kept], np.float32(0.0))
+        field = self.field
+        return VoxelField(field.bounds, field.resolution, self.vertices[kept], density, sh, field.contracted)
 
 
 AnyField = NDArray[np.floating] | NDArray[np.bool_]

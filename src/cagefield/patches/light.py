@@ -5,9 +5,9 @@ The openness of a surface point p with normal n is
     o(p) = 1 - sum_r w_r max(0, 1 - D(p + r n) / r),
 
 D the distance to the nearest solid, for a few reaches r: how much nearer other surfaces are than open space.
-The weights w are fitted to the field: where surfaces go on smoothly, most differences of log colour between
-neighbours are texture, of either sign, and the rest follows log o. A field without contact shadows gets
-weights near 0, and then nothing is changed.
+The weights w are fitted to the field, as it is seen: between neighbours on a surface, log colour differs by
+texture, of either sign, and by log o. A field without contact shadows gets weights near 0, and then
+nothing is changed. Weights that add up to less than 1 leave what light reaches the deepest corner.
 
 Source: Evans, "Fast approximations for global illumination on dynamic scenes" (2006), for the openness.
 """
@@ -15,20 +15,30 @@ Source: Evans, "Fast approximations for global illumination on dynamic scenes" (
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
-from cagefield.patches.block import Block, world_of
+from cagefield.patches.block import Block
+from cagefield.patches.seen import SeenPairs
 from cagefield.typing import Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-LEAST = 0.08
+DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
+
+SHOWING = 0.1
+"""Sum of the weights from which on contact shadows are there."""
+
+ENOUGH = 150
+"""Pairs from which weights are fitted, at least."""
+
+SMOOTH = 2.0
+"""Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +51,24 @@ class Ambience:
     @property
     def shows(self) -> bool:
         """False where colours do not follow the openness."""
-        return sum(self.weights) > 0.05
+        return sum(self.weights) > SHOWING
 
-    def openness(self, nearness: Array) -> Array:
-        """o [N], at least LEAST, of nearnesses [N,R]."""
-        return np.asarray(np.maximum(1.0 - nearness @ np.array(self.weights), LEAST))
+    @property
+    def reach(self) -> float:
+        """The largest distance, in world units, at which it makes a difference; 0 where it shows nowhere."""
+        return max((r for r, w in zip(self.reaches, self.weights, strict=True) if w > 0.01), default=0.0)
+
+    def log_openness(self, nearness: Array) -> Array:
+        """log o [N], o at least DARKEST, of nearnesses [N,R]."""
+        return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
 
 
-def distances(solid: Mask, voxel: Array) -> NDArray[np.float32]:
+def distances(solid: Mask, block: Block) -> NDArray[np.float32]:
     """Distance [X,Y,Z] in world units of the vertices of a block to its nearest solid one."""
     if not solid.any():
-        return np.full(solid.shape, np.inf, np.float32)
-    return np.asarray(ndimage.distance_transform_edt(~solid, sampling=tuple(voxel)), np.float32)
+        return np.full(solid.shape, 1e9, np.float32)
+    spacing = tuple(float(edge) for edge in block.field.voxel_size)
+    return np.asarray(ndimage.distance_transform_edt(~solid, sampling=spacing), np.float32)
 
 
 def nearness(
@@ -61,56 +77,61 @@ def nearness(
     """max(0, 1 - D(p + r n) / r) [N,R] at points [N,3] with normals [N,3], for each reach r."""
     columns = []
     for reach in reaches:
-        found = block.lookup(np.minimum(distance, reach), points + reach * normals, outside=reach)
+        found = block.lookup(distance, points + reach * normals, outside=1e9)
         columns.append(np.clip(1.0 - found / reach, 0.0, 1.0))
     return np.stack(columns, axis=1)
 
 
-def ambience_of(block: Block, reaches: Sequence[float], *, most: int = 40_000, seed: int = 0) -> Ambience:
-    """The weights that explain the colours of a block's surfaces; see the module."""
-    chance = np.random.default_rng(seed)
-    surface = surfaces(block)
-    at = np.argwhere(surface)
-    nothing = Ambience(tuple(reaches), (0.0,) * len(reaches))
-    if len(at) < 200:
+def ambience_of(block: Block, pairs: SeenPairs) -> Ambience:
+    """The weights that explain the colours of a field's surfaces; `block` holds all of the field."""
+    at = np.argwhere(block.solid)
+    nothing = Ambience((), ())
+    if len(at) < ENOUGH or len(pairs.points) < ENOUGH:
         return nothing
-    at = at[chance.choice(len(at), min(most, len(at)), replace=False)]
-    normal = block.normals[tuple(at.T)]
-    # A neighbour a few voxels away in the surface's plane.
-    aside = np.cross(normal, chance.normal(size=normal.shape))
-    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-6)
-    other = np.round(at + chance.uniform(2.0, 6.0, (len(at), 1)) * aside).astype(np.int64)
-    kept = ((other >= 0) & (other < block.shape)).all(axis=1)
-    at, other = at[kept], other[kept]
-    kept = surface[tuple(other.T)]
-    at, other = at[kept], other[kept]
-    same = (block.normals[tuple(at.T)] * block.normals[tuple(other.T)]).sum(axis=1) > 0.95
-    at, other = at[same], other[same]
-    if len(at) < 200:
-        return nothing
-    logs, near = [], []
-    distance = distances(block.solid, block.field.voxel_size)
-    for each in (at, other):
-        place = tuple(each.T)
-        rgb = 0.5 + 0.28209479 * block.sh[block.slot[place], 0]
-        logs.append(np.log(np.clip(rgb, 0.02, 1.0).mean(axis=1)))
-        points = world_of(block.field, each + block.low)
-        near.append(nearness(block, distance, points, block.normals[place], reaches))
-    change = logs[1] - logs[0]
+    span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * block.field.voxel_size
+    reaches = tuple(share * float(np.linalg.norm(span)) for share in REACHES)
+    distance = distances(block.solid, block)
+    first = nearness(block, distance, pairs.points, pairs.normals, reaches)
+    second = nearness(block, distance, pairs.other_points, pairs.other_normals, reaches)
+    change = pairs.log_change
 
     def residuals(weights: Array) -> Array:
-        first, second = (np.log(np.maximum(1.0 - n @ weights, LEAST)) for n in near)
-        return np.asarray(second - first - change)
+        ambience = Ambience(reaches, tuple(weights))
+        return ambience.log_openness(second) - ambience.log_openness(first) - change
 
-    fit = optimize.least_squares(
-        residuals, np.full(len(reaches), 0.1), bounds=(0.0, 1.0), loss="soft_l1", f_scale=0.03
-    )
-    weights = fit.x * min(1.0, 1.0 / max(float(fit.x.sum()), 1e-9))
-    return Ambience(tuple(reaches), tuple(float(w) for w in weights))
+    fit = optimize.least_squares(residuals, np.full(len(reaches), 0.1), bounds=(0.0, 1.0))
+    share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
+    return Ambience(reaches, tuple(float(w) * share for w in fit.x))
 
 
-def surfaces(block: Block) -> Mask:
-    """Vertices [X,Y,Z] with colour near a surface: solid ones beside others, and their neighbours."""
-    solid = block.solid
-    near = ndimage.binary_dilation(~solid) & solid
-    return np.asarray(near & (block.slot >= 0) & (np.abs(block.normals).sum(axis=-1) > 0.5))
+@dataclass(frozen=True, eq=False)
+class Lighting:
+    """The light on some vertices (`where` [X,Y,Z]) of a block: the log of what it is multiplied by, [N]."""
+
+    where: Mask
+    log_ratio: Array
+
+    def smoothed(self, block: Block) -> Lighting:
+        """The same, smoothed along surfaces."""
+        weight = np.zeros(block.shape)
+        weight[self.where] = np.minimum(block.depth[self.where], 1.0)
+        values = np.zeros(block.shape)
+        values[self.where] = self.log_ratio * weight[self.where]
+        total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
+        smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
+        return replace(self, log_ratio=smooth)
+
+    def stronger(self, factor: float) -> Lighting:
+        """The same to the power of a factor."""
+        return replace(self, log_ratio=factor * self.log_ratio)
+
+    def dense(self, block: Block) -> Array:
+        """The log of the ratio [X,Y,Z], 0 elsewhere."""
+        out = np.zeros(block.shape)
+        out[self.where] = self.log_ratio
+        return out
+
+
+def lit_vertices(block: Block) -> Mask:
+    """Vertices [X,Y,Z] whose colour shows and whose normal is known."""
+    return np.asarray((block.slot >= 0) & (block.depth > 0.01) & ((block.normals**2).sum(axis=-1) > 0.25))

@@ -57,31 +57,39 @@ class Support:
 
 
 def support_of(block: Block, part: Mask, ring: Mask, *, seed: int = 0) -> Support | None:
-    """The plane that most surface vertices of the ring [X,Y,Z] lie on, with the part [X,Y,Z] resting on it."""
+    """The plane through surface vertices of the ring [X,Y,Z] that the part [X,Y,Z] stands on, or just over.
+
+    Each vertex counts by how near the part comes to it from above.
+    """
     at = np.argwhere(ring).astype(np.float64)
     content = np.argwhere(part)
     if len(at) < LEAST or not len(content):
         return None
     normals = block.normals[ring]
+    size = float(np.median(np.ptp(content, axis=0))) + 1.0
+    reach = max(4.0, 0.25 * size)
+    from_part = ndimage.distance_transform_edt(~part)
+    near = ndimage.map_coordinates(from_part, (at + reach * normals).T, order=1, mode="nearest")
+    shade = np.clip(1.0 - near / (2.0 * reach), 0.02, 1.0)
     chance = np.random.default_rng(seed)
-    some = chance.choice(len(at), min(len(at), 4000), replace=False)
+    some = chance.choice(len(at), min(len(at), 6000), replace=False)
     probes = content[chance.choice(len(content), min(len(content), 2000), replace=False)]
-    best, most = None, 0
-    for row in chance.choice(len(at), min(TRIALS, len(at)), replace=False):
+    best, most = None, 0.0
+    for row in chance.choice(len(at), min(TRIALS, len(at)), replace=False, p=shade / shade.sum()):
         n = normals[row].astype(np.float64)
         height = (at[some] - at[row]) @ n
         found = (np.abs(height) < NEAR) & (normals[some] @ n > ALONG)
-        if found.sum() <= most:
+        score = float(shade[some][found].sum())
+        if score <= most:
             continue
         above = (probes - at[row]) @ n
-        # It stands on it: little of the part lies below, and some of it close above.
-        if (above < -NEAR - 1.0).mean() < 0.05 and np.percentile(above, 3) < 4.0:
-            best, most = row, int(found.sum())
-    if best is None or most * len(at) / len(some) < LEAST:
+        if (above < -NEAR - 1.0).mean() < 0.05 and np.percentile(above, 3) < max(4.0, 0.3 * size):
+            best, most = row, score
+    if best is None:
         return None
-    n = normals[best].astype(np.float64)
+    n, centre = normals[best].astype(np.float64), at[best]
     for _ in range(3):
-        member = np.flatnonzero((np.abs((at - at[best]) @ n) < NEAR) & (normals @ n > ALONG))
+        member = np.flatnonzero((np.abs((at - centre) @ n) < NEAR) & (normals @ n > ALONG))
         if len(member) < LEAST:
             return None
         centre = at[member].mean(axis=0)
@@ -147,7 +155,9 @@ def footprint_of(block: Block, support: Support, part: Mask, shaded: Mask) -> Fo
         return None
     knots = chance.choice(knots, min(KNOTS, len(knots)), replace=False)
     surface = own + _crossing(block, support)[:, None][:, 0]
-    spline = RBFInterpolator(uv[knots], surface[knots], neighbors=64, smoothing=4.0, kernel="thin_plate_spline")
+    spline = RBFInterpolator(
+        uv[knots], surface[knots], neighbors=64, smoothing=4.0, kernel="thin_plate_spline"
+    )
     cells = np.argwhere(hole | around)
     height = np.zeros(size)
     height[tuple(cells.T)] = spline((cells + first).astype(np.float64))
@@ -195,7 +205,14 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
     deep[tuple(voxels[new & (height < -1.5)].T)] = True
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where])
-    return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], (u[around], v[around], height[around]))
+    return _coloured(
+        block,
+        footprint,
+        voxels[new],
+        (u[new], v[new]),
+        voxels[around],
+        (u[around], v[around], height[around]),
+    )
 
 
 def _profile(block: Block, at: NDArray[np.int64], height: Array) -> Array:

@@ -1,0 +1,135 @@
+"""The patch of one discrete edit: what it took away is filled, and light goes along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit
+from cagefield.edits.patch import Patch
+from cagefield.edits.stack import EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import SOLID, Block, block_of
+from cagefield.patches.light import Ambience, Lighting, distances, lit_vertices, nearness
+from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
+from cagefield.typing import Mask
+from cagefield.warps.inner_map import HexahedronMap
+
+RIM = 6.0
+"""A support is looked for within this distance of V^c, voxels, or within half of its size."""
+
+CLOSE = 3.0
+"""Surfaces are hidden by what comes this near to them, voxels."""
+
+UNSURE = 0.2
+"""Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
+
+
+def patch_of(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None) -> Patch:
+    """The patch of a discrete edit of a field under the edits below it; `ambience` None leaves the light.
+
+    A copy is not filled, as nothing is uncovered.
+    """
+    work = _Work.of(field, below, edit, ambience)
+    under, part = work.emptied, None
+    lighting = None
+    support = None if edit.keep_source else work.support(under)
+    if ambience is not None and ambience.shows:
+        lighting = work.light(ambience)
+        under = under.relit(lighting.where, np.exp(lighting.log_ratio))
+        part = None if edit.deleted else work.relit_part(ambience)
+    if support is not None:
+        hidden = work.rim(under) & (ndimage.distance_transform_edt(~work.part) < CLOSE)
+        if lighting is not None:
+            hidden |= lighting.dense(under) > UNSURE
+        footprint = footprint_of(under, support, work.part, hidden)
+        if footprint is not None:
+            under = rebuilt(under, footprint, work.inside)
+    return Patch(work.region, under.layer(), None if part is None else part.layer())
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it."""
+
+    edit: Edit
+    region: Cage
+    before: Block
+    emptied: Block
+    inside: Mask
+    part: Mask
+
+    @classmethod
+    def of(cls, field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None) -> _Work:
+        voxel = float(field.voxel_size.max())
+        box = edit.inner.aabb
+        margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
+        if ambience is not None and ambience.shows:
+            margin = max(margin, 1.5 * ambience.reach + RIM * voxel)
+            if not edit.deleted:
+                moved = edit.deformed.aabb
+                box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
+        box = box + margin * np.array([[-1.0], [1.0]])
+        before = block_of(field, below, box)
+        inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
+        emptied = before
+        if not edit.keep_source:
+            emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
+        region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
+        return cls(edit, region, before, emptied, inside, before.solid & inside)
+
+    def rim(self, block: Block) -> Mask:
+        """Surface vertices around V^c."""
+        spacing = tuple(float(edge) for edge in block.field.voxel_size)
+        away = ndimage.distance_transform_edt(~self.inside, sampling=spacing)
+        size = np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0])
+        near = away < max(RIM * max(spacing), 0.5 * float(size))
+        solid = block.solid
+        return np.asarray(solid & ndimage.binary_dilation(~solid) & near & ~self.inside & lit_vertices(block))
+
+    def support(self, block: Block) -> Support | None:
+        """What the part stood on."""
+        return support_of(block, self.part, self.rim(block))
+
+    def solid_after(self) -> Mask:
+        """What is solid [X,Y,Z] once the part is where it is moved to."""
+        solid = self.emptied.solid.copy()
+        if self.edit.deleted:
+            return solid
+        phi = HexahedronMap(self.edit.inner, self.edit.deformed)
+        inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))
+        solid.reshape(-1)[inside] = self.before.lookup(self.before.depth, canonical) > SOLID
+        return solid
+
+    def light(self, ambience: Ambience) -> Lighting:
+        """What the light on everything but the part is multiplied by."""
+        block = self.emptied
+        where = lit_vertices(block)
+        points, normals = block.positions(where), block.normals[where]
+        logs = [
+            ambience.log_openness(nearness(block, distances(solid, block), points, normals, ambience.reaches))
+            for solid in (self.before.solid, self.solid_after())
+        ]
+        return Lighting(where, logs[1] - logs[0]).smoothed(block)
+
+    def relit_part(self, ambience: Ambience) -> Block:
+        """The content of V^c in the light of its new place; no more than that has colours."""
+        block = self.before
+        where = lit_vertices(block) & self.inside
+        points, normals = block.positions(where), block.normals[where]
+        inside, moved, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(points)
+        turned = np.einsum("nji,nj->ni", np.linalg.inv(jacobian), normals[inside])
+        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
+        log = np.zeros(len(points))
+        new = nearness(block, distances(self.solid_after(), block), moved, turned, ambience.reaches)
+        old = nearness(
+            block, distances(block.solid, block), points[inside], normals[inside], ambience.reaches
+        )
+        log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
+        lighting = Lighting(where, log).smoothed(block)
+        block = block.relit(where, np.exp(lighting.log_ratio))
+        kept = ndimage.binary_dilation(self.inside, iterations=2)
+        return replace(block, slot=np.where(kept, block.slot, -1))
