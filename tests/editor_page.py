@@ -240,5 +240,6 @@ def editor_page(
 
 _SUMMARY = (
     "JSON.stringify([cagefield.now.connection, cagefield.now.notice, cagefield.now.state?.revision,"
-    " cagefield.picture, cagefield.camera.seq, cagefield.drag, cagefield.quiet])"
+    " cagefield.picture, cagefield.camera.seq, cagefield.drag, cagefield.quiet, cagefield.page,"
+    " cagefield.now.state?.pictured, document.querySelector('.status')?.textContent])"
 )

