@@ -10,7 +10,8 @@ import pytest
 from cagefield.benchmarking import workbench
 from cagefield.benchmarking.cases import chosen
 from cagefield.benchmarking.compare import seen
-from cagefield.benchmarking.edits import measure, table
+from cagefield.benchmarking.edits import measure
+from cagefield.benchmarking.edits_table import table
 from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cli import main
 from cagefield.rendering.metrics import psnr
