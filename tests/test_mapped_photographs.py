@@ -41,6 +41,7 @@ class Still:
     """A map that moves nothing, in a box around the scenes."""
 
     bounds: Any = ((-1.2, -1.2, -1.2), (1.2, 1.2, 1.2))
+    boxes: Any = ()
 
     def to_canonical(self, points: NDArray[Any], viewdirs: NDArray[Any] | None = None) -> KernelSamples:
         assert viewdirs is not None
@@ -183,6 +184,20 @@ def test_cuts_and_copies_have_the_surfaces_that_samples_have() -> None:
     # the cut through the box's middle is a face across the ray, .3 behind the box's own
     origin, direction = camera.origin, camera.rays(row[None])[1][0]
     np.testing.assert_allclose(frame.depth[row[1], row[0]], -origin[0] / direction[0], atol=1e-3)
+
+
+def test_a_thin_copy_in_open_space_is_not_stepped_over() -> None:
+    """Before the copy a ray's sample is far from all surfaces, and knows nothing of the jump ahead."""
+    scene = scene_of(Primitive(Box((0.004, 0.25, 0.25)), GREY, place((-0.5, 0, 0))[None]))
+    copy = Edit(Cage.box((-0.5, 0, 0), (0.012, 0.6, 0.6)), adjustment="discrete", keep_source=True)
+    mapping = exact(EditStack([copy.translate((1.0, 0.2, 0))]))
+    camera = view(24, 0.6)
+    frame = MappedScene(scene, mapping).photograph(camera, supersample=1)
+    truth = scene.duplicate("thing", translate=(1.0, 0.2, 0)).photograph(camera, supersample=1)
+    assert (truth.opacity > 0).sum() > 1.5 * (scene.photograph(camera, supersample=1).opacity > 0).sum()
+    assert ((frame.opacity > 0) ^ (truth.opacity > 0)).sum() <= 2
+    both = (frame.opacity > 0) & (truth.opacity > 0)
+    np.testing.assert_allclose(frame.depth[both], truth.depth[both], atol=2e-3)
 
 
 def test_mirrors_are_refused() -> None:
