@@ -200,6 +200,30 @@ def test_a_thin_copy_in_open_space_is_not_stepped_over() -> None:
     np.testing.assert_allclose(frame.depth[both], truth.depth[both], atol=2e-3)
 
 
+@dataclass(frozen=True)
+class Squeezed(Still):
+    """x^c = x + tanh(50 x) / 2: what lies within half a unit of x = 0 is pressed into a twentieth of that."""
+
+    def to_canonical(self, points: NDArray[Any], viewdirs: NDArray[Any] | None = None) -> KernelSamples:
+        assert viewdirs is not None
+        canonical, along = points.copy(), viewdirs.copy()
+        canonical[:, 0] += np.tanh(50 * points[:, 0]) / 2
+        along[:, 0] *= 1 + 25 * (1 - np.tanh(50 * points[:, 0]) ** 2)
+        stretch = np.linalg.norm(along, axis=1)
+        return KernelSamples(canonical, along / stretch[:, None], stretch, np.zeros(len(points), bool))
+
+
+def test_what_a_map_squeezes_is_not_stepped_over() -> None:
+    """Before the squeeze nothing is near and the map is as it should be; a step goes right over it."""
+    scene = scene_of(Primitive(Box((0.02, 0.5, 0.5)), GREY))
+    camera = Camera.look_at((3.0, 0, 0), (0, 0, 0), width=16, height=16, fov_x=0.2)
+    # whole steps of .1 from the face at 1.15 end at .05 and -.05
+    squeezed = Squeezed(((-1.2, -1.2, -1.2), (1.15, 1.2, 1.2)))
+    frame = MappedScene(scene, squeezed).photograph(camera, supersample=1)
+    assert (frame.opacity == 1).all()
+    np.testing.assert_allclose(frame.depth[7:9, 7:9], 3.0, atol=0.02)
+
+
 def test_mirrors_are_refused() -> None:
     mirror = replace(Primitive(Box((0.3, 0.3, 0.3)), GREY), mirror=0.2)
     with pytest.raises(SceneError, match="scene test has a mirror, which cannot be seen through a map"):
