@@ -7,7 +7,7 @@
 WORKDIR is the work folder of `cagefield bench edits`; its fields of that many steps are used, or trained.
 Only edits that change lengths can tell: whole scenes and parts that stand free are scaled, alike on all axes
 and not, and the truth is the scene built so, with the light it was photographed with. The built-in continuous
-edits follow, whose truth is the scene's model through the exact map.
+edits follow, whose truth is the scene photographed through the exact map.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from cagefield import devices
+from cagefield.benchmarking import compare
 from cagefield.benchmarking.cases import CASES, chosen
-from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr
+from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr, supersampled
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
 from cagefield.benchmarking.workbench import Settings, Workbench
@@ -57,7 +58,7 @@ STANDING: tuple[tuple[str, str, str, Factors], ...] = (
 """Scene, case whose cage is used, part, factors: the part is scaled about the middle of its cage's floor."""
 
 
-CONTINUOUS = "Continuous edits: against the scene's model through the exact map, its density as it is."
+CONTINUOUS = "Continuous edits: against photos of the scene through the exact map."
 
 
 PRESERVED = {
@@ -168,7 +169,7 @@ def continuous(bench: Workbench, scenes: Sequence[str]) -> Iterator[tuple[str, .
         before = bench.mapped(case.scene, None, cameras)
         truth = bench.mapped(case.scene, case.edits, cameras)
         name = case.name.replace("_", " ")
-        yield _row(bench, case.scene, name, "continuous", case.edits, cameras, before, truth)
+        yield _row(bench, case.scene, name, "continuous", case.edits, cameras, before, truth, compare.FINER)
 
 
 def _row(
@@ -180,12 +181,13 @@ def _row(
     cameras: tuple[Camera, ...],
     before: AnyArray,
     truth: AnyArray,
+    rays: int = 1,
 ) -> tuple[str, ...]:
     there = changed_pixels(before, truth)
     field, figures, finer = bench.scene(name).field, [], []
     for preserve in (False, True):
         renderer = renderer_of(field, edits, preserve_opacity=preserve)
-        shown = np.stack([_shown(renderer, camera, 1) for camera in cameras])
+        shown = np.stack([_shown(renderer, camera, rays) for camera in cameras])
         figures += [mean_psnr(shown, truth), pooled_psnr(shown, truth, there)]
         if isinstance(field, SplatField):
             finer.append(mean_psnr(np.stack([_shown(renderer, camera, FINER) for camera in cameras]), truth))
@@ -198,10 +200,8 @@ def _row(
 
 def _shown(renderer: Renderer | SplatRenderer, camera: Camera, finer: int) -> AnyArray:
     """A picture over white of 8 bits, drawn with `finer` x `finer` pixels for each."""
-    large = camera.resized(camera.width * finer, camera.height * finer)
-    rgb = renderer.render(large, background="white").rgb
-    rgb = rgb.reshape(camera.height, finer, camera.width, finer, 3).mean(axis=(1, 3))
-    return np.round(np.clip(rgb, 0.0, 1.0) * 255.0).astype(np.uint8)
+    rgb = supersampled(lambda large: renderer.render(large, background="white").rgb, camera, finer)
+    return np.round(rgb * 255.0).astype(np.uint8)
 
 
 if __name__ == "__main__":

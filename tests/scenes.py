@@ -21,7 +21,6 @@ TINY = Settings(
     config=VoxelConfig(steps=60, resolution=24),
     exact_size=24,
     exact_views=2,
-    exact_samples=64,
     compared_size=16,
     compared_views=1,
 )

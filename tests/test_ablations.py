@@ -16,7 +16,6 @@ from cagefield.benchmarking.limits import limits
 from cagefield.benchmarking.strips import difference, strip
 from cagefield.benchmarking.workbench import Settings, Workbench, beside
 from cagefield.cli import main
-from cagefield.datasets.procedural import procedural_scene
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.training.voxel_config import VoxelConfig
@@ -26,7 +25,6 @@ TINY = Settings(
     size=32,
     test_views=3,
     config=VoxelConfig(steps=60, resolution=24),
-    exact_samples=64,
     compared_size=16,
     compared_views=1,
 )
@@ -143,7 +141,7 @@ def test_command(capsys: pytest.CaptureFixture[str], tmp_path: Path, bench: Work
     argv = [
         "bench", "ablation", "discrete-continuous", "-o", str(tmp_path), "--workdir", str(bench.folder),
         "--views", "16", "--size", "32", "--test-views", "3", "--steps", "60", "--resolution", "24",
-        "--compared-size", "16", "--compared-views", "1", "--exact-samples", "64", "--picture-size", "32",
+        "--compared-size", "16", "--compared-views", "1", "--picture-size", "32",
     ]  # fmt: skip
     assert main(argv) == 0
     assert "discrete-continuous.png" in capsys.readouterr().out

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.benchmarking.cases import CASES
-from cagefield.benchmarking.edits import Score, table
+from cagefield.benchmarking.edits_table import Score, table
 from cagefield.benchmarking.figures import Figures
 from cagefield.benchmarking.naive_splats import NAIVE, naive_splats, seen_naively
 from cagefield.benchmarking.workbench import Settings
@@ -64,7 +64,7 @@ def test_pictures_are_those_of_the_scene_where_nothing_is_bent_cut_or_turned() -
 
 def test_the_table_has_a_column_for_each_way() -> None:
     figures = Figures(20.0, 19.9, 0.9, 0.9, 20.0, 19.9, 10.0, 0.1)
-    score = Score(CASES[0], "photos", 1, 16, figures, float("nan"), 1.0, naive=(3.0, 2.0, 1.0))
+    score = Score(CASES[0], "photos", 1, 16, figures, 1.0, naive=(3.0, 2.0, 1.0))
     text = table([score], Settings(config=SplatConfig(steps=70))).markdown()
     assert "| lost, means only | lost, no turned SH | lost, not split |" in text
     assert "| 3.00 | 2.00 | 1.00 |" in text

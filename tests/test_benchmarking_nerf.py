@@ -10,7 +10,8 @@ import pytest
 from cagefield.benchmarking import workbench
 from cagefield.benchmarking.cases import chosen
 from cagefield.benchmarking.compare import seen
-from cagefield.benchmarking.edits import measure, table
+from cagefield.benchmarking.edits import measure
+from cagefield.benchmarking.edits_table import table
 from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cli import main
 from cagefield.rendering.metrics import psnr
@@ -29,7 +30,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_nerf_is_measured_by_its_exact_pictures(tmp_path: Path) -> None:
     config = NerfConfig.small(width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop=3, steps=8)
-    settings = Settings(8, 24, 2, config, exact_size=16, exact_views=1, exact_samples=32, discrete_views=1)
+    settings = Settings(8, 24, 2, config, exact_size=16, exact_views=1, discrete_views=1)
     bench = Workbench(settings, tmp_path)
     (score,) = measure(chosen(["microphone"], ["move_weight"]), bench)
     scene = bench.scene("microphone")

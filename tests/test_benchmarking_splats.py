@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cagefield.benchmarking.edits import table
+from cagefield.benchmarking.edits_table import table
 from cagefield.benchmarking.learning import Budget, splat_config
 from cagefield.benchmarking.workbench import Settings
 from cagefield.cli.bench_edits import BenchEdits

@@ -170,7 +170,7 @@ def test_bench_edits_compares_methods(
     argv = [
         "bench", "edits", "--scenes", "microphone", "--edits", "push_head", "--views", "8", "--size", "32",
         "--test-views", "3", "--steps", "60", "--resolution", "24", "--exact-size", "24", "--exact-views",
-        "1", "--exact-samples", "64", "--compared-size", "16", "--compared-views", "1", "--methods",
+        "1", "--compared-size", "16", "--compared-views", "1", "--methods",
         "flow 64", "trilinear", "--workdir", str(bench.folder), "-o", str(tmp_path / "edits.md"),
     ]  # fmt: skip
     assert main(argv) == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -332,6 +333,45 @@ def test_occlusion_is_open_on_a_ball_and_darker_in_a_corner():
     assert near < between - 0.05 < far - 0.1
     assert far > 0.95
     assert corner.remove("wall").occlusion is corner.occlusion
+
+
+def test_occlusion_anew_is_of_the_parts_where_they_stand():
+    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
+    box = Part("box", (Primitive(Box((0.1, 0.1, 0.1)), PLAIN, place((-0.4, 0.013, 0.11))[None]),))
+    still = ProceduralScene("still", (plate, box))
+    anew = still.move("box", translate=(0.85, 0, 0)).with_its_own_occlusion()
+    points = np.array([[-0.55, 0.013, 0], [0.3, 0.013, 0], [-0.1, -0.8, 0]], np.float32).T
+    up = np.tile(np.float32([[0], [0], [1]]), 3)
+    left, come, far = anew.occlusion(points, up)
+    were = still.occlusion(points, up)
+    # beside the box by .05, as it was modelled and as it stands, and away from both
+    assert left > were[0] + 0.1 and come < were[1] - 0.1 and far == were[2]
+    # as if the box had never stood elsewhere, but for the lattice, .25 of whose spacing it is off
+    poses = box.primitives[0].poses.copy()
+    poses[:, 0, 3] += 0.85
+    there = ProceduralScene("there", (plate, Part("box", (replace(box.primitives[0], poses=poses),))))
+    np.testing.assert_allclose(there.occlusion(points, up), (left, come, far), atol=0.02)
+    again = anew.move("box", translate=(-0.85, 0, 0))
+    assert again.occlusion is anew.occlusion
+    np.testing.assert_allclose(again.with_its_own_occlusion().occlusion(points, up), were, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "part"), [("digger", "cone"), ("microphone", "base"), ("plant", "flower")])
+def test_occlusion_anew_changes_nothing_far_from_what_moved(name, part):
+    scene = procedural_scene(name)
+    camera = viewpoints(1, 64, lowest=scene.lowest)[0]
+    photo = scene.photograph(camera, background="white").rgb
+    np.testing.assert_allclose(
+        scene.with_its_own_occlusion().photograph(camera, background="white").rgb, photo, atol=1e-5
+    )
+    old, new = (
+        each.photograph(camera, background="white").rgb
+        for each in (scene.remove(part), scene.remove(part).with_its_own_occlusion())
+    )
+    changed = np.abs(old - new).max(-1) > 4 / 255
+    # though the box of the parts, where the lattice of distances begins, is another without the part
+    assert 0.0005 < changed.mean() < 0.1
+    assert (new - old).min() > -1e-4, "taking a part away darkens nothing"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.benchmarking.visibility import unseen_pixels
+from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
 from cagefield.cameras import Camera, turntable
 from cagefield.datasets.procedural.parts import Part, Primitive, place
 from cagefield.datasets.procedural.scene import ProceduralScene
@@ -70,3 +70,25 @@ def test_ground_seen_through_a_hair_thin_gap_is_unseen() -> None:
     # the foot less a rim of the box's rounding and a voxel, 0.02 wide on every side
     assert 0.75 * foot < shares[0.004] < 1.15 * foot
     assert shares[0.1] < 0.2 * foot
+
+
+def test_what_a_part_hid_is_uncovered_where_it_was() -> None:
+    scene = box_on_plate()
+    moved = scene.move("box", translate=(0.0, 0.55, 0.0))
+    uncovered = uncovered_pixels(moved, above(), scene)
+    # the box's top, .4 above the plate and so nearer: its picture is the larger by 4 / 3.6
+    share = (0.4 / 3.6) ** 2 / (2 * np.tan(0.25)) ** 2
+    np.testing.assert_allclose(uncovered.mean(), share, rtol=0.15)
+    assert uncovered[40, 40] and not uncovered[8, 8]
+    np.testing.assert_array_equal(uncovered, uncovered_pixels(scene.remove("box"), above(), scene))
+
+
+def test_a_part_that_covers_its_own_place_or_was_copied_uncovers_nothing() -> None:
+    scene = box_on_plate()
+    assert not uncovered_pixels(scene, above(), scene).any()
+    assert not uncovered_pixels(scene.duplicate("box", translate=(0, 0.55, 0)), above(), scene).any()
+    turned = scene.move("box", rotate=(np.pi, 0.0, 0.0), translate=(0, 0, 0.3), pivot=(0, 0, 0.2))
+    assert not uncovered_pixels(turned, above(), scene).any()
+    # behind the plate's edge there is nothing to uncover
+    beside = Camera.look_at((0, -4.0, 0.3), (0, 0, 0.3), width=40, height=40, fov_x=0.3)
+    assert not uncovered_pixels(scene.remove("box"), beside, scene)[:15].any()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import compared_cameras, continuous, seen
+from cagefield.benchmarking.compare import FINER, compared_cameras, continuous, seen
 from cagefield.benchmarking.distortion import distortion
 from cagefield.benchmarking.edits import eye, frame_ratio
 from cagefield.benchmarking.figures import Figures, compare
@@ -69,7 +69,8 @@ class Subject:
         """The field through edits against the scene's model through their exact map."""
         name, cameras = self.case.scene, self.cameras
         before, after = (self.bench.mapped(name, stack, cameras) for stack in (None, edits))
-        return compare(seen(self.scene, cameras), seen(self.scene.with_edits(edits), cameras), before, after)
+        still, edited = (seen(scene, cameras, FINER) for scene in (self.scene, self.scene.with_edits(edits)))
+        return compare(still, edited, before, after)
 
     def with_edit(self, change: Callable[[Edit], Edit]) -> EditStack:
         """The case's edits, the continuous one changed."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.distortion import Distortion, distortion, shell_points
-from cagefield.benchmarking.figures import Figures, compare, stacked
+from cagefield.benchmarking.figures import Figures, compare, stacked, supersampled
 from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
@@ -28,6 +28,10 @@ from cagefield.typing import AnyArray
 from cagefield.warps.device_stack import DeviceStack
 
 _TIMED_POINTS = 1 << 17
+
+FINER = 2
+"""Pixels of continuous edits are the mean of FINER x FINER rays, as those of their truth are: they are larger
+than the pixels of the photos that a field learnt from, and with one ray each would show less of it."""
 
 _COLUMNS = (
     "scene", "edit", "method", "folds", "min det J", "max stretch", "mean |J - R|", "set-up", "per million",
@@ -81,7 +85,7 @@ def _measured(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -
             continue
         scene = bench.scene(case.scene)
         cameras = compared_cameras(scene, bench)
-        unedited = seen(scene, cameras)
+        unedited = seen(scene, cameras, FINER)
         before = bench.mapped(case.scene, None, cameras)
         for name in methods:
             method = METHODS[name]
@@ -91,7 +95,7 @@ def _measured(cases: Sequence[Case], methods: Sequence[str], bench: Workbench) -
                 maps[key] = distortion(edit.exact_warp, edit)
             edits = method.of_all(case.edits)
             after = bench.mapped(case.scene, Method(method.shell).of_all(case.edits), cameras)
-            figures = compare(unedited, seen(scene.with_edits(edits), cameras), before, after)
+            figures = compare(unedited, seen(scene.with_edits(edits), cameras, FINER), before, after)
             yield Comparison(case, name, maps[key], map_time(edits), figures)
 
 
@@ -103,9 +107,9 @@ def compared_cameras(scene: Scene, bench: Workbench) -> tuple[Camera, ...]:
     )
 
 
-def seen(scene: Scene, cameras: Sequence[Camera]) -> AnyArray:
-    """Pictures [V,H,W,3] of a scene, as `shown`."""
-    return stacked([np.clip(shown(scene, camera).rgb, 0.0, 1.0) for camera in cameras])
+def seen(scene: Scene, cameras: Sequence[Camera], rays: int = 1) -> AnyArray:
+    """Pictures [V,H,W,3] of a scene, as `shown`, each pixel the mean of rays x rays."""
+    return stacked([supersampled(lambda finer: shown(scene, finer).rgb, camera, rays) for camera in cameras])
 
 
 def shown(scene: Scene, camera: Camera) -> RenderResult:

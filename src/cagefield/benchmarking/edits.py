@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import continuous, map_time, seen, shown
+from cagefield.benchmarking.compare import FINER, continuous, map_time, seen, shown
 from cagefield.benchmarking.distortion import distortion
 from cagefield.benchmarking.edits_table import TIMED_EXACTLY, Revealed, Score
 from cagefield.benchmarking.figures import changed_pixels, compare, floats, mean_psnr, pooled_psnr
@@ -57,21 +57,22 @@ def measure(cases: Sequence[Case], bench: Workbench, *, taught: bool = False) ->
             size = bench.settings.exact_size
             cameras = tuple(camera.resized(size, size) for camera in cameras[: bench.settings.exact_views])
             truth, before = "exact map", bench.mapped(name, None, cameras)
-            after = bench.mapped(name, case.edits, cameras)
+            after, rays = bench.mapped(name, case.edits, cameras), FINER
         else:
             cameras = cameras[: bench.settings.discrete_views]
             truth, before = "photos", bench.modelled(name, cameras)
-            after = bench.moved(case, cameras)
+            after, rays = bench.moved(case, cameras), 1
         if truth not in unedited:
-            unedited[truth] = seen(scene, cameras)
-        pictures = seen(edited, cameras)
+            unedited[truth] = seen(scene, cameras, rays)
+        pictures = seen(edited, cameras, rays)
         if case.moved is not None:
             revealed = _revealed(case, bench, cameras, unedited[truth], pictures, taught)
         figures = compare(unedited[truth], pictures, before, after)
         naive: tuple[float, ...] = ()
         if isinstance(scene.field, SplatField):
             naive = tuple(
-                figures.unedited - mean_psnr(naively, after) for _, naively in seen_naively(edited, cameras)
+                figures.unedited - mean_psnr(naively, after)
+                for _, naively in seen_naively(edited, cameras, rays)
             )
         both = (perceived(unedited[truth], before), perceived(pictures, after)) if perceived else None
         yield Score(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import MapTime
+from cagefield.benchmarking.compare import FINER, MapTime
 from cagefield.benchmarking.distortion import Distortion
 from cagefield.benchmarking.figures import Figures
 from cagefield.benchmarking.naive_splats import NAIVE
@@ -105,7 +105,8 @@ def table(scores: Sequence[Score], settings: Settings, notes: Sequence[str] = ()
         "photos of the scene; edited: the edited field against the truth of the edit; lost: the difference.",
         "Truth: photos of the scene whose part was really moved, all light as it then falls, ambient "
         "occlusion computed anew; for continuous edits photos of the scene seen through the edit's exact "
-        f"map, which carries the light along, at {settings.exact_size}x{settings.exact_size} pixels.",
+        f"map, which carries the light along, at {settings.exact_size}x{settings.exact_size} pixels, each "
+        f"the mean of {FINER}x{FINER} rays, of the field's pictures too.",
         "There: on the pixels that the edit changes in truth, and a margin of a 100th of the width; if left: "
         "what the field without the edit would reach there.",
         "Old shadows: against the truth whose ambient occlusion stays as it was, on what a part left and on "

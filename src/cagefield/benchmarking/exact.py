@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,11 @@ class KernelMap:
         """The box [2,3] outside which nothing is changed."""
         return self.edits.bounds
 
+    @property
+    def boxes(self) -> Array:
+        """Boxes [B,2,3] outside all of which nothing is changed."""
+        return self.edits.boxes
+
     @cached_property
     def _packed(self) -> DeviceStack:
         return DeviceStack.from_stack(self.edits)
@@ -50,7 +55,14 @@ class KernelMap:
         return KernelSamples(points, along, stretch, np.minimum(places, 0))
 
 
-def exact(edits: EditStack) -> PointMap:
+class BoxedMap(PointMap, Protocol):
+    """A point map that knows the boxes [B,2,3] outside all of which nothing is changed."""
+
+    @property
+    def boxes(self) -> Array: ...
+
+
+def exact(edits: EditStack) -> BoxedMap:
     """The stack's map without its lattices, by the kernel where all its shells have one."""
     stack = EditStack(edit.replace(lattice=None) for edit in edits)
     shells = {edit.shell for edit in stack.active if edit.adjustment == "continuous"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.cameras import Camera
 from cagefield.rendering.metrics import mse, psnr, ssim
 from cagefield.typing import AnyArray
 
@@ -99,6 +100,14 @@ def floats(pictures: AnyArray) -> NDArray[np.float32]:
     if pictures.dtype == np.uint8:
         return pictures.astype(np.float32) / np.float32(255.0)
     return np.clip(pictures, 0.0, 1.0).astype(np.float32)
+
+
+def supersampled(draw: Callable[[Camera], NDArray[Any]], camera: Camera, rays: int) -> NDArray[np.float32]:
+    """A picture [H,W,3] clipped to [0,1], each pixel the mean of rays x rays that are drawn."""
+    height, width = camera.height, camera.width
+    fine = np.clip(draw(camera.resized(width * rays, height * rays)), 0.0, 1.0)
+    mean: NDArray[np.float32] = fine.reshape(height, rays, width, rays, 3).mean((1, 3), dtype=np.float32)
+    return mean
 
 
 def stacked(pictures: Sequence[NDArray[Any]]) -> AnyArray:

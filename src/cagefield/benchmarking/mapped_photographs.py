@@ -4,7 +4,8 @@ Notation: phi takes deformed points to canonical ones, J is its Jacobian; a ray 
 space meets a surface where the scene's distance D(phi(p(t))) is 0. Outside the box of what phi changes rays
 are traced as they are; inside, from t a step of D / |J d| stays in the empty ball of radius D about phi(p(t))
 as long as phi is about linear: a step whose end is outside that ball is taken back and shortened, down to
-SHORTEST, where the map jumps; so is one that ends beyond what the map empties. Surfaces have the colours of
+SHORTEST, where the map jumps; so is one that ends beyond what the map empties. None goes past a face of the
+boxes of what phi changes, in which a thin copy may stand. Surfaces have the colours of
 their canonical points in direction J d.
 Source: Hart, "Sphere tracing" (1996), whose step is divided by the map's stretch.
 """
@@ -17,13 +18,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.benchmarking.exact import BoxedMap
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural import ProceduralScene
 from cagefield.datasets.procedural.distance_cells import DistanceCells
 from cagefield.datasets.procedural.supersampling import photograph
 from cagefield.datasets.procedural.tracing import TOLERANCE, Hits, along, trace
 from cagefield.errors import SceneError
-from cagefield.rendering.reference_renderer import PointMap, intersect_box
+from cagefield.rendering.reference_renderer import intersect_box
 from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import Array, Float32, Int, Mask
 
@@ -90,7 +92,7 @@ class MappedScene:
     """A procedural scene seen through a point map. Raises SceneError for a scene with mirrors."""
 
     scene: ProceduralScene
-    mapping: PointMap
+    mapping: BoxedMap
 
     def __post_init__(self) -> None:
         if any(item.primitive.mirror for item in self.scene.placed):
@@ -155,10 +157,15 @@ class MappedScene:
         active = np.flatnonzero(~result.arrived)
         t, at = enter[active], result.of(active)
         step = _step(at)
+        faces = [intersect_box(start[None], directions.T, box) for box in self.mapping.boxes]
+        stops = np.array([t for pair in faces for t in pair], np.float32).reshape(-1, len(enter)) + SHORTEST
         for _ in range(MAX_STEPS):
             if not len(active):
                 break
             step = np.minimum(step, leave[active] - t)
+            to_stops = stops[:, active] - t
+            step = np.minimum(step, np.where(to_stops > 1e-6, to_stops, np.inf).min(0, initial=np.inf))
+            step = step.astype(np.float32)
             ahead = self._samples(start, directions[:, active], t + step)
             moved = np.linalg.norm(ahead.points - at.points, axis=0)
             passed = np.isinf(at.bound) & ~np.isinf(ahead.bound)

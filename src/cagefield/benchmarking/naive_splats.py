@@ -11,9 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import cast
 
-import numpy as np
-
-from cagefield.benchmarking.figures import stacked
+from cagefield.benchmarking.figures import stacked, supersampled
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
@@ -23,7 +21,7 @@ from cagefield.rendering.moved_splats import moved_splats
 from cagefield.rendering.render_result import RenderResult
 from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.scene import Scene
-from cagefield.typing import AnyArray
+from cagefield.typing import AnyArray, Float32
 
 NAIVE = ("means only", "no turned SH", "not split")
 """Means alone; means and covariances, colours unturned; everything but splitting."""
@@ -40,8 +38,10 @@ def naive_splats(field: SplatField, edits: EditStack) -> Iterator[tuple[str, Def
     yield from zip(NAIVE, (replace(unturned, covariances=own), unturned, whole), strict=True)
 
 
-def seen_naively(scene: Scene, cameras: Sequence[Camera]) -> Iterator[tuple[str, AnyArray]]:
+def seen_naively(scene: Scene, cameras: Sequence[Camera], rays: int = 1) -> Iterator[tuple[str, AnyArray]]:
     """Pictures [V,H,W,3] over white of a scene of splats under its edits, by each of the `NAIVE` ways.
+
+    Each pixel is the mean of rays x rays.
 
     Raises EditError for an edit that cannot be evaluated.
     """
@@ -51,5 +51,8 @@ def seen_naively(scene: Scene, cameras: Sequence[Camera]) -> Iterator[tuple[str,
     for name, splats in naive_splats(field, scene.edits):
         renderer = SplatRenderer(field)
         renderer.splats = splats
-        frames = [cast(RenderResult, renderer.render(camera, background="white")) for camera in cameras]
-        yield name, stacked([np.clip(frame.rgb, 0.0, 1.0) for frame in frames])
+
+        def draw(camera: Camera, renderer: SplatRenderer = renderer) -> Float32:
+            return cast(RenderResult, renderer.render(camera, background="white")).rgb
+
+        yield name, stacked([supersampled(draw, camera, rays) for camera in cameras])

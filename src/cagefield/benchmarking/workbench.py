@@ -120,7 +120,8 @@ class Workbench:
     def taught(self, case: Case) -> Scene:
         """A scene trained on photos of the truth of a discrete case: what its edit could know at best."""
         what, key = f"{case.scene}, {case.name}", digest([*self._shape, case.name], _TRULY_MOVED)
-        dataset = self._photographed(case.scene, self._moved(case), f"{what}: photos", key)
+        truth = _models(case)[1].with_its_own_occlusion()
+        dataset = self._photographed(case.scene, truth, f"{what}: photos to teach by", key)
         return self._trained(what, dataset)
 
     @property
@@ -179,23 +180,15 @@ class Workbench:
 
         With `old_shadows` ambient occlusion stays as modelled: on what the part left, and on the part.
         """
-        scene = self._moved(case, old_shadows)
+        _, scene = _models(case)
+        scene = scene if old_shadows else scene.with_its_own_occlusion()
         key = digest([case.scene, case.name, old_shadows, _poses(cameras)], _TRULY_MOVED)
         what = f"{case.scene}, {case.name}: photos of the truth"
         return self._kept(case.scene, key, what, lambda: self._photographs(scene, cameras), len(cameras))
 
-    @staticmethod
-    def _moved(case: Case, old_shadows: bool = False) -> ProceduralScene:
-        if case.moved is None:
-            raise CagefieldError(
-                f"no part of {case.scene} is moved by {case.name}; its truth is the exact map"
-            )
-        scene = case.moved(procedural_scene(case.scene))
-        return scene if old_shadows else scene.with_its_own_occlusion()
-
     def unseen_pixels(self, case: Case, cameras: Sequence[Camera], where: Mask) -> Mask:
         """Pixels [V,H,W] in `where`, of `moved`, that show what none of the photos of the scene showed."""
-        moved, scene = self._moved(case, old_shadows=True), procedural_scene(case.scene)
+        scene, moved = _models(case)
         photos = self.scene(case.scene).cameras["train"]
         shown = hashlib.sha256(np.packbits(where).tobytes()).hexdigest()
         key = digest(["unseen", case.scene, case.name, shown, _poses(cameras), _poses(photos)], _HIDDEN)
@@ -208,7 +201,7 @@ class Workbench:
 
     def uncovered_pixels(self, case: Case, cameras: Sequence[Camera]) -> Mask:
         """Pixels [V,H,W] of `moved` that show a surface which the part hid before."""
-        moved, scene = self._moved(case, old_shadows=True), procedural_scene(case.scene)
+        scene, moved = _models(case)
         key = digest(["uncovered", case.scene, case.name, _poses(cameras)], _HIDDEN)
         masks = (uncovered_pixels(moved, camera, scene).astype(np.uint8) for camera in cameras)
         what = f"{case.scene}, {case.name}: what was uncovered"
@@ -276,6 +269,14 @@ def trained(
         raise KeyboardInterrupt
     cameras = {name: tuple(view.camera for view in getattr(dataset, name)) for name in ("train", "test")}
     return Scene.baked(learnt.field, cameras, resolution=BAKED)
+
+
+def _models(case: Case) -> tuple[ProceduralScene, ProceduralScene]:
+    """The built-in scene of a case, and that scene with its part really moved, light as modelled."""
+    if case.moved is None:
+        raise CagefieldError(f"no part of {case.scene} is moved by {case.name}; its truth is the exact map")
+    scene = procedural_scene(case.scene)
+    return scene, case.moved(scene)
 
 
 def beside(camera: Camera, other: Camera, degrees: float) -> bool:
