@@ -56,6 +56,7 @@ from cagefield.scene_files import (
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
+    from cagefield.patches.patcher import Patcher
     from cagefield.rendering.renderers import AnyRenderer
 
     class Trained(Protocol):
@@ -239,6 +240,8 @@ class Scene:
             raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
+        if "patcher" in self.__dict__:
+            scene.__dict__["patcher"] = self.patcher
         return scene
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
@@ -323,9 +326,27 @@ class Scene:
         from cagefield.rendering.renderers import renderer_of
 
         origin: AnyRenderer | None = self.__dict__.get("_origin")
+        edits = self.patched_edits
         if origin is not None:
-            return origin.with_edits(self.edits, preserve_opacity=self.preserve_opacity)
-        return renderer_of(self.field, self.edits, preserve_opacity=self.preserve_opacity)
+            return origin.with_edits(edits, preserve_opacity=self.preserve_opacity)
+        return renderer_of(self.field, edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def patcher(self) -> Patcher:
+        """What fills the places that edits uncover, and takes light along; shared by `with_edits`."""
+        from cagefield.patches.patcher import Patcher
+        from cagefield.rendering.renderers import renderer_of
+
+        def render(camera: Camera) -> RenderResult:
+            plain = self.__dict__.setdefault("_plain", renderer_of(self.field))
+            return cast(RenderResult, plain.render(camera, background="black", normals=True))
+
+        return Patcher(self.field, self.cameras.get("train", ()), render)
+
+    @property
+    def patched_edits(self) -> EditStack:
+        """The edits with the patches that they ask for."""
+        return self.patcher.patched(self.edits.edits)
 
     @cached_property
     def _exact_splats(self) -> AnyRenderer:
@@ -333,7 +354,7 @@ class Scene:
 
     @property
     def _exact_edits(self) -> EditStack:
-        return EditStack(edit.replace(lattice=None) for edit in self.edits)
+        return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
 
 
 def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:

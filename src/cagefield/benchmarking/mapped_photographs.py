@@ -142,9 +142,9 @@ class MappedScene:
             raise SceneError("a map must return viewdirs and stretch when it is given viewdirs")
         canonical = np.ascontiguousarray(mapped.points.T, np.float32)
         nearest = self._cells(canonical)
-        bound = np.where(mapped.emptied, np.float32(np.inf), nearest.bound)
+        bound = np.where((mapped.layer < 0), np.float32(np.inf), nearest.bound)
         viewdirs = np.ascontiguousarray(mapped.viewdirs.T, np.float32)
-        stretch = np.where(mapped.emptied, np.float32(1), mapped.stretch).astype(np.float32)
+        stretch = np.where((mapped.layer < 0), np.float32(1), mapped.stretch).astype(np.float32)
         return _Samples(canonical, viewdirs, stretch, bound, nearest.primitive, nearest.instance)
 
     def _march(

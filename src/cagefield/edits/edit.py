@@ -17,7 +17,7 @@ from cagefield.edits import operations as ops
 from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
-from cagefield.edits.options import Adjustment, problem_of_options
+from cagefield.edits.options import Adjustment, Fill, Relight, problem_of_options
 from cagefield.edits.patch import Patch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.errors import CageError, DeviceError, EditError
@@ -63,6 +63,9 @@ class Edit:
     - width: how much of the flow shell moves, in (0, 1]: from "only near the inner cage" to the whole shell.
     - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
       sheets is shown.
+    - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
+      leaves it as it was trained.
+    - relight: "occlusion" takes contact shadows along, of a discrete edit; "none" leaves them.
     - patch: of a discrete edit, what the field that it was made for shows where something was taken away
       (`cagefield.patches.patched`); no part of edit files.
 
@@ -83,6 +86,8 @@ class Edit:
     deleted: bool = False
     falloff: str = "smooth"
     width: float = 1.0
+    fill: Fill = "surroundings"
+    relight: Relight = "occlusion"
     patch: Patch | None = None
 
     def __post_init__(self) -> None:
@@ -99,6 +104,7 @@ class Edit:
             deleted=self.deleted,
             fading=(self.falloff, self.width),
             lattice=self.lattice,
+            surroundings=(self.fill, self.relight),
         )
         if problem is not None:
             raise self._error(problem)

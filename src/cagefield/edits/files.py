@@ -22,6 +22,8 @@
       - name: no cup
         delete: true
         inner: {center: [2, 0, 0], size: 0.5}
+        fill: surroundings                    # or none: what it stood on goes on where it was, if left out
+        relight: occlusion                    # or none: contact shadows go along, if left out
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
@@ -147,6 +149,8 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
             "lattice",
             "enabled",
             "allow_folding",
+            "fill",
+            "relight",
         ),
     )
     inner = _cage(keys["inner"])
@@ -157,7 +161,7 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
     options["adjustment"] = "discrete" if deleted else "continuous"
     if "adjustment" in keys:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
-    for name in ("shell", "falloff"):
+    for name in ("shell", "falloff", "fill", "relight"):
         if name in keys:
             options[name] = keys[name].text()
     if "name" in keys:
@@ -291,6 +295,10 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["width"] = edit.width
     if edit.keep_source:
         content["keep_source"] = True
+    if edit.fill != "surroundings":
+        content["fill"] = edit.fill
+    if edit.relight != "occlusion":
+        content["relight"] = edit.relight
     if edit.lattice is not None:
         content["lattice"] = edit.lattice
     if not edit.enabled:

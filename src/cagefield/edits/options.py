@@ -9,6 +9,12 @@ from cagefield.warps import FALLOFFS, SHELLS
 
 Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
+Fill: TypeAlias = Literal["surroundings", "none"]
+Relight: TypeAlias = Literal["occlusion", "none"]
+
+FILLS: tuple[Fill, ...] = ("surroundings", "none")
+RELIGHTS: tuple[Relight, ...] = ("occlusion", "none")
+
 LATTICE_RANGE = (2, 512)
 MOST_NODES = 512**3
 """Lattice nodes of all edits together, of 32 bytes each: one lattice of 512, or eight of 256."""
@@ -35,15 +41,19 @@ def problem_of_options(
     deleted: bool,
     fading: tuple[str, float],
     lattice: int | None,
+    surroundings: tuple[str, str],
 ) -> str | None:
     """What is wrong with an edit's options, and the cure; None where they go together.
 
-    `fading` is (falloff, width). See `cagefield.edits.edit.Edit` for what each of them means.
+    `fading` is (falloff, width), `surroundings` (fill, relight). See `cagefield.edits.edit.Edit` for what each of them means.
     """
     if adjustment not in ("continuous", "discrete"):
         return f'adjustment must be "continuous" or "discrete", got "{adjustment}"'
     if shell not in SHELLS:
         return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
+    for name, value, known in zip(("fill", "relight"), surroundings, (FILLS, RELIGHTS), strict=True):
+        if value not in known:
+            return f'{name} must be one of {", ".join(known)}, got "{value}"'
     if adjustment == "continuous":
         if not has_outer:
             return (

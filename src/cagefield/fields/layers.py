@@ -1,8 +1,9 @@
 """Layers: parts of a voxel field's grid that have a second content, beside the field's own.
 
-A layer is a VoxelField on the same grid (bounds, resolution, contracted) that stores vertices of a block only,
-the block's first and last one among them (empty ones too). It is read in that block only. On a device the layers of a field lie behind it: the index of the field's slots, x slowest, is continued
-by the blocks' slices, and the *place* of a layer is what has to be added to a vertex's x to find it there.
+A layer is a VoxelField on the same grid (bounds, resolution, contracted) that stores vertices of a block,
+the block's first and last one among them, also where these are empty. It is read in that block only. On a
+device the layers of a field lie behind it: the index of the field's slots, x slowest, is continued by the
+blocks' slices, and the *place* of a layer is what has to be added to a vertex's x to find it there.
 Places are multiples of `ALIGNED`, so that bricks of vertices stay whole, and never 0.
 """
 

@@ -194,7 +194,7 @@ def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
     inside = ((g >= 0) & (g <= n - 1)).all(axis=1)
     base = np.clip(np.floor(g).astype(np.int64), 0, n - 2)
     fraction = g - base
-    raw, sh, total = np.zeros(len(g)), np.zeros((len(g), *field.sh.shape[1:])), np.zeros(len(g))
+    raw, sh = np.zeros(len(g)), np.zeros((len(g), *field.sh.shape[1:]))
     for corner in range(8):
         offset = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1])
         slot, stored = field.lookup(base + offset)

@@ -23,7 +23,7 @@ from scipy import ndimage, optimize
 
 from cagefield.patches.block import Block
 from cagefield.patches.seen import SeenPairs
-from cagefield.typing import Array, Mask
+from cagefield.typing import AnyArray, Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08)
 """The reaches r, shares of the diagonal of what the field holds."""
@@ -72,7 +72,7 @@ def distances(solid: Mask, block: Block) -> NDArray[np.float32]:
 
 
 def nearness(
-    block: Block, distance: NDArray[np.float32], points: Array, normals: Array, reaches: Sequence[float]
+    block: Block, distance: AnyArray, points: Array, normals: Array, reaches: Sequence[float]
 ) -> Array:
     """max(0, 1 - D(p + r n) / r) [N,R] at points [N,3] with normals [N,3], for each reach r."""
     columns = []

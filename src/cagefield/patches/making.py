@@ -28,19 +28,22 @@ UNSURE = 0.2
 """Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
 
 
-def patch_of(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None) -> Patch:
+def patch_of(
+    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+) -> Patch:
     """The patch of a discrete edit of a field under the edits below it; `ambience` None leaves the light.
 
-    A copy is not filled, as nothing is uncovered.
+    A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
+    is moved to, and keeps the light that it had.
     """
-    work = _Work.of(field, below, edit, ambience)
+    work = _Work.of(field, below, edit, ambience, settled)
     under, part = work.emptied, None
     lighting = None
-    support = None if edit.keep_source else work.support(under)
+    support = None if edit.keep_source or edit.fill == "none" else work.support(under)
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
         under = under.relit(lighting.where, np.exp(lighting.log_ratio))
-        part = None if edit.deleted else work.relit_part(ambience)
+        part = work.relit_part(ambience) if work.settled else None
     if support is not None:
         hidden = work.rim(under) & (ndimage.distance_transform_edt(~work.part) < CLOSE)
         if lighting is not None:
@@ -53,7 +56,10 @@ def patch_of(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it."""
+    """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
+
+    settled: the part is shown at its new place, and casts its shadow there.
+    """
 
     edit: Edit
     region: Cage
@@ -61,15 +67,19 @@ class _Work:
     emptied: Block
     inside: Mask
     part: Mask
+    settled: bool
 
     @classmethod
-    def of(cls, field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None) -> _Work:
+    def of(
+        cls, field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, settled: bool
+    ) -> _Work:
+        settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
         box = edit.inner.aabb
         margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
         if ambience is not None and ambience.shows:
             margin = max(margin, 1.5 * ambience.reach + RIM * voxel)
-            if not edit.deleted:
+            if settled:
                 moved = edit.deformed.aabb
                 box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
         box = box + margin * np.array([[-1.0], [1.0]])
@@ -79,7 +89,7 @@ class _Work:
         if not edit.keep_source:
             emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
-        return cls(edit, region, before, emptied, inside, before.solid & inside)
+        return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
 
     def rim(self, block: Block) -> Mask:
         """Surface vertices around V^c."""
@@ -95,9 +105,9 @@ class _Work:
         return support_of(block, self.part, self.rim(block))
 
     def solid_after(self) -> Mask:
-        """What is solid [X,Y,Z] once the part is where it is moved to."""
+        """What is solid [X,Y,Z] once the part is where it is moved to, or gone."""
         solid = self.emptied.solid.copy()
-        if self.edit.deleted:
+        if not self.settled:
             return solid
         phi = HexahedronMap(self.edit.inner, self.edit.deformed)
         inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))

@@ -20,7 +20,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import factorized
 
 from cagefield.patches.block import Block
-from cagefield.typing import Array, Float32, Mask
+from cagefield.typing import Array, Mask
 
 TRIALS = 200
 """Planes that are tried."""
@@ -154,10 +154,8 @@ def footprint_of(block: Block, support: Support, part: Mask, shaded: Mask) -> Fo
     if len(knots) < LEAST:
         return None
     knots = chance.choice(knots, min(KNOTS, len(knots)), replace=False)
-    surface = own + _crossing(block, support)[:, None][:, 0]
-    spline = RBFInterpolator(
-        uv[knots], surface[knots], neighbors=64, smoothing=4.0, kernel="thin_plate_spline"
-    )
+    surface = own + _crossing(block, support)
+    spline = RBFInterpolator(uv[knots], surface[knots], neighbors=64, smoothing=4.0)
     cells = np.argwhere(hole | around)
     height = np.zeros(size)
     height[tuple(cells.T)] = spline((cells + first).astype(np.float64))
@@ -205,14 +203,8 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
     deep[tuple(voxels[new & (height < -1.5)].T)] = True
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where])
-    return _coloured(
-        block,
-        footprint,
-        voxels[new],
-        (u[new], v[new]),
-        voxels[around],
-        (u[around], v[around], height[around]),
-    )
+    known_columns = (u[around], v[around], height[around])
+    return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
 
 
 def _profile(block: Block, at: NDArray[np.int64], height: Array) -> Array:
@@ -291,6 +283,3 @@ def membrane(hole: Mask, given: Mask, table: Array) -> Array:
     for channel in range(table.shape[1]):
         out[unknown, channel] = solve(sources[:, channel])
     return out
-
-
-__all__ = ["Float32", "Footprint", "Support", "footprint_of", "membrane", "rebuilt", "support_of"]

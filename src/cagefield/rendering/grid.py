@@ -101,8 +101,10 @@ class DeviceGrid:
             stored += len(vertices)
             densities.append(density)
             colours.append(sh.reshape(-1))
-        every = (index, np.concatenate(densities), np.concatenate(colours))
-        return DeviceGrid(self.field, *map(to_device, every), layers, base)
+        values, coefficients = np.concatenate(densities), np.concatenate(colours)
+        return DeviceGrid(
+            self.field, to_device(index), to_device(values), to_device(coefficients), layers, base
+        )
 
 
 def _by_brick(field: VoxelField) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:

@@ -57,9 +57,8 @@ class Renderer:
         self.edits = edits if edits is not None else EditStack([])
         self.step = float(step)
         self.preserve_opacity = preserve_opacity
-        self.grid = (grid if grid is not None else DeviceGrid.from_field(field)).with_layers(
-            self.edits.layers
-        )
+        shared = grid if grid is not None else DeviceGrid.from_field(field)
+        self.grid = shared.with_layers(self.edits.layers)
         self._canonical = occupancy.of_field(field)
         self._canonical_bricks = occupancy_args(self._canonical, to_device(self._canonical.codes))
         self._pixels: dict[tuple[int, int], Any] = {}

@@ -52,6 +52,7 @@ def to_deformed(
         np.concatenate([part.points for part in parts]),
         np.concatenate([part.jacobian for part in parts]),
         np.concatenate([part.lost for part in parts]),
+        np.concatenate([part.inside for part in parts]),
     )
 
 

@@ -59,10 +59,8 @@ def is_dense(image: vec3, r: vec3, place: qd.i32, grid: GridArgs):
     while x <= last.x and found == 0:
         for y in range(first.y, last.y + 1):
             for z in range(first.z, last.z + 1):
-                if (
-                    grid.density[grid.index[((x + place) * grid.resolution.y + y) * grid.resolution.z + z]]
-                    > 0.0
-                ):
+                vertex = ((x + place) * grid.resolution.y + y) * grid.resolution.z + z
+                if grid.density[grid.index[vertex]] > 0.0:
                     found = 1
         x += 1
     return found

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit
 from cagefield.server.editor.identity_cache import IdentityCache
 
 if TYPE_CHECKING:
+    from cagefield.patches.patcher import Patcher
     from cagefield.rendering.renderers import AnyRenderer
 
 QUICK_LATTICE = 32
@@ -31,9 +32,9 @@ class _Kept:
 class EditedRenderers:
     """See the module."""
 
-    def __init__(self, plain: AnyRenderer, is_sampled: bool) -> None:
+    def __init__(self, plain: AnyRenderer, is_sampled: bool, patcher: Patcher) -> None:
         """`is_sampled`: rays are sampled, and samples mapped; lattices are for those alone."""
-        self._plain, self._is_sampled = plain, is_sampled
+        self._plain, self._is_sampled, self._patcher = plain, is_sampled, patcher
         self._coarse: IdentityCache[Edit, Edit] = IdentityCache(32)
         self._exact: list[_Kept] = []
         self._quick: list[_Kept] = []
@@ -60,12 +61,13 @@ class EditedRenderers:
                 return kept.renderer
         shown = list(wanted)
         if not exact and self._is_sampled:
-            ready = {id(edit) for kept in self._exact for edit in kept.renderer.edits}
+            ready = {id(edit) for kept in self._exact for edit in kept.edits}
             shown = [edit if id(edit) in ready else self._quickly(edit) for edit in shown]
         # Occupancy under edits that both share is kept.
         last = self._exact[-1:] if exact else (self._quick or self._exact[-1:])
+        stack = self._patcher.patched(shown, moving=not exact, proceed=proceed)
         renderer = (last[0].renderer if last else self._plain).with_edits(
-            EditStack(shown), preserve_opacity=preserve_opacity, coarse=not exact, proceed=proceed
+            stack, preserve_opacity=preserve_opacity, coarse=not exact, proceed=proceed
         )
         kept = _Kept(wanted, preserve_opacity, renderer)
         if exact:

@@ -56,7 +56,7 @@ class RendererCache:
         self._is_sampled = isinstance(scene.field, VoxelField)
         """Whether rays are sampled, and samples mapped: lattices and steps are for those alone."""
         self._edits: list[Edit] = []
-        self.edited = EditedRenderers(self.plain, self._is_sampled)
+        self.edited = EditedRenderers(self.plain, self._is_sampled, scene.patcher)
         lower, upper = scene.field.bounds
         self._middle = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower))

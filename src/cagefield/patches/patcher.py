@@ -1,0 +1,95 @@
+"""Patches of one field's edits, made when they are asked for, and the last ones kept."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.patch import Patch
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import block_of
+from cagefield.patches.light import Ambience, ambience_of
+from cagefield.patches.making import patch_of
+from cagefield.patches.seen import seen_pairs
+from cagefield.rendering.render_result import RenderResult
+
+KEPT = 16
+"""Patches that are kept for when they are asked for again."""
+
+Key = tuple[object, ...]
+
+
+class Patcher:
+    """Gives discrete edits the patches that their `fill` and `relight` ask for.
+
+    `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
+    from there by `render`, which draws the field without edits, with normals. Splats have no patches yet.
+    """
+
+    def __init__(
+        self,
+        field: VoxelField | SplatField,
+        cameras: Sequence[Camera],
+        render: Callable[[Camera], RenderResult],
+    ) -> None:
+        self._field, self._cameras, self._render = field, cameras, render
+        self._kept: OrderedDict[Key, Patch] = OrderedDict()
+
+    def patched(
+        self, edits: Sequence[Edit], *, moving: bool = False, proceed: Callable[[], None] | None = None
+    ) -> EditStack:
+        """The stack of the edits, in order, with their patches.
+
+        While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
+        place: this does not depend on where that is. `proceed` is called between patches, and may raise.
+        """
+        made: list[Edit] = []
+        for edit in edits:
+            if isinstance(self._field, VoxelField) and wants_patch(edit, moving):
+                if proceed is not None:
+                    proceed()
+                edit = edit.replace(patch=self._patch(self._field, tuple(made), edit, moving))
+            made.append(edit)
+        return EditStack(made)
+
+    @cached_property
+    def ambience(self) -> Ambience:
+        """How the field's colours follow its openness."""
+        if not isinstance(self._field, VoxelField):
+            return Ambience((), ())
+        block = block_of(self._field, EditStack(), self._field.bounds)
+        return ambience_of(block, seen_pairs(self._render, self._cameras, self._field.bounds))
+
+    def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch:
+        stack = EditStack(below)
+        relit = edit.relight == "occlusion" and self.ambience.shows
+        key: Key = (
+            *stack.active,
+            edit.inner,
+            None if moving or not relit else edit.deformed,
+            edit.deleted,
+            edit.keep_source,
+            edit.fill,
+            relit,
+        )
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        patch = patch_of(field, stack, edit, self.ambience if relit else None, settled=not moving)
+        self._kept[key] = patch
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return patch
+
+
+def wants_patch(edit: Edit, moving: bool = False) -> bool:
+    """True for an edit that is shown, and leaves something to be filled or put into another light."""
+    if edit.adjustment != "discrete" or not (edit.enabled and edit.changes_anything):
+        return False
+    if edit.keep_source:
+        return edit.relight != "none" and not moving
+    return edit.fill != "none" or edit.relight != "none"
