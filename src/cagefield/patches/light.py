@@ -6,8 +6,8 @@ The openness of a surface point p with normal n is
 
 D the distance to the nearest solid, for a few reaches r: how much nearer other surfaces are than open space.
 The weights w are fitted to the field, as it is seen: between neighbours on a surface, log colour differs by
-texture, of either sign, and by log o. A field without contact shadows gets weights near 0, and then
-nothing is changed. Weights that add up to less than 1 leave what light reaches the deepest corner.
+texture, of either sign, and by log o. Where that says little, weights stay near usual ones. A field without
+contact shadows gets weights near 0, and then nothing is changed. Weights that add up to less than 1 leave what light reaches the deepest corner.
 
 Source: Evans, "Fast approximations for global illumination on dynamic scenes" (2006), for the openness.
 """
@@ -27,6 +27,12 @@ from cagefield.typing import AnyArray, Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08)
 """The reaches r, shares of the diagonal of what the field holds."""
+
+USUAL, SPREAD = (0.1, 0.2, 0.2, 0.15), 0.2
+"""Weights that are usual where light comes from all around, and their standard deviation."""
+
+ALIKE = 10.0
+"""Pairs that count as one."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -72,7 +78,7 @@ def distances(solid: Mask, block: Block) -> NDArray[np.float32]:
 
 
 def nearness(
-    block: Block, distance: AnyArray, points: Array, normals: Array, reaches: Sequence[float]
+    block: Block, distance: AnyArray, points: AnyArray, normals: AnyArray, reaches: Sequence[float]
 ) -> Array:
     """max(0, 1 - D(p + r n) / r) [N,R] at points [N,3] with normals [N,3], for each reach r."""
     columns = []
@@ -95,11 +101,16 @@ def ambience_of(block: Block, pairs: SeenPairs) -> Ambience:
     second = nearness(block, distance, pairs.other_points, pairs.other_normals, reaches)
     change = pairs.log_change
 
+    usual = np.array(USUAL)
+    # Neighbouring pairs see the same texture.
+    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826 * np.sqrt(ALIKE)
+
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        return ambience.log_openness(second) - ambience.log_openness(first) - change
+        told = ambience.log_openness(second) - ambience.log_openness(first) - change
+        return np.concatenate([told / max(noise, 1e-3), (weights - usual) / SPREAD])
 
-    fit = optimize.least_squares(residuals, np.full(len(reaches), 0.1), bounds=(0.0, 1.0))
+    fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
     return Ambience(reaches, tuple(float(w) * share for w in fit.x))
 
