@@ -19,14 +19,18 @@ from cagefield.edits.partial import partial_edit
 from cagefield.errors import CagefieldError
 from cagefield.exporting.page import NAMES, ScenePage, write_folder
 from cagefield.formats.page_file import bytes_until
+from cagefield.formats.page_splat_edits import encode_page_splat_edits
+from cagefield.formats.page_splats import encode_page_splats
 from cagefield.formats.splat_files import read_splats
 from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.rendering.deformed_splats import changed_splats
 from cagefield.rendering.metrics import psnr
-from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.scene import Scene
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
+from field_page import field_page
+from gpu_objects import COUNT
 from page_fields import MOVE, SIZE
 from splat_scenes import random_splats
 
@@ -86,8 +90,10 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
     page_of = ScenePage.of(scene, "splats", keys, on_progress=told.append)
     assert told == sorted(told) and len(told) > 15 and told[-1] == 1.0
     assert page_of.along is not None and page_of.along.states <= 19
-    # Chords of 8 degrees of arcs of a radius below 1.2: .0024 of it, and the rounding of means.
-    print(page_of.along.error, page_of.along.split, len(page_of.along.data))
+    assert page_of.along.split
+    # Chords of 8 degrees of arcs of a radius below 1.2 are .0024 of it off; splats that begin to be moved or
+    # turned by the next edit between two states are further off.
+    assert 0.0 < page_of.along.error[0] < 6e-3
     file = tmp_path / "scene.html"
     file.write_text(page_of.one_file(), encoding="utf-8")
     line = Timeline(keys, loop=False)
@@ -105,9 +111,7 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
             stack = EditStack([edit for edit in there if edit is not None])
             seen = dataclasses.replace(camera, fx=focal, fy=focal)
             pictures.append(rendered(dataclasses.replace(scene, edits=stack), seen))
-            coarse = SplatRenderer(scene.field).with_edits(stack, coarse=True)
-            whole_ = coarse.render(seen, background=scene.background).rgb8()
-            print(seconds, least, psnr(pixels(page), pictures[-1]), psnr(pixels(page), whole_))
+            assert psnr(pixels(page), pictures[-1]) >= least, seconds
         page.press("body", "h")
         settle(page)
         assert psnr(pixels(page), rendered(scene, camera)) >= 40.0
@@ -146,6 +150,9 @@ def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
         settle(page)
         after = rendered(scene, scene.cameras["test"][0])
         assert 16.0 < psnr(coarse, after) < 36.0
+        # Edits are shown of what is there.
+        unedited = rendered(scene, scene.cameras["test"][0], edits=False)
+        assert psnr(coarse, after) > psnr(coarse, unedited) + 3.0
         assert psnr(pixels(page), after) >= 40.0
 
 
@@ -195,3 +202,23 @@ def test_genuine_splats(tmp_path: Path) -> None:
         page.press("body", "b")
         settle(page)
         assert psnr(pixels(page), rendered(scene, seen[0], edits=False)) >= 40.0
+
+
+def test_renderers_of_splats_that_are_opened_and_closed_leave_nothing() -> None:
+    field = splats_scene(count=400).field
+    edits = EditStack([TURN])
+    changed = encode_page_splat_edits(field, changed_splats(field, edits))
+    camera = splats_scene().cameras["test"][0].resized(60, 60)
+    with field_page(splats=True) as page:
+        page.page.evaluate(COUNT)
+        seen = []
+        for _ in range(4):
+            page.page.evaluate("() => { window.r = new cagefieldViewer.SplatRenderer(gl); }")
+            page.load(encode_page_splats(field))
+            page.edit(changed)
+            page.draw(camera)
+            objects = page.page.evaluate("({...gpuObjects})")
+            assert objects["Texture"] > 5 and objects["Program"] >= 3
+            page.page.evaluate("r.dispose()")
+            seen.append(sum(page.page.evaluate("({...gpuObjects})").values()))
+        assert seen == [seen[0]] * 4 and seen[0] <= 1
