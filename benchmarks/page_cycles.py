@@ -2,9 +2,10 @@
 
 python benchmarks/page_cycles.py [--cycles 100] [-o benchmarks/results/page_cycles.md]
 
-On tiny scenes with an edit, of voxels and of splats: the editor (voxels) with `?render=page`, whose view is turned until the page has drawn
-it, and the pages of `cagefield export`. One tab goes there and back to an empty page; memory is read after
-garbage was collected. Then one renderer after the other in a page that stays, each disposed of.
+On tiny scenes with an edit, of voxels and of splats: the editor (voxels) with `?render=page`, whose view is
+turned until the page has drawn it, and the pages of `cagefield export`. One tab goes there and back to an
+empty page; memory is read after garbage was collected. Then one renderer after the other in a page that
+stays, each disposed of.
 """
 
 from __future__ import annotations

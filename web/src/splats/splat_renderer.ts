@@ -6,6 +6,7 @@
  * that is blended over what is there. The order of many splats comes from a worker: while the view is turned a
  * picture has the order of a moment ago, and `onOrder` says when it is worth drawing again.
  */
+import { TooLarge } from "../field/atlas";
 import type { LoadOptions, Picture } from "../field/field_renderer";
 import { programOf } from "../field/gl";
 import type { Program } from "../field/gl";
@@ -30,7 +31,7 @@ import type { Order } from "./sorter";
 import { CHANGED } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
 import { readSplatLevels } from "./splat_file";
-import { SplatStore } from "./splat_store";
+import { PROJECTED, SplatStore } from "./splat_store";
 import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
@@ -159,7 +160,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.setEdits(changed?.edits ?? null);
   }
 
-  /** What edits changed; null for nothing. Throws where it is of other splats. */
+  /** What edits changed; null for nothing. Throws where it is of other splats, `TooLarge` beyond the memory. */
   setEdits(edits: SplatEdits | null): void {
     this.changed?.texture.dispose();
     this.changed = null;
@@ -167,6 +168,9 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     if (edits === null || (edits.changed === 0 && !edits.hidden.includes(1))) return;
     if (this.store !== null && edits.count !== this.store.header.count)
       throw new Error(`edits of ${edits.count} splats, the page has ${this.store.header.count}; reload it`);
+    const bytes = this.bytes + (4 * CHANGED + PROJECTED) * edits.changed;
+    if (bytes > this.memory)
+      throw new TooLarge(`the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`);
     const texture = new WordTexture(this.gl, edits.records.length);
     if (edits.changed > 0) texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
     this.changed = { edits, texture, set: null, own: null };
@@ -383,6 +387,8 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     return program;
   }
 }
+
+const mebibytes = (bytes: number): number => Math.ceil(bytes / 2 ** 20);
 
 /** The means of changed splats, NaN where those whose colours they have are not there yet. */
 function arrivedOf({ means, records, changed }: SplatEdits, store: SplatStore): Float32Array {
