@@ -88,6 +88,7 @@ def path_edits(
         if mixable(one, other):
             errors.append(_distances(PathState.of(middle), one, other))
     data = encode_page_path(
+        renderer.field,
         times,
         [unique.index(parts) for parts in knots],
         list(states.values()),

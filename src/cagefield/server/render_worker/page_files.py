@@ -36,7 +36,7 @@ class PageFiles:
     def __init__(self, renderers: RendererCache) -> None:
         self._renderers = renderers
         self._for_page: IdentityCache[Edit, Edit] = IdentityCache(64)
-        self._own = EditedRenderers(renderers.plain, True)
+        self._own = EditedRenderers(renderers.plain, True, renderers.scene.patcher)
         """Of stacks with an exact shell, which a page draws with a lattice."""
         self._occupancies: dict[str, Occupancy] = {}
 
