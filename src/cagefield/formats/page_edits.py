@@ -33,7 +33,7 @@ from cagefield.edits import EditStack
 from cagefield.edits.edit import Edit
 from cagefield.errors import EditError
 from cagefield.formats.page_file import LEVEL, byte_planes, pack
-from cagefield.formats.page_layers import digest, encode_layer, layer_key
+from cagefield.formats.page_layers import bricks_of, digest, encode_layer, layer_key
 from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
 from cagefield.typing import Float32
@@ -113,7 +113,7 @@ def encode_changed_edits(
         key = layer_key(layer)
         if key not in has and all(key != before["key"] for before in layers):
             arrays.update(encode_layer(layer, renderer.field, f"layer.{len(layers)}"))
-        layers.append({"key": key, "place": place})
+        layers.append({"key": key, **bricks_of(layer, place)})
     occupancy, codes = _occupancy(renderer.occupancy, has, occupancies or {})
     header = {
         "edits": len(edits),

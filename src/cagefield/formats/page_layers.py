@@ -19,6 +19,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.fields.layers import slices_of
 from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_field import BRICK, encode_vertices, quantised_colours, quantised_density
 from cagefield.typing import Float32
@@ -33,6 +34,12 @@ def layer_key(layer: VoxelField) -> str:
     if layer not in _keys:
         _keys[layer] = digest(layer.vertices, layer.density, layer.sh)
     return _keys[layer]
+
+
+def bricks_of(layer: VoxelField, place: int) -> dict[str, int]:
+    """Slices of bricks along x: the `place` of a layer, the `first` that it is read in, and their `end`."""
+    low, high = slices_of(layer)
+    return {"place": place // BRICK, "first": low // BRICK, "end": high // BRICK}
 
 
 def encode_layer(layer: VoxelField, field: VoxelField, name: str) -> dict[str, NDArray[Any]]:
@@ -79,9 +86,9 @@ def _in_block(layer: VoxelField, field: VoxelField) -> NDArray[np.int64]:
     """The field's vertices [N] in the block of a layer."""
     if not len(layer.vertices):
         return layer.vertices
-    ends = layer.vertices[[0, -1]]
-    low, high = _positions(ends, layer)
-    vertices = field.vertices[slice(*np.searchsorted(field.vertices, ends + [0, 1]))]
+    first, last = layer.vertices[[0, -1]]
+    low, high = _positions(layer.vertices[[0, -1]], layer)
+    vertices = field.vertices[slice(*np.searchsorted(field.vertices, [first, last + 1]))]
     at = _positions(vertices, field)
     return vertices[((at >= low) & (at <= high)).all(axis=1)]
 

@@ -5,7 +5,8 @@
     occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
     lattice.k  [2, 3 N] uint8, halves as in `page_edits`. Entry n of the header's `lattices` says which of
                them the edits of state n have
-    layer.k.*  as `page_layers` has them. Entry n of the header's `layers` has [k, place] of those of state n
+    layer.k.*  as `page_layers` has them. Entry n of the header's `layers` has [k, place, first, end] of those of state
+               n, as `page_layers.bricks_of`
     rows.n     as `page_edits` has them, of state n
 
 Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same
@@ -26,7 +27,7 @@ from cagefield.edits.edit import Edit
 from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_edits import page_rows
 from cagefield.formats.page_file import byte_planes, pack
-from cagefield.formats.page_layers import encode_layer, layer_key
+from cagefield.formats.page_layers import bricks_of, encode_layer, layer_key
 from cagefield.rendering.occupancy import BRICK, Occupancy, encode, masks_of
 from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.packing import (
@@ -108,7 +109,7 @@ def encode_page_path(
             if key not in held:
                 held[key] = len(held)
                 arrays.update(encode_layer(layer, field, f"layer.{held[key]}"))
-            layers[-1].append([held[key], place])
+            layers[-1].append([held[key], *bricks_of(layer, place).values()])
     header = {
         "edits": [len(state.edits) for state in states],
         "boxes": [len(state.packed.boxes) if state.edits else 0 for state in states],

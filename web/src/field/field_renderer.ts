@@ -12,10 +12,12 @@
  */
 import { unrolled } from "./edits_glsl";
 import { EditsOnGpu } from "./edits_on_gpu";
-import { deleteField, uploadLevel, uploadOccupancy } from "./field_textures";
+import type { Layout } from "./atlas";
+import { deleteField, layoutWithin, uploadLevel, uploadLevelNow, uploadOccupancy } from "./field_textures";
 import type { FieldTextures } from "./field_textures";
 import { programOf } from "./gl";
 import type { Program } from "./gl";
+import { LayersOnGpu, placesFor } from "./layers_on_gpu";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
 import { fragment } from "./march_glsl";
@@ -54,6 +56,8 @@ export interface Picture {
 interface Shown {
   level: Level;
   textures: FieldTextures;
+  /** Those of the edits' patches; the coarse level has none, and shows the field in their place. */
+  layers: LayersOnGpu | null;
   occupancy: WebGLTexture;
   /** An occupancy without anything to leap over, for a coarse level under edits: theirs is that of the full one. */
   solid: WebGLTexture | null;
@@ -143,13 +147,14 @@ export class FieldRenderer implements SceneDrawer {
     this.shown = null;
     for (const part of [this.targets, this.views, this.onGpu]) part.forget();
     const turn = ++this.loading;
-    if (shown) await this.take(shown.level, () => turn === this.loading);
     this.setEdits(edits);
+    if (shown) await this.take(shown.level, () => turn === this.loading);
   }
 
   /** The edits that the field is seen through; null for none. Uploads what is other than before. */
   setEdits(edits: PageEdits | null): void {
     this.onGpu.set(edits);
+    this.putLayers();
   }
 
   /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
@@ -191,6 +196,7 @@ export class FieldRenderer implements SceneDrawer {
       gl.uniform1i(uniform("editCount"), active.edits);
       gl.uniform1i(uniform("boxCount"), active.boxes);
       gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
+      gl.uniform1i(uniform("layered"), Number(shown.layers !== null));
     }
     const { first, count } = picture.rows ?? { first: 0, count: height };
     const across = picture.columns ?? { first: 0, count: width };
@@ -241,10 +247,39 @@ export class FieldRenderer implements SceneDrawer {
   }
 
   private async take(level: Level, wanted: () => boolean): Promise<void> {
-    const textures = await uploadLevel(this.gl, level, this.memory, wanted);
+    const { gl } = this;
+    const textures = await uploadLevel(gl, level, this.layoutOf(level), wanted);
     if (textures === null) return;
     this.drop();
-    this.shown = { level, textures, occupancy: uploadOccupancy(this.gl, level.occupancy), solid: null };
+    this.shown = this.shownOf(level, textures);
+    this.putLayers();
+  }
+
+  private shownOf(level: Level, textures: FieldTextures): Shown {
+    const layers = level.last ? new LayersOnGpu(this.gl, textures, level) : null;
+    return { level, textures, layers, occupancy: uploadOccupancy(this.gl, level.occupancy), solid: null };
+  }
+
+  /** The layout of a level, with room for the layers of its edits. Throws `TooLarge` beyond the memory. */
+  private layoutOf(level: Level): Layout {
+    const layers = level.last ? (this.onGpu.edits?.layers ?? []) : [];
+    return layoutWithin(this.gl, level, this.memory, (layout) => placesFor(layers, layout));
+  }
+
+  /** Puts the edits' layers into the field's textures; where they have no room, these are made anew with more. */
+  private putLayers(): void {
+    const layers = this.onGpu.edits?.layers ?? [];
+    const uploaded = this.shown?.layers?.set(layers);
+    if (uploaded === undefined) return;
+    if (uploaded !== null) {
+      this.onGpu.count(uploaded);
+      return;
+    }
+    const { level } = this.shown as Shown;
+    const layout = this.layoutOf(level);
+    this.drop();
+    this.shown = this.shownOf(level, uploadLevelNow(this.gl, level, layout));
+    this.putLayers();
   }
 
   private drop(): void {
