@@ -84,8 +84,8 @@ class ScenePage:
         plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
         found = {"field": encode_page_field(field, step=step, background=scene.background)}
         if scene.edits.active:
-            found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.edits)))
-        along = path_edits(plain, scene.edits, keys, loop)
+            found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
+        along = path_edits(plain, scene.edits, keys, loop, scene.patcher)
         if along is not None:
             found["path"] = along.data
         header = {

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.partial import partial_edit
+from cagefield.edits.patch import Patch
 from cagefield.errors import EditError
 from cagefield.formats.page_edits import LATTICE, for_pages
 from cagefield.formats.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.patches.patcher import Patcher
 from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
 
@@ -52,26 +54,30 @@ class PathEdits:
 
 
 def path_edits(
-    renderer: Renderer, edits: EditStack, keys: Sequence[Keyframe], loop: bool
+    renderer: Renderer, edits: EditStack, keys: Sequence[Keyframe], loop: bool, patcher: Patcher
 ) -> PathEdits | None:
     """The states of `edits` along the path of `keys`; None where all of them have gone all the way all along.
 
     `renderer` draws the field. Raises EditError for an edit that is not possible at a part that is shown.
+
+    Of an edit that moves, `patcher` fills what it left once it has begun, and takes its light along once it
+    has gone all the way: a patch of every state would take some hundred KB each.
     """
     if len(keys) < 2:
         return None
-    edits = for_pages(edits)
     line = Timeline(keys, loop=loop)
     times = _times(line, edits)
     if times is None:
         return None
+    on_way = for_pages(patcher.patched(edits.edits, moving=True))
+    edits = for_pages(patcher.patched(edits.edits))
     knots = [_parts(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
     shells = [n for n in moving if edits[n].adjustment == "continuous"]
     lattices = sum(len({parts[n] for parts in unique}) for n in shells)
     nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
-    stacks = {parts: _stack(edits, parts, moving, nodes) for parts in unique}
+    stacks = {parts: _stack(edits, on_way, parts, moving, nodes) for parts in unique}
     states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
     found: list[Occupancy] = []
     errors: list[NDArray[np.float64]] = []
@@ -81,7 +87,7 @@ def path_edits(
     for k in range(len(knots) - 1):
         if knots[k] == knots[k + 1]:
             continue
-        middle = _stack(edits, _parts(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes)
+        middle = _stack(edits, on_way, _parts(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes)
         renderer = renderer.with_edits(middle)
         found.append(renderer.occupancy)
         one, other = states[knots[k]], states[knots[k + 1]]
@@ -127,7 +133,7 @@ def _parts(line: Timeline, edits: EditStack, seconds: float) -> Parts:
     )
 
 
-def _stack(edits: EditStack, parts: Parts, moving: Sequence[int], nodes: int) -> EditStack:
+def _stack(edits: EditStack, on_way: EditStack, parts: Parts, moving: Sequence[int], nodes: int) -> EditStack:
     """The stack at these parts; the lattices of edits that move have at most `nodes` an axis."""
     found: list[Edit] = []
     for number, (edit, part) in enumerate(zip(edits, parts, strict=True)):
@@ -139,10 +145,32 @@ def _stack(edits: EditStack, parts: Parts, moving: Sequence[int], nodes: int) ->
             raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
         if there is None:
             continue
+        patch = _patch(edits, on_way, parts, number)
+        if patch is not there.patch:
+            there = there.replace(patch=patch)
         if number in moving and there.lattice is not None:
             there = there.replace(lattice=min(nodes, there.lattice))
         found.append(there)
     return EditStack(found)
+
+
+def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | None:
+    """The patch that an edit has at these parts.
+
+    Patches show what the whole edits before them make: there is none while one of these, that reaches into
+    its region, is on its way.
+    """
+    edit, part = edits[number], parts[number]
+    if part < 1.0 and not edit.deleted:
+        edit = on_way[number]
+    if edit.patch is None or part <= 0.0:
+        return None
+    low, high = edit.patch.region.aabb
+    for before, there in zip(edits.edits[:number], parts, strict=False):
+        meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
+        if there < 1.0 and before.enabled and meets.all(axis=1).any():
+            return None
+    return edit.patch
 
 
 def _distances(exact: PathState, one: PathState, other: PathState) -> NDArray[np.float64]:
