@@ -18,7 +18,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -337,9 +337,10 @@ class Scene:
         from cagefield.patches.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of
 
+        plain = cache(lambda: renderer_of(self.field))
+
         def render(camera: Camera) -> RenderResult:
-            plain = self.__dict__.setdefault("_plain", renderer_of(self.field))
-            return cast(RenderResult, plain.render(camera, background="black", normals=True))
+            return cast(RenderResult, plain().render(camera, background="black", normals=True))
 
         return Patcher(self.field, self.cameras.get("train", ()), render)
 

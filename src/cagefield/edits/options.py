@@ -45,7 +45,8 @@ def problem_of_options(
 ) -> str | None:
     """What is wrong with an edit's options, and the cure; None where they go together.
 
-    `fading` is (falloff, width), `surroundings` (fill, relight). See `cagefield.edits.edit.Edit` for what each of them means.
+    `fading` is (falloff, width), `surroundings` (fill, relight). See
+    `cagefield.edits.edit.Edit` for what each of them means.
     """
     if adjustment not in ("continuous", "discrete"):
         return f'adjustment must be "continuous" or "discrete", got "{adjustment}"'

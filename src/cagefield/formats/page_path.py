@@ -5,8 +5,8 @@
     occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
     lattice.k  [2, 3 N] uint8, halves as in `page_edits`. Entry n of the header's `lattices` says which of
                them the edits of state n have
-    layer.k.*  as `page_layers` has them. Entry n of the header's `layers` has [k, place, first, end] of those of state
-               n, as `page_layers.bricks_of`
+    layer.k.*  as `page_layers` has them. Entry n of the header's `layers` has those of state n: [k, place,
+               first, end], see `page_layers.bricks_of`
     rows.n     as `page_edits` has them, of state n
 
 Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same

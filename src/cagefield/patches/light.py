@@ -6,27 +6,35 @@ The openness of a surface point p with normal n is
 
 D the distance to the nearest solid, for a few reaches r: how much nearer other surfaces are than open space.
 The weights w are fitted to the field, as it is seen: between neighbours on a surface, log colour differs by
-texture, of either sign, and by log o. A field without contact shadows gets weights near 0, and then
-nothing is changed. Weights that add up to less than 1 leave what light reaches the deepest corner.
+texture, of either sign, and by log o. Where that says little, weights stay near usual ones. A field without
+contact shadows gets weights near 0, and then nothing is changed. Weights that add up to less than 1 leave
+the light that reaches the deepest corner.
 
 Source: Evans, "Fast approximations for global illumination on dynamic scenes" (2006), for the openness.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
-from cagefield.patches.block import Block
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import SOLID, Block
 from cagefield.patches.seen import SeenPairs
 from cagefield.typing import AnyArray, Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08)
 """The reaches r, shares of the diagonal of what the field holds."""
+
+USUAL, SPREAD = (0.1, 0.2, 0.2, 0.15), 0.2
+"""Weights that are usual where light comes from all around, and their standard deviation."""
+
+ALIKE = 10.0
+"""Pairs that count as one."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -36,6 +44,12 @@ SHOWING = 0.1
 
 ENOUGH = 150
 """Pairs from which weights are fitted, at least."""
+
+FINEST = 128
+"""Vertices along the longest axis of the grid on which distances in a whole field are found."""
+
+FAR = 1e9
+"""A distance beyond all reaches."""
 
 SMOOTH = 2.0
 """Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
@@ -63,43 +77,68 @@ class Ambience:
         return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
 
 
-def distances(solid: Mask, block: Block) -> NDArray[np.float32]:
-    """Distance [X,Y,Z] in world units of the vertices of a block to its nearest solid one."""
+Distance = Callable[[Array], NDArray[np.float64]]
+"""Distances [N] in world units of points [N,3] to the nearest solid."""
+
+
+def distance_in(block: Block, solid: Mask) -> Distance:
+    """The distance to what is solid [X,Y,Z] of a block; far outside of the block."""
     if not solid.any():
-        return np.full(solid.shape, 1e9, np.float32)
+        return lambda points: np.full(len(points), FAR)
     spacing = tuple(float(edge) for edge in block.field.voxel_size)
-    return np.asarray(ndimage.distance_transform_edt(~solid, sampling=spacing), np.float32)
+    values = ndimage.distance_transform_edt(~solid, sampling=spacing)
+    return lambda points: block.lookup(values, points, outside=FAR)
 
 
-def nearness(
-    block: Block, distance: AnyArray, points: Array, normals: Array, reaches: Sequence[float]
-) -> Array:
+def distance_in_field(field: VoxelField) -> Distance:
+    """The distance to what is solid in all of a field, on a grid of at most FINEST vertices an axis."""
+    stride = -(-max(field.resolution) // FINEST)
+    solid = np.zeros(field.resolution, bool)
+    solid.reshape(-1)[field.vertices[field.density * field.sample_spacing > SOLID]] = True
+    solid = np.pad(solid, [(0, -n % stride) for n in field.resolution])
+    nx, ny, nz = (n // stride for n in solid.shape)
+    pooled = solid.reshape(nx, stride, ny, stride, nz, stride).any(axis=(1, 3, 5))
+    values = np.full(pooled.shape, FAR)
+    if pooled.any():
+        values = ndimage.distance_transform_edt(~pooled, sampling=tuple(stride * field.voxel_size))
+
+    def lookup(points: Array) -> NDArray[np.float64]:
+        g = (field.grid_coordinates(points) - 0.5 * (stride - 1)) / stride
+        return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=FAR))
+
+    return lookup
+
+
+def nearness(distance: Distance, points: Array, normals: AnyArray, reaches: Sequence[float]) -> Array:
     """max(0, 1 - D(p + r n) / r) [N,R] at points [N,3] with normals [N,3], for each reach r."""
-    columns = []
-    for reach in reaches:
-        found = block.lookup(distance, points + reach * normals, outside=1e9)
-        columns.append(np.clip(1.0 - found / reach, 0.0, 1.0))
-    return np.stack(columns, axis=1)
+    found = [distance(points + reach * normals) / reach for reach in reaches]
+    return np.clip(1.0 - np.stack(found, axis=1), 0.0, 1.0)
 
 
-def ambience_of(block: Block, pairs: SeenPairs) -> Ambience:
-    """The weights that explain the colours of a field's surfaces; `block` holds all of the field."""
-    at = np.argwhere(block.solid)
+def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
+    """The weights that explain the colours of a field's surfaces, as they are seen."""
     nothing = Ambience((), ())
-    if len(at) < ENOUGH or len(pairs.points) < ENOUGH:
+    dense = field.vertices[field.density * field.sample_spacing > SOLID]
+    if len(dense) < ENOUGH or len(pairs.points) < ENOUGH:
         return nothing
-    span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * block.field.voxel_size
+    at = np.stack(np.unravel_index(dense[:: max(1, len(dense) // 100_000)], field.resolution), axis=1)
+    span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * field.voxel_size
     reaches = tuple(share * float(np.linalg.norm(span)) for share in REACHES)
-    distance = distances(block.solid, block)
-    first = nearness(block, distance, pairs.points, pairs.normals, reaches)
-    second = nearness(block, distance, pairs.other_points, pairs.other_normals, reaches)
+    distance = distance_in_field(field)
+    first = nearness(distance, pairs.points, pairs.normals, reaches)
+    second = nearness(distance, pairs.other_points, pairs.other_normals, reaches)
     change = pairs.log_change
+
+    usual = np.array(USUAL)
+    # Neighbouring pairs see the same texture.
+    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826 * np.sqrt(ALIKE)
 
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        return ambience.log_openness(second) - ambience.log_openness(first) - change
+        told = ambience.log_openness(second) - ambience.log_openness(first) - change
+        return np.concatenate([told / max(noise, 1e-3), (weights - usual) / SPREAD])
 
-    fit = optimize.least_squares(residuals, np.full(len(reaches), 0.1), bounds=(0.0, 1.0))
+    fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
     return Ambience(reaches, tuple(float(w) * share for w in fit.x))
 

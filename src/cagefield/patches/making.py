@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -13,7 +14,7 @@ from cagefield.edits.patch import Patch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block, block_of
-from cagefield.patches.light import Ambience, Lighting, distances, lit_vertices, nearness
+from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Mask
 from cagefield.warps.inner_map import HexahedronMap
@@ -39,13 +40,13 @@ def patch_of(
     work = _Work.of(field, below, edit, ambience, settled)
     under, part = work.emptied, None
     lighting = None
-    support = None if edit.keep_source or edit.fill == "none" else work.support(under)
+    support = None if edit.keep_source or edit.fill == "none" else work.support()
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
         under = under.relit(lighting.where, np.exp(lighting.log_ratio))
         part = work.relit_part(ambience) if work.settled else None
     if support is not None:
-        hidden = work.rim(under) & (ndimage.distance_transform_edt(~work.part) < CLOSE)
+        hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
         if lighting is not None:
             hidden |= lighting.dense(under) > UNSURE
         footprint = footprint_of(under, support, work.part, hidden)
@@ -91,18 +92,27 @@ class _Work:
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
 
-    def rim(self, block: Block) -> Mask:
+    @cached_property
+    def rim(self) -> Mask:
         """Surface vertices around V^c."""
+        block = self.emptied
         spacing = tuple(float(edge) for edge in block.field.voxel_size)
         away = ndimage.distance_transform_edt(~self.inside, sampling=spacing)
         size = np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0])
         near = away < max(RIM * max(spacing), 0.5 * float(size))
         solid = block.solid
-        return np.asarray(solid & ndimage.binary_dilation(~solid) & near & ~self.inside & lit_vertices(block))
+        around = solid & ndimage.binary_dilation(~solid) & near & ~self.inside
+        return np.asarray(around & lit_vertices(block))
 
-    def support(self, block: Block) -> Support | None:
+    def support(self) -> Support | None:
         """What the part stood on."""
-        return support_of(block, self.part, self.rim(block))
+        return support_of(self.emptied, self.part, self.rim)
+
+    @cached_property
+    def _distances(self) -> tuple[Distance, Distance]:
+        """Distances to what was solid, and to what is then."""
+        block = self.emptied
+        return distance_in(block, self.before.solid), distance_in(block, self.solid_after())
 
     def solid_after(self) -> Mask:
         """What is solid [X,Y,Z] once the part is where it is moved to, or gone."""
@@ -120,8 +130,8 @@ class _Work:
         where = lit_vertices(block)
         points, normals = block.positions(where), block.normals[where]
         logs = [
-            ambience.log_openness(nearness(block, distances(solid, block), points, normals, ambience.reaches))
-            for solid in (self.before.solid, self.solid_after())
+            ambience.log_openness(nearness(distance, points, normals, ambience.reaches))
+            for distance in self._distances
         ]
         return Lighting(where, logs[1] - logs[0]).smoothed(block)
 
@@ -134,10 +144,9 @@ class _Work:
         turned = np.einsum("nji,nj->ni", np.linalg.inv(jacobian), normals[inside])
         turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
         log = np.zeros(len(points))
-        new = nearness(block, distances(self.solid_after(), block), moved, turned, ambience.reaches)
-        old = nearness(
-            block, distances(block.solid, block), points[inside], normals[inside], ambience.reaches
-        )
+        before, after = self._distances
+        new = nearness(after, moved, turned, ambience.reaches)
+        old = nearness(before, points[inside], normals[inside], ambience.reaches)
         log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
         lighting = Lighting(where, log).smoothed(block)
         block = block.relit(where, np.exp(lighting.log_ratio))

@@ -11,7 +11,6 @@ from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import Patch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import block_of
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
 from cagefield.patches.seen import seen_pairs
@@ -61,8 +60,7 @@ class Patcher:
         """How the field's colours follow its openness."""
         if not isinstance(self._field, VoxelField):
             return Ambience((), ())
-        block = block_of(self._field, EditStack(), self._field.bounds)
-        return ambience_of(block, seen_pairs(self._render, self._cameras, self._field.bounds))
+        return ambience_of(self._field, seen_pairs(self._render, self._cameras, self._field.bounds))
 
     def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch:
         stack = EditStack(below)

@@ -230,12 +230,14 @@ def _integrate(
     t, rate, seen = _along(field.field, rays, s)
     points = (rays.origins[:, None] + t[..., None] * rays.directions[:, None]).reshape(-1, 3)
     viewdirs = rays.directions[:, None].expand(*s.shape, 3).reshape(-1, 3)
-    gain = None
-    if mapped is not None:
-        points, viewdirs, gain = mapped(points, viewdirs)
-    sigma, rgb = field(points, viewdirs, network, 0.0 if jitter is None else jitter.noise)
-    if gain is not None:
-        sigma = sigma * gain
+
+    def evaluate(p: Tensor, d: Tensor) -> tuple[Tensor, Tensor]:
+        return field(p, d, network, 0.0 if jitter is None else jitter.noise)
+
+    if mapped is None:
+        sigma, rgb = evaluate(points, viewdirs)
+    else:
+        sigma, rgb = mapped.evaluated(points, viewdirs, evaluate)
     sigma = torch.where(seen[:, None], sigma.reshape(s.shape), torch.zeros_like(s))
     delta = torch.cat([s[:, 1:] - s[:, :-1], torch.full_like(s[:, :1], ENDLESS)], dim=1) * rate
     alpha = 1.0 - torch.exp(-sigma * delta)

@@ -35,3 +35,4 @@ def map_tensors(
                 if not unchanged:
                     gain *= length / qd.max(d.norm(), 1e-20)
             out[i, 6] = gain
+            out[i, 7] = qd.cast(place, qd.f32)
