@@ -261,9 +261,9 @@ def test_patches_are_those_of_edits_that_have_begun_and_of_whole_ones() -> None:
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     # The edit before goes all the way first.
     keys = (
-        Keyframe(pose, 45.0, 0.1, {1: 0.0, 2: 0.0}),
-        Keyframe(pose, 45.0, 0.1, {1: 1.0, 2: 0.5}),
-        Keyframe(pose, 45.0, 0.1, {1: 1.0, 2: 1.0}),
+        Keyframe(pose, 45.0, 0.3, {1: 0.0, 2: 0.0}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 0.5}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 1.0}),
     )
     found = path_edits(Renderer(field), EditStack([MOVE, above]), keys, False, cast(Patcher, patches))
     assert found is not None
