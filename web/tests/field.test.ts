@@ -1,3 +1,4 @@
+import { deflateSync } from "node:zlib";
 import { describe, expect, it } from "vitest";
 import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
 import { joined, summed } from "../src/field/level";
@@ -5,7 +6,7 @@ import type { Level, Vec3 } from "../src/field/level";
 import { Pacing } from "../src/field/pacing";
 import { Choice, memoryLimit } from "../src/field/choice";
 import { patched } from "../src/field/page_edits";
-import { indexWith, ownBricks } from "../src/field/page_layers";
+import { indexWith, ownBricks, readLayer } from "../src/field/page_layers";
 import type { Layer } from "../src/field/page_layers";
 import { Places } from "../src/field/places";
 import { Stored } from "../src/field/stored";
@@ -88,6 +89,30 @@ function layer(key: string, cells = [0, 1]): Layer {
 } // prettier-ignore
 
 describe("layers of a field", () => {
+  it("are unpacked from their arrays", async () => {
+    const arrays: [string, string, Uint8Array][] = [
+      ["box", "i4", new Uint8Array(Int32Array.from([1, 2, 3, 1, 1, 2]).buffer)],
+      ["cells", "u1", Uint8Array.from([0, 2])],
+      ["bricks", "u1", Uint8Array.from([1, 0])],
+      ["masks", "u1", new Uint8Array(64).fill(3, 0, 1)],
+      ["density", "u1", Uint8Array.from([1, 2, 3, 4])],
+      ["sh", "u1", Uint8Array.from([1, 1, 0, 255, 2, 0])],
+    ];
+    const blobs = arrays.map(([, , data]) => deflateSync(data));
+    const entries = arrays.map(([name, type], n) => ({ name: `layer.0.${name}`, type, shape: [], bytes: blobs[n].length }));
+    const text = new TextEncoder().encode(JSON.stringify({ arrays: entries }));
+    const start = new Uint8Array(16);
+    start.set(new TextEncoder().encode("somefile"));
+    new DataView(start.buffer).setUint32(8, 1, true);
+    new DataView(start.buffer).setUint32(12, text.length, true);
+    const whole = Uint8Array.from([...start, ...text, ...blobs.flatMap((blob) => [...blob])]);
+    const read = await readLayer(await PageFile.open(new ByteReader(whole.buffer), "somefile", 1), "layer.0", "a");
+    expect([read.key, read.low, read.dims]).toEqual(["a", [1, 2, 3], [1, 1, 2]]);
+    expect([[...read.cells], [...read.density], [...read.sh]]).toEqual([[0, 2], [0x301, 0x402], [129, 130, 128, 127, 130, 130]]); // prettier-ignore
+    const stored = new Stored(read, 8, read.low, read.dims);
+    expect([stored.slot(8, 16, 24), stored.slot(8, 16, 25), stored.slot(8, 16, 26), stored.slot(7, 16, 24)]).toEqual([0, 1, -1, -1]);
+  });
+
   it("have their own vertices, and the field's where they have none", () => {
     const layout = layoutOf(level(), 256, 3);
     const stored = [new Stored(layer("a"), 8, [0, 0, 0], [2, 1, 1]), Stored.ofLevel(level())];

@@ -72,7 +72,9 @@ def _other(
 
     A vertex that the layer does not have is empty: density 0, grey.
     """
-    vertices = np.union1d(layer.vertices, _in_block(layer, field))
+    # Two sorted runs, which a stable sort merges.
+    vertices = np.sort(np.concatenate([layer.vertices, _in_block(layer, field)]), kind="stable")
+    vertices = vertices[np.diff(vertices, prepend=-1) > 0]
     one, other = (_values(source, vertices) for source in (layer, field))
     apart = (one[0] != other[0]) | (one[1] != other[1]).any(axis=(1, 2))
     vertices = vertices[apart]
@@ -123,8 +125,10 @@ def _cells(
 ) -> NDArray[np.bool_]:
     """[dims], which bricks of cells of a box have one of the vertices [N,3] at a cell."""
     found = np.zeros(dims, bool)
+    at = at[((at >= low * BRICK) & (at <= (low + dims) * BRICK)).all(axis=1)]
     for corner in np.ndindex(2, 2, 2):
-        cell = at - np.array(corner)
+        # The cells on the lower sides of a vertex lie in another brick where it is the first one of its own.
+        cell = at[(at[:, np.flatnonzero(corner)] % BRICK == 0).all(axis=1)] - np.array(corner)
         brick = cell // BRICK - low
         inside = (cell >= 0) & (cell < resolution - 1) & (brick >= 0) & (brick < dims)
         found[tuple(brick[inside.all(axis=1)].T)] = True
