@@ -63,6 +63,8 @@ class Block:
     @cached_property
     def normals(self) -> Float32:
         """Unit normals [X,Y,Z,3], against the gradient of a smoothed opacity; 0 where that is flat."""
+        if min(self.shape) < 3:
+            return np.zeros((*self.shape, 3), np.float32)
         smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
         slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
         length = np.linalg.norm(slope, axis=-1, keepdims=True)
@@ -77,11 +79,14 @@ class Block:
         g = self.field.grid_coordinates(points) - self.low
         return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=outside))
 
-    def with_density(self, where: Mask, density: Float32) -> Block:
-        """The block with the densities [N] at the vertices of a mask; those without colour become grey."""
+    def with_density(self, where: Mask, density: Float32, *, slots: bool = False) -> Block:
+        """The block with the densities [N] at the vertices of a mask; those without colour become grey.
+
+        Empty ones have no colour unless they get `slots`: beside a surface it shows.
+        """
         values = self.density.copy()
         values[where] = density
-        fresh = where & (values > 0.0) & (self.slot < 0)
+        fresh = where & ((values > 0.0) | slots) & (self.slot < 0)
         slot = self.slot.copy()
         slot[fresh] = len(self.sh) + np.arange(int(fresh.sum()))
         sh = np.concatenate([self.sh, np.zeros((int(fresh.sum()), *self.sh.shape[1:]), np.float32)])
@@ -112,7 +117,8 @@ class Block:
         kept = self.slot >= 0
         kept[0, 0, 0] = kept[-1, -1, -1] = True
         slot = self.slot[kept]
-        sh = np.where((slot >= 0)[:, None, None], self.sh[slot], np.float32(0.0))
+        known = np.concatenate([self.sh, np.zeros((1, *self.sh.shape[1:]), np.float32)])
+        sh = known[np.where(slot >= 0, slot, len(self.sh))]
         density = np.where(slot >= 0, self.density[kept], np.float32(0.0))
         field = self.field
         return VoxelField(field.bounds, field.resolution, self.vertices[kept], density, sh, field.contracted)
@@ -129,9 +135,11 @@ def block_of(field: VoxelField, below: EditStack, box: Array) -> Block:
     """
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
     g = field.grid_coordinates(corners)
-    low = np.maximum(np.floor(g.min(axis=0)).astype(np.int64) - 1, 0)
-    high = np.minimum(np.ceil(g.max(axis=0)).astype(np.int64) + 1, np.array(field.resolution) - 1)
-    shape = np.maximum(high - low + 1, 1)
+    last = np.array(field.resolution) - 1
+    low = np.clip(np.floor(g.min(axis=0)).astype(np.int64) - 1, 0, np.maximum(last - 2, 0))
+    high = np.minimum(np.ceil(g.max(axis=0)).astype(np.int64) + 1, last)
+    # Normals need three vertices.
+    shape = np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
     block = _stored(field, low, shape)
     for first in range(0, int(shape.prod()) if below.active else 0, AT_ONCE):
         block = _through(block, below, np.arange(first, min(first + AT_ONCE, int(shape.prod()))))

@@ -153,7 +153,7 @@ class Lighting:
     def smoothed(self, block: Block) -> Lighting:
         """The same, smoothed along surfaces."""
         weight = np.zeros(block.shape)
-        weight[self.where] = np.minimum(block.depth[self.where], 1.0)
+        weight[self.where] = np.minimum(block.depth[self.where], 1.0) + 1e-3
         values = np.zeros(block.shape)
         values[self.where] = self.log_ratio * weight[self.where]
         total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
@@ -172,5 +172,5 @@ class Lighting:
 
 
 def lit_vertices(block: Block) -> Mask:
-    """Vertices [X,Y,Z] whose colour shows and whose normal is known."""
-    return np.asarray((block.slot >= 0) & (block.depth > 0.01) & ((block.normals**2).sum(axis=-1) > 0.25))
+    """Vertices [X,Y,Z] whose colour shows, also those beside a surface, and whose normal is known."""
+    return np.asarray((block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25))

@@ -202,7 +202,7 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
     deep = np.zeros(block.shape, bool)
     deep[tuple(voxels[new & (height < -1.5)].T)] = True
     values = np.where(below & deep, block.density, values)
-    block = block.with_density(where, values[where])
+    block = block.with_density(where, values[where], slots=True)
     known_columns = (u[around], v[around], height[around])
     return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
 

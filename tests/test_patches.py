@@ -1,0 +1,325 @@
+"""Patches: what edits uncover goes on, shadows go along, and every renderer reads the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits.patch import Patch
+from cagefield.errors import EditError, EditFileError
+from cagefield.fields.layers import ALIGNED, places_of, slices_of
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import block_of, interpolated
+from cagefield.patches.light import Ambience
+from cagefield.patches.making import patch_of
+from cagefield.patches.patcher import Patcher, wants_patch
+from cagefield.patches.support import membrane
+from cagefield.rendering.reference_renderer import render_sampled
+from cagefield.rendering.renderer import Renderer
+from cagefield.scene import Scene
+
+C0 = 0.28209479177387814
+FLOOR, TOP = -0.5, 0.1
+STRENGTH = 0.7
+"""How much of its light a corner lacks."""
+
+
+def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
+    """PSNR of two pictures."""
+    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
+
+
+def room(box: bool, *, scale: float = 1.0, resolution: int = 44, reach: float = 0.3) -> VoxelField:
+    """A coloured floor, with a box on it or without one, shaded by how near the other is.
+
+    Under the box, which no photo would show, the floor is black.
+    """
+    axis = np.linspace(-1.0, 1.0, resolution)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    edge = axis[1] - axis[0]
+    floor = (z <= FLOOR) & (z > FLOOR - 4.0 * edge)
+    block = (np.abs(x - 0.1) < 0.25) & (np.abs(y) < 0.25) & (z > FLOOR) & (z < TOP) & box
+    solid = floor | block
+    rgb = np.zeros((*solid.shape, 3))
+    rgb[floor] = np.stack([0.45 + 0.2 * x, 0.55 + 0.15 * y, 0.5 - 0.1 * x], axis=-1)[floor]
+    rgb[block] = (0.8, 0.3, 0.2)
+    if box:
+        from_block = ndimage.distance_transform_edt(~block) * edge
+        from_floor = ndimage.distance_transform_edt(~floor) * edge
+        other = np.where(floor, from_block, from_floor)
+        rgb *= (1.0 - STRENGTH * np.clip(1.0 - other / reach, 0.0, 1.0))[..., None]
+        rgb[floor & (np.abs(x - 0.1) < 0.25) & (np.abs(y) < 0.25)] = 0.0
+    # As in a trained field, the empty vertices beside a surface have its colours.
+    away, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
+    rgb = rgb[tuple(nearest)]
+    vertices = np.flatnonzero(away < 2.0)
+    density = np.where(solid.reshape(-1)[vertices], 2.0 / (edge * scale), 0.0)
+    return VoxelField(
+        np.array([[-scale] * 3, [scale] * 3]),
+        (resolution,) * 3,
+        vertices,
+        density.astype(np.float32),
+        ((rgb.reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
+    )
+
+
+def cage(scale: float = 1.0) -> Cage:
+    """Around the box, from a voxel above the floor on."""
+    return Cage.box(
+        scale * np.array([0.1, 0.0, 0.5 * (FLOOR + 0.04 + TOP + 0.06)]), scale * np.array([0.6, 0.6, 0.62])
+    )
+
+
+def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
+    """Around the floor, from above."""
+    return turntable((0.0, 0.0, -0.3 * scale), 3.0 * scale, 8, elevation=0.7, width=72, height=72, fov_x=0.6)
+
+
+def seen(scene: Scene) -> NDArray[np.float32]:
+    """Pictures of a scene from some of its cameras."""
+    return np.stack([scene.render(camera).rgb for camera in cameras(float(scene.field.bounds[1, 0]))[::4]])
+
+
+@pytest.fixture(scope="module")
+def scenes() -> tuple[Scene, Scene]:
+    """(the floor with its box, the floor alone)."""
+    both = (Scene(room(box), cameras={"train": cameras()}) for box in (True, False))
+    return next(both), next(both)
+
+
+def test_a_box_leaves_no_trace(scenes: tuple[Scene, Scene]) -> None:
+    scene, truth = scenes
+    found = {}
+    for fill, relight in (("none", "none"), ("surroundings", "none"), ("surroundings", "occlusion")):
+        edit = dataclasses.replace(Edit.delete(cage()), fill=fill, relight=relight)
+        found[fill, relight] = db(seen(scene.with_edits(EditStack([edit]))), seen(truth))
+    none, filled, both = found.values()
+    assert filled > none + 2.0 and both > filled + 4.0 and both > 30.0, found
+
+
+def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:
+    scene, _ = scenes
+    large = Scene(room(True, scale=50.0), cameras={"train": cameras(50.0)})
+    small = seen(scene.with_edits(EditStack([Edit.delete(cage())])))
+    assert db(seen(large.with_edits(EditStack([Edit.delete(cage(50.0))]))), small) > 40.0
+
+
+def test_the_fit_finds_the_shade_and_none_where_none_is(scenes: tuple[Scene, Scene]) -> None:
+    scene, _ = scenes
+    ambience = scene.patcher.ambience
+    assert ambience.shows and 0.4 < sum(ambience.weights) < 0.95
+    field = scene.field
+    assert isinstance(field, VoxelField)
+    plain = dataclasses.replace(field, sh=np.zeros_like(field.sh))
+    assert sum(Scene(plain, cameras=scene.cameras).patcher.ambience.weights) < 0.1
+    bare = Scene(plain).patcher.ambience  # without cameras it is looked at from around
+    assert sum(bare.weights) < 0.2
+
+
+def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
+    """The box at its new place shades the floor there, about as much as where it stood."""
+    scene, truth = scenes
+    moved = Edit(cage(), adjustment="discrete").translate((-0.8, 0.0, 0.0))
+
+    def beside(edit: Edit, x: float) -> float:
+        """How bright the floor is beside the box at x, over what it is without a box."""
+        eye = (x, -0.29, 1.5)
+        camera = Camera.look_at(eye, (x, -0.289, FLOOR), width=3, height=3, fov_x=0.01)
+        own = scene.with_edits(EditStack([edit])).render(camera).rgb.mean()
+        return float(own / truth.render(camera).rgb.mean())
+
+    left = dataclasses.replace(moved, relight="none")
+    assert beside(left, 0.1) < 0.85 and beside(moved, 0.1) > 0.8
+    assert beside(left, -0.7) > 0.95 and beside(moved, -0.7) < 0.8
+
+
+def test_switched_off_nothing_is_patched(scenes: tuple[Scene, Scene]) -> None:
+    scene, _ = scenes
+    edit = dataclasses.replace(Edit.delete(cage()), fill="none", relight="none")
+    assert not wants_patch(edit) and scene.with_edits(EditStack([edit])).patched_edits[0].patch is None
+    plain = Renderer(scene.field, EditStack([edit])).render(cameras()[0])  # type: ignore[arg-type]
+    own = scene.with_edits(EditStack([edit])).render(cameras()[0])
+    assert plain is not None and np.array_equal(plain.rgb, own.rgb)
+    continuous = Edit(cage(), cage().grown(0.1)).translate((0.05, 0.0, 0.0))
+    assert not wants_patch(continuous) and not wants_patch(Edit.delete(cage()).replace(enabled=False))
+
+
+def test_patches_are_kept_while_a_cage_is_dragged(scenes: tuple[Scene, Scene]) -> None:
+    scene, _ = scenes
+    edit = Edit(cage(), adjustment="discrete").translate((-0.5, 0.0, 0.0))
+    further = edit.translate((-0.2, 0.0, 0.0))
+    first, second = (scene.patcher.patched([e], moving=True)[0].patch for e in (edit, further))
+    assert first is second and first is not None and first.part is None
+    settled = scene.patcher.patched([further])[0].patch
+    assert settled is not first and settled is not None and settled.part is not None
+    assert scene.patcher.patched([further])[0].patch is settled
+
+
+def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, float]) -> VoxelField:
+    """A layer of one colour in a box, as dense as its height says."""
+    block = block_of(field, EditStack(), box)
+    every = np.ones(block.shape, bool)
+    heights = block.positions(every)[:, 2]
+    full = block.with_density(every, (20.0 * (heights > 0.0)).astype(np.float32))
+    return full.with_colours(full.slot >= 0, np.broadcast_to(rgb, (int((full.slot >= 0).sum()), 3))).layer()
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
+    field = dataclasses.replace(room(True, resolution=24), contracted=contracted)
+    if contracted:
+        # Nothing lies beyond the box of interest, which the oracle samples evenly.
+        at = np.stack(np.unravel_index(field.vertices, field.resolution), axis=1)
+        kept = (np.abs(at - 11.5) < 5.0).all(axis=1)
+        field = VoxelField(
+            field.bounds * 0.4,
+            field.resolution,
+            field.vertices[kept],
+            field.density[kept],
+            field.sh[kept],
+            contracted=True,
+        )
+    box = np.array([[-0.3, -0.4, -0.6], [0.5, 0.4, 0.5]]) * (0.4 if contracted else 1.0)
+    inner = Cage.box(box.mean(axis=0), 0.7 * (box[1] - box[0]))
+    size = float(box[1, 0] - box[0, 0])
+    patch = Patch(
+        Cage.box(box.mean(axis=0), 0.95 * (box[1] - box[0])),
+        other(field, box, (0.1, 0.6, 0.2)),
+        other(field, box, (0.2, 0.2, 0.9)),
+    )
+    edit = Edit(inner, adjustment="discrete").translate((-size, 0.0, 0.1 * size)).rotate((0.0, 0.0, 0.4))
+    earlier = Edit(inner, inner.grown(0.2 * size), lattice=16).translate((0.05 * size, 0.0, 0.0))
+    stack = EditStack([earlier, edit.replace(patch=patch)])
+    assert len(set(stack.places)) == 2 and min(stack.places) >= max(field.resolution) - ALIGNED
+    camera = Camera.look_at(
+        (1.2 * size, -2.5 * size, 1.4 * size), tuple(box.mean(axis=0)), width=40, height=40, fov_x=0.7
+    )
+    frame = Renderer(field, stack, step=0.25).render(camera, background="black")
+    assert frame is not None
+    source = field.__call__ if contracted else field
+    oracle = render_sampled(
+        source, camera, near=0.0, far=8.0 * size, samples=1000, edits=stack, background="black"
+    )
+    plain = render_sampled(
+        source, camera, near=0.0, far=8.0 * size, samples=500, background="black",
+        edits=EditStack([earlier, edit]),
+    )  # fmt: skip
+    assert db(frame.rgb, oracle.rgb) > 36.0 > 25.0 > db(plain.rgb, oracle.rgb)
+    # Without the patch the grid of the field is used as it was.
+    assert Renderer(field, stack).with_edits(EditStack([])).grid.layers == ()
+
+
+def test_layers_lie_behind_the_field_and_apart() -> None:
+    field = room(True, resolution=24)
+    low, high = (
+        other(field, np.array(box), (0.5, 0.5, 0.5))
+        for box in ([[-1, -1, -1], [0, 0, 0]], [[0, 0, 0], [1, 1, 1]])
+    )
+    places = places_of((low, high, low))
+    spans = [
+        (p + slices_of(layer)[0], p + slices_of(layer)[1])
+        for p, layer in zip(places, (low, high, low), strict=True)
+    ]
+    assert all(p % ALIGNED == 0 for p in places) and spans[0][0] >= 24
+    assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
+
+
+def test_a_patch_over_an_earlier_edit_shows_what_that_made() -> None:
+    field = room(True)
+    earlier = Edit(cage(), adjustment="discrete").translate((-0.7, 0.0, 0.0)).rotate((0.0, 0.0, 0.5))
+    block = block_of(field, EditStack([earlier]), np.array([[-0.9, -0.4, -0.7], [0.5, 0.4, 0.3]]))
+    mapped = EditStack([earlier]).to_canonical(block.positions(np.ones(block.shape, bool)))
+    raw, _ = interpolated(field, mapped.points)
+    expected = np.where(mapped.layer < 0, 0.0, np.maximum(raw, 0.0)).reshape(block.shape)
+    np.testing.assert_allclose(np.maximum(block.density, 0.0), expected, atol=1e-4 * expected.max())
+    # The box that was moved is taken away again, where it is now.
+    again = Edit.delete(earlier.deformed)
+    patch = patch_of(field, EditStack([earlier]), again, None)
+    at = earlier.deformed.center[None]
+    assert interpolated(patch.under, at)[0][0] <= 0.0
+
+
+def test_membranes_are_harmonic() -> None:
+    u, v = np.meshgrid(np.arange(20.0), np.arange(14.0), indexing="ij")
+    hole = (u > 4) & (u < 15) & (v > 3) & (v < 11)
+    values = np.stack([2.0 * u - v + 3.0, u * v], axis=-1).reshape(-1, 2)  # both harmonic on a grid
+    table = np.where(hole.reshape(-1, 1), 0.0, values)
+    np.testing.assert_allclose(membrane(hole, ~hole, table), values, atol=1e-2)
+
+
+def test_a_table_ends_at_its_edge(scenes: tuple[Scene, Scene]) -> None:
+    """A box that stands over a floor's edge leaves no floor in the air."""
+    field = room(True)
+    x = np.linspace(-1.0, 1.0, 44)[field.vertices // 44**2]
+    z = np.linspace(-1.0, 1.0, 44)[field.vertices % 44]
+    kept = (z > FLOOR) | (x < 0.1)
+    cut = VoxelField(
+        field.bounds, field.resolution, field.vertices[kept], field.density[kept], field.sh[kept]
+    )
+    box = Cage.box((0.1, 0.0, 0.5 * (FLOOR + TOP) + 0.02), (0.6, 0.6, TOP - FLOOR + 0.06))
+    scene = Scene(cut, EditStack([Edit.delete(box)]), cameras={"train": cameras()})
+    down = [
+        Camera.look_at((at, 0.0, 2.0), (at + 1e-3, 0.0, FLOOR), width=3, height=3, fov_x=0.01)
+        for at in (0.0, 0.25)
+    ]
+    assert scene.render(down[0]).opacity.min() > 0.9 and scene.render(down[1]).opacity.max() < 0.1
+
+
+def test_strange_cages_are_patched_without_a_traceback(scenes: tuple[Scene, Scene]) -> None:
+    scene, _ = scenes
+    for odd in (
+        Cage.box((0.0, 0.0, 0.0), 8.0),  # holds all of the field
+        Cage.box((5.0, 5.0, 5.0), 0.5),  # holds nothing, outside of the grid
+        Cage.box((0.9, 0.9, 0.9), 0.5),  # over the grid's edge
+        Cage.box((0.0, 0.0, FLOOR), 1e-4),  # smaller than a voxel
+        Cage.box((0.1, 0.0, FLOOR), (0.5, 0.5, 0.6), (0.3, 0.2, 0.5)),  # through the floor
+    ):
+        for edit in (
+            Edit.delete(odd),
+            Edit(odd, adjustment="discrete").translate((-0.4, 0.1, 0.3)),
+            Edit(odd, adjustment="discrete", keep_source=True).scale(0.5),
+        ):
+            assert np.isfinite(scene.with_edits(EditStack([edit])).render(cameras()[0]).rgb).all()
+
+
+def test_a_field_of_nothing_solid_is_patched() -> None:
+    field = room(True)
+    thin = dataclasses.replace(field, density=np.full_like(field.density, 1e-3))
+    scene = Scene(thin, EditStack([Edit.delete(cage())]))
+    assert not scene.patcher.ambience.shows
+    assert np.isfinite(scene.render(cameras()[0]).rgb).all()
+
+
+def test_options_are_read_and_written(tmp_path: Path) -> None:
+    stack = EditStack(
+        [dataclasses.replace(Edit.delete(cage()), fill="none", relight="none"), Edit.delete(cage())]
+    )
+    text = dump_edits(stack)
+    assert parse_edits(text) == stack and text.count("fill: none") == 1 == text.count("relight: none")
+    with pytest.raises(EditFileError, match=r'fill must be one of surroundings, none, got "grass"'):
+        parse_edits(text.replace("fill: none", "fill: grass"))
+    with pytest.raises(EditError, match="relight must be one of"):
+        Edit(cage(), adjustment="discrete", relight="moon")  # type: ignore[arg-type]
+
+
+def test_openness_needs_weights() -> None:
+    assert not Ambience((), ()).shows and Ambience((), ()).reach == 0.0
+    both = Ambience((0.1, 0.2), (0.5, 0.5))
+    np.testing.assert_allclose(np.exp(both.log_openness(np.array([[0.0, 0.0], [1.0, 0.0]]))), [1.0, 0.5])
+
+
+def test_patchers_leave_other_fields_alone() -> None:
+    from splat_scenes import splat_scene
+
+    scene = splat_scene()
+    edits = Patcher(scene.field, (), lambda camera: scene.render(camera)).patched([Edit.delete(cage())])
+    assert edits[0].patch is None
