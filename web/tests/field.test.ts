@@ -1,4 +1,3 @@
-import { deflateSync } from "node:zlib";
 import { describe, expect, it } from "vitest";
 import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
 import { joined, summed } from "../src/field/level";
@@ -90,7 +89,7 @@ function layer(key: string, cells = [0, 1]): Layer {
 
 describe("layers of a field", () => {
   it("are unpacked from their arrays", async () => {
-    const arrays: [string, string, Uint8Array][] = [
+    const arrays: [string, string, Uint8Array<ArrayBuffer>][] = [
       ["box", "i4", new Uint8Array(Int32Array.from([1, 2, 3, 1, 1, 2]).buffer)],
       ["cells", "u1", Uint8Array.from([0, 2])],
       ["bricks", "u1", Uint8Array.from([1, 0])],
@@ -98,7 +97,9 @@ describe("layers of a field", () => {
       ["density", "u1", Uint8Array.from([1, 2, 3, 4])],
       ["sh", "u1", Uint8Array.from([1, 1, 0, 255, 2, 0])],
     ];
-    const blobs = arrays.map(([, , data]) => deflateSync(data));
+    const deflated = async (data: Uint8Array<ArrayBuffer>): Promise<Uint8Array> =>
+      new Uint8Array(await new Response(new Blob([data]).stream().pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
+    const blobs = await Promise.all(arrays.map(([, , data]) => deflated(data)));
     const entries = arrays.map(([name, type], n) => ({ name: `layer.0.${name}`, type, shape: [], bytes: blobs[n].length }));
     const text = new TextEncoder().encode(JSON.stringify({ arrays: entries }));
     const start = new Uint8Array(16);
