@@ -12,12 +12,8 @@
  */
 import { unrolled } from "./edits_glsl";
 import { EditsOnGpu } from "./edits_on_gpu";
-import type { Layout } from "./atlas";
-import { deleteField, layoutWithin, uploadLevel, uploadLevelNow, uploadOccupancy } from "./field_textures";
-import type { FieldTextures } from "./field_textures";
-import { programOf } from "./gl";
+import { OutOfMemory, programOf } from "./gl";
 import type { Program } from "./gl";
-import { LayersOnGpu, placesFor } from "./layers_on_gpu";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
 import { fragment } from "./march_glsl";
@@ -25,8 +21,10 @@ import type { Variant } from "./march_glsl";
 import { reachOf, setField, setView } from "./march_uniforms";
 import type { PinholeCamera } from "./march_uniforms";
 import type { PageEdits } from "./page_edits";
+import type { PlacedLayer } from "./page_layers";
 import type { Bytes, OnArrival } from "./page_file";
 import { plainState, unbind, WHOLE } from "./present";
+import { ShownField } from "./shown_field";
 import type { SceneDrawer } from "./scene_drawer";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
@@ -53,16 +51,6 @@ export interface Picture {
   columns?: { first: number; count: number };
 }
 
-interface Shown {
-  level: Level;
-  textures: FieldTextures;
-  /** Those of the edits' patches; the coarse level has none, and shows the field in their place. */
-  layers: LayersOnGpu | null;
-  occupancy: WebGLTexture;
-  /** An occupancy without anything to leap over, for a coarse level under edits: theirs is that of the full one. */
-  solid: WebGLTexture | null;
-}
-
 /** Bytes of textures that a field may take unless the caller says otherwise. */
 const MEMORY = 768 * 2 ** 20;
 
@@ -80,7 +68,7 @@ export class FieldRenderer implements SceneDrawer {
   /** Milliseconds that the last new shader took to compile. */
   compileTime = 0;
   compiled = 0;
-  private shown: Shown | null = null;
+  private shown: ShownField | null = null;
   private readonly onGpu: EditsOnGpu;
   private readonly views: Views;
   private camera: PinholeCamera | null = null;
@@ -189,14 +177,14 @@ export class FieldRenderer implements SceneDrawer {
     };
     bind("densityAtlas", gl.TEXTURE_3D, textures.density);
     bind("brickIndex", gl.TEXTURE_3D, textures.index);
-    bind("bricks", gl.TEXTURE_3D, active ? this.deformed(shown) : shown.occupancy);
+    bind("bricks", gl.TEXTURE_3D, active ? (level.last ? this.onGpu.bricks : shown.withoutLeaps) : shown.occupancy);
     textures.colours.forEach((texture, n) => bind(`colourAtlas${n}`, gl.TEXTURE_3D, texture));
     if (active) {
       bind("lattice", gl.TEXTURE_2D, this.onGpu.bind(program));
       gl.uniform1i(uniform("editCount"), active.edits);
       gl.uniform1i(uniform("boxCount"), active.boxes);
       gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
-      gl.uniform1i(uniform("layered"), Number(shown.layers !== null));
+      gl.uniform1i(uniform("layered"), Number(shown.layered));
     }
     const { first, count } = picture.rows ?? { first: 0, count: height };
     const across = picture.columns ?? { first: 0, count: width };
@@ -247,55 +235,31 @@ export class FieldRenderer implements SceneDrawer {
   }
 
   private async take(level: Level, wanted: () => boolean): Promise<void> {
-    const { gl } = this;
-    const textures = await uploadLevel(gl, level, this.layoutOf(level), wanted);
-    if (textures === null) return;
+    const shown = await ShownField.upload(this.gl, this.memory, level, this.layers, wanted);
+    if (shown === null) return;
     this.drop();
-    this.shown = this.shownOf(level, textures);
+    this.shown = shown;
     this.putLayers();
   }
 
-  private shownOf(level: Level, textures: FieldTextures): Shown {
-    const layers = level.last ? new LayersOnGpu(this.gl, textures, level) : null;
-    return { level, textures, layers, occupancy: uploadOccupancy(this.gl, level.occupancy), solid: null };
+  /** The layers that the edits' patches have. */
+  private get layers(): readonly PlacedLayer[] {
+    return this.onGpu.edits?.layers ?? [];
   }
 
-  /** The layout of a level, with room for the layers of its edits. Throws `TooLarge` beyond the memory. */
-  private layoutOf(level: Level): Layout {
-    const layers = level.last ? (this.onGpu.edits?.layers ?? []) : [];
-    return layoutWithin(this.gl, level, this.memory, (layout) => placesFor(layers, layout));
-  }
-
-  /** Puts the edits' layers into the field's textures; where they have no room, these are made anew with more. */
   private putLayers(): void {
-    const layers = this.onGpu.edits?.layers ?? [];
-    const uploaded = this.shown?.layers?.set(layers);
-    if (uploaded === undefined) return;
-    if (uploaded !== null) {
-      this.onGpu.count(uploaded);
-      return;
+    try {
+      if (this.shown) this.onGpu.count(this.shown.putLayers(this.layers));
+    } catch (error) {
+      // The GPU had no memory for the field's textures with more room, and has those before no more.
+      if (error instanceof OutOfMemory) this.drop();
+      throw error;
     }
-    const { level } = this.shown as Shown;
-    const layout = this.layoutOf(level);
-    this.drop();
-    this.shown = this.shownOf(level, uploadLevelNow(this.gl, level, layout));
-    this.putLayers();
   }
 
   private drop(): void {
-    if (!this.shown) return;
-    deleteField(this.gl, this.shown.textures);
-    this.gl.deleteTexture(this.shown.occupancy);
-    this.gl.deleteTexture(this.shown.solid);
+    this.shown?.dispose();
     this.shown = null;
-  }
-
-  /** The occupancy of the field under its edits. */
-  private deformed(shown: Shown): WebGLTexture | null {
-    if (shown.level.last) return this.onGpu.bricks;
-    const { occupancy } = shown.level;
-    shown.solid ??= uploadOccupancy(this.gl, { ...occupancy, codes: new Uint16Array(occupancy.codes.length).fill(255) });
-    return shown.solid;
   }
 
   /** The nearest and farthest distance of the field's box from the camera. */
