@@ -3,11 +3,11 @@ import { ROW } from "../field/edits_glsl";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
-import type { Bytes } from "../field/page_file";
 import type { Lattice, PageEdits } from "../field/page_edits";
 import { readLayer } from "../field/page_layers";
 import type { Layer, PlacedLayer } from "../field/page_layers";
 import { mixedHalves } from "./halves";
+import { placeAt } from "./path";
 
 interface PathHeader {
   edits: number[];
@@ -43,7 +43,7 @@ export class PathEdits {
     private readonly states: State[],
   ) {}
 
-  static async read(source: ReadableStream<Bytes> | ArrayBuffer): Promise<PathEdits> {
+  static async read(source: ArrayBuffer): Promise<PathEdits> {
     const file = await PageFile.open<PathHeader>(new ByteReader(source), "cagepath", 2);
     const { header } = file;
     const times = (await file.read("times")) as Float32Array;
@@ -65,13 +65,10 @@ export class PathEdits {
 
   /** The edits at seconds from the path's begin. */
   at(seconds: number): PageEdits {
-    const { times, order, states } = this;
-    const last = times.length - 1;
-    let k = 0;
-    while (k < last - 1 && times[k + 1] <= seconds) k++;
-    const share = Math.max(0, Math.min(1, (seconds - times[k]) / Math.max(1e-9, times[k + 1] - times[k])));
-    const one = states[order[k]];
-    const other = states[order[k + 1]];
+    const { order, states } = this;
+    const { first, share } = placeAt(this.times, seconds);
+    const one = states[order[first]];
+    const other = states[order[first + 1]];
     const near = share < 0.5 ? one : other;
     if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.lattices);
     const lattices = one.lattices.map((lattice, n) => {
