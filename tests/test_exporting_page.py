@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import threading
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,16 +17,24 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.partial import partial_edit
+from cagefield.edits.patch import Patch
 from cagefield.errors import EditError
 from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
-from cagefield.formats.page_file import bytes_until
+from cagefield.exporting.path_states import path_edits
+from cagefield.fields.voxel import VoxelField
+from cagefield.formats.page_file import bytes_until, unpack
+from cagefield.formats.page_layers import layer_key
+from cagefield.formats.page_path import MAGIC, VERSION
 from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.patches.patcher import Patcher
 from cagefield.rendering.metrics import psnr
+from cagefield.rendering.renderer import Renderer
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
 from hand import Hand
 from page_fields import MOVE, SIZE, lumps, lumps_scene
+from page_layers import patch_by_hand
 
 
 def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> None:
@@ -121,11 +130,15 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
 TURN = Edit(Cage.box((0, 0, 0), (0.8, 0.8, 0.8)), Cage.box((0, 0, 0), (1.7, 1.6, 1.5)))
 
 
+BARE: Any = {"fill": "none", "relight": "none"}
+"""Options of edits that have no patch, or one made by hand."""
+
+
 def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
-    gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6)))
-    scene = dataclasses.replace(
-        lumps_scene(), edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)), MOVE, gone])
-    )
+    scene = lumps_scene()
+    gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6))).replace(**BARE)
+    move = MOVE.replace(**BARE, patch=patch_by_hand(scene.field, MOVE.inner, part=True))
+    scene = dataclasses.replace(scene, edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)), move, gone]))
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (
         Keyframe(pose, 45.0, 2.0, {1: 0.0, 2: 0.0, 3: 0.0}),
@@ -148,6 +161,8 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
             settle(page)
             parts = line.parts(np.array([seconds]))
             there = [partial_edit(edit, float(parts[n][0])) for n, edit in enumerate(scene.edits, start=1)]
+            if parts[1][0] < 1.0:  # The patch shows what the turn makes once it is whole.
+                there = [edit and edit.replace(patch=None) for edit in there]
             stack = EditStack([edit for edit in there if edit is not None])
             camera = dataclasses.replace(_as_shown(scene.cameras["test"][0], 45.0))
             pictures.append(rendered(dataclasses.replace(scene, edits=stack), camera))
@@ -160,6 +175,48 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         assert {**after, "Program": 0} == {**objects, "Program": 0}
     for one, other in itertools.pairwise(pictures):
         assert psnr(one, other) < 30.0
+
+
+class _Patches:
+    """Gives discrete edits one patch while they move, and another then."""
+
+    def __init__(self, moving: Patch, settled: Patch) -> None:
+        self.moving, self.settled = moving, settled
+
+    def patched(self, edits: Sequence[Edit], *, moving: bool = False) -> EditStack:
+        patch = self.moving if moving else self.settled
+        return EditStack(
+            edit if edit.adjustment == "continuous" else edit.replace(patch=patch) for edit in edits
+        )
+
+
+def test_patches_are_those_of_edits_that_have_begun_and_of_whole_ones() -> None:
+    scene = lumps_scene()
+    field = scene.field
+    assert isinstance(field, VoxelField)
+    patches = _Patches(*(patch_by_hand(field, MOVE.inner, part=n == 1, seed=n) for n in range(2)))
+    above = MOVE.translate((-0.1, 0.0, 0.0))
+    pose = tuple(scene.cameras["test"][0].c2w.ravel())
+    # The edit before goes all the way first.
+    keys = (
+        Keyframe(pose, 45.0, 0.3, {1: 0.0, 2: 0.0}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 0.5}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 1.0}),
+    )
+    found = path_edits(Renderer(field), EditStack([MOVE, above]), keys, False, cast(Patcher, patches))
+    assert found is not None
+    header, arrays = unpack(found.data, MAGIC, VERSION, "a path")
+    shown = []
+    for state in arrays["states"]:
+        shown.append([number for number, *_ in header["layers"][state]])
+        places = [8 * place for _, place, *_ in header["layers"][state]]
+        rows = arrays[f"rows.{state}"]
+        have = [rows[44 * edit + row, 3] for edit in range(2) for row in (5, 7)]
+        assert [place for place in have if place > 0] == places
+    keys_of = [layer_key(layer) for patch in (patches.moving, patches.settled) for layer in patch.layers]
+    named = [[keys_of.index(header["layer_keys"][number]) for number in numbers] for numbers in shown]
+    # 0 is what a move left; 1 and 2 are a whole edit's.
+    assert list(dict.fromkeys(map(tuple, named))) == [(), (0,), (1, 2, 0), (1, 2, 1, 2)]
 
 
 def _as_shown(camera: Camera, fov_y_deg: float) -> Camera:

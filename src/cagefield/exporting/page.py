@@ -91,7 +91,7 @@ class ScenePage:
             found = {"field": encode_page_field(field, step=step, background=scene.background)}
             if scene.edits.active:
                 found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
-            along = path_edits(plain, scene.edits, keys, loop, on_progress=on_progress)
+            along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
         if along is not None:
             found["path"] = along.data
         header = {

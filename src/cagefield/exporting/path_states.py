@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.partial import partial_edit
+from cagefield.edits.patch import Patch
 from cagefield.errors import EditError
 from cagefield.formats.page_edits import LATTICE, for_pages
 from cagefield.formats.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.patches.patcher import Patcher
 from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
 
@@ -59,6 +61,7 @@ def path_edits(
     edits: EditStack,
     keys: Sequence[Keyframe],
     loop: bool,
+    patcher: Patcher,
     *,
     on_progress: Callable[[float], None] = lambda done: None,
 ) -> PathEdits | None:
@@ -66,21 +69,25 @@ def path_edits(
 
     `renderer` draws the field. `on_progress` is told the share that is done. Raises EditError for an edit
     that is not possible at a part that is shown.
+
+    Of an edit that moves, `patcher` fills what it left once it has begun, and takes its light along once it
+    has gone all the way: a patch of every state would take some hundred KB each.
     """
     if len(keys) < 2:
         return None
-    edits = for_pages(edits)
     line = Timeline(keys, loop=loop)
     times = state_times(line, edits, MOST_STATES)
     if times is None:
         return None
+    on_way = for_pages(patcher.patched(edits.edits, moving=True))
+    edits = for_pages(patcher.patched(edits.edits))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
     shells = [n for n in moving if edits[n].adjustment == "continuous"]
     lattices = sum(len({parts[n] for parts in unique}) for n in shells)
     nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
-    stacks = {parts: stack_at(edits, parts, moving, nodes) for parts in unique}
+    stacks = {parts: stack_at(edits, parts, moving, nodes, on_way) for parts in unique}
     middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
     total = len(stacks) + len(middles)
     states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
@@ -91,7 +98,7 @@ def path_edits(
         found.append(renderer.occupancy)
         on_progress(len(found) / total)
     for k in middles:
-        middle = stack_at(edits, parts_at(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes)
+        middle = stack_at(edits, parts_at(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes, on_way)
         renderer = renderer.with_edits(middle)
         found.append(renderer.occupancy)
         one, other = states[knots[k]], states[knots[k + 1]]
@@ -99,6 +106,7 @@ def path_edits(
             errors.append(_distances(PathState.of(middle), one, other))
         on_progress(len(found) / total)
     data = encode_page_path(
+        renderer.field,
         times,
         [unique.index(parts) for parts in knots],
         list(states.values()),
@@ -140,8 +148,17 @@ def parts_at(line: Timeline, edits: EditStack, seconds: float) -> Parts:
     )
 
 
-def stack_at(edits: EditStack, parts: Parts, moving: Sequence[int] = (), nodes: int = LATTICE) -> EditStack:
-    """The stack at these parts; the lattices of edits that move have at most `nodes` an axis."""
+def stack_at(
+    edits: EditStack,
+    parts: Parts,
+    moving: Sequence[int] = (),
+    nodes: int = LATTICE,
+    on_way: EditStack | None = None,
+) -> EditStack:
+    """The stack at these parts; the lattices of edits that move have at most `nodes` an axis.
+
+    `on_way` has the patches of edits that have begun and not gone all the way; without, they are as `edits`'.
+    """
     found: list[Edit] = []
     for number, (edit, part) in enumerate(zip(edits, parts, strict=True)):
         try:
@@ -152,10 +169,32 @@ def stack_at(edits: EditStack, parts: Parts, moving: Sequence[int] = (), nodes: 
             raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
         if there is None:
             continue
+        patch = _patch(edits, on_way or edits, parts, number)
+        if patch is not there.patch:
+            there = there.replace(patch=patch)
         if number in moving and there.lattice is not None:
             there = there.replace(lattice=min(nodes, there.lattice))
         found.append(there)
     return EditStack(found)
+
+
+def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | None:
+    """The patch that an edit has at these parts.
+
+    Patches show what the whole edits before them make: there is none while one of these, that reaches into
+    its region, is on its way.
+    """
+    edit, part = edits[number], parts[number]
+    if part < 1.0 and not edit.deleted:
+        edit = on_way[number]
+    if edit.patch is None or part <= 0.0:
+        return None
+    low, high = edit.patch.region.aabb
+    for before, there in zip(edits.edits[:number], parts, strict=False):
+        meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
+        if there < 1.0 and before.enabled and meets.all(axis=1).any():
+            return None
+    return edit.patch
 
 
 def _distances(exact: PathState, one: PathState, other: PathState) -> NDArray[np.float64]:
