@@ -164,4 +164,6 @@ class _Work:
         lighting = Lighting(where, log).smoothed(block)
         block = block.relit(where, np.exp(lighting.log_ratio))
         kept = ndimage.binary_dilation(self.inside, iterations=2)
-        return replace(block, slot=np.where(kept, block.slot, -1))
+        at = np.argwhere(kept)
+        part = replace(block, slot=np.where(kept, block.slot, -1))
+        return part.cropped(at.min(axis=0), at.max(axis=0)) if len(at) else part
