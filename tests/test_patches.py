@@ -14,6 +14,7 @@ from scipy import ndimage
 from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError, EditFileError
 from cagefield.fields.layers import ALIGNED, places_of, slices_of
@@ -323,3 +324,17 @@ def test_patchers_leave_other_fields_alone() -> None:
     scene = splat_scene()
     edits = Patcher(scene.field, (), lambda camera: scene.render(camera)).patched([Edit.delete(cage())])
     assert edits[0].patch is None
+
+
+def test_a_clone_fills_with_what_another_cage_holds(scenes: tuple[Scene, Scene]) -> None:
+    """A hole through the floor shows the floor beside it, without a seam; the file says so."""
+    scene, truth = scenes
+    through = Cage.box((0.1, 0.0, -0.2), (0.66, 0.66, 0.9))
+    source = through.translate((-0.7, 0.55, 0.0))
+    edits = {
+        fill: EditStack([dataclasses.replace(Edit.delete(through), fill=fill)])
+        for fill in ("none", Clone(source))
+    }
+    assert all(parse_edits(dump_edits(stack)) == stack for stack in edits.values())
+    hole, clone = (db(seen(scene.with_edits(stack)), seen(truth)) for stack in edits.values())
+    assert clone > hole + 3.0 and clone > 24.0, (hole, clone)

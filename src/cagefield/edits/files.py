@@ -22,7 +22,8 @@
       - name: no cup
         delete: true
         inner: {center: [2, 0, 0], size: 0.5}
-        fill: surroundings                    # or none: what it stood on goes on where it was, if left out
+        fill: surroundings                    # if left out: what it stood on goes on; or none, or a cage
+                                              # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
         relight: occlusion                    # or none: contact shadows go along, if left out
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
@@ -47,7 +48,7 @@ from cagefield.edits.edit import Edit, ImpossibleEditError
 from cagefield.edits.names import mended, problem_of_name
 from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
-from cagefield.edits.options import problem_of_lattices
+from cagefield.edits.options import Clone, problem_of_lattices
 from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
@@ -161,7 +162,9 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
     options["adjustment"] = "discrete" if deleted else "continuous"
     if "adjustment" in keys:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
-    for name in ("shell", "falloff", "fill", "relight"):
+    if "fill" in keys:
+        options["fill"] = _fill(keys["fill"])
+    for name in ("shell", "falloff", "relight"):
         if name in keys:
             options[name] = keys[name].text()
     if "name" in keys:
@@ -189,6 +192,13 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
         except CagefieldError as error:
             raise node.error(str(error)) from None
     return edit
+
+
+def _fill(node: Node) -> Any:
+    """What an edit is filled with: a word, or {clone: cage}."""
+    if node.is_mapping:
+        return Clone(_cage(node.mapping(required=("clone",))["clone"]))
+    return node.text()
 
 
 def _name(node: Node, mend: bool) -> str:
@@ -295,7 +305,9 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["width"] = edit.width
     if edit.keep_source:
         content["keep_source"] = True
-    if edit.fill != "surroundings":
+    if isinstance(edit.fill, Clone):
+        content["fill"] = {"clone": _from_cage(edit.fill.source)}
+    elif edit.fill != "surroundings":
         content["fill"] = edit.fill
     if edit.relight != "occlusion":
         content["relight"] = edit.relight

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from cagefield.cages import Cage
 from cagefield.warps import FALLOFFS, SHELLS
 
 Adjustment: TypeAlias = Literal["continuous", "discrete"]
 
-Fill: TypeAlias = Literal["surroundings", "none"]
+
+@dataclass(frozen=True)
+class Clone:
+    """A way to fill: V^c shows what is in the source cage, blended at its rim. The cage stays as it is."""
+
+    source: Cage
+
+
+Fill: TypeAlias = Literal["surroundings", "none"] | Clone
 Relight: TypeAlias = Literal["occlusion", "none"]
 
-FILLS: tuple[Fill, ...] = ("surroundings", "none")
-RELIGHTS: tuple[Relight, ...] = ("occlusion", "none")
+FILLS: tuple[str, ...] = ("surroundings", "none")
+RELIGHTS: tuple[str, ...] = ("occlusion", "none")
 
 LATTICE_RANGE = (2, 512)
 MOST_NODES = 512**3
@@ -41,7 +51,7 @@ def problem_of_options(
     deleted: bool,
     fading: tuple[str, float],
     lattice: int | None,
-    surroundings: tuple[str, str],
+    surroundings: tuple[str | Clone, str],
 ) -> str | None:
     """What is wrong with an edit's options, and the cure; None where they go together.
 
@@ -53,7 +63,7 @@ def problem_of_options(
     if shell not in SHELLS:
         return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
     for name, value, known in zip(("fill", "relight"), surroundings, (FILLS, RELIGHTS), strict=True):
-        if value not in known:
+        if value not in known and not (name == "fill" and isinstance(value, Clone)):
             return f'{name} must be one of {", ".join(known)}, got "{value}"'
     if adjustment == "continuous":
         if not has_outer:

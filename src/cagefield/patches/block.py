@@ -195,21 +195,35 @@ def _through(block: Block, below: EditStack, rows: NDArray[np.int64]) -> Block:
     rows, points = rows[changed], points[changed]
     mapped = below.to_canonical(points)
     changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
-    rows, points, layer = rows[changed], mapped.points[changed], mapped.layer[changed]
+    rows, points = rows[changed], points[changed]
+    raw, sh = sampled(block.field, below, points)
     density, slot = block.density.copy(), block.slot.copy()
-    density.flat[rows], slot.flat[rows] = 0.0, -1
-    colours = [block.sh]
-    count = len(block.sh)
-    for number, source in enumerate((block.field, *below.layers)):
-        here = np.flatnonzero(layer == number)
-        raw, sh = interpolated(source, points[here])
-        kept = np.flatnonzero(raw > 0.0)
-        here = here[kept]
-        density.flat[rows[here]] = raw[kept]
-        slot.flat[rows[here]] = count + np.arange(len(here))
-        count += len(here)
-        colours.append(rotated_sh(sh[kept], _turns(mapped.jacobian[changed][here])))
-    return replace(block, density=density, slot=slot, sh=np.concatenate(colours))
+    stored = raw > 0.0
+    density.flat[rows], slot.flat[rows] = raw, -1
+    slot.flat[rows[stored]] = len(block.sh) + np.arange(int(stored.sum()))
+    return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, sh[stored]]))
+
+
+def sampled(
+    field: VoxelField, below: EditStack, points: Array, turn: Array | None = None
+) -> tuple[Float32, Float32]:
+    """(density [N] before its clamp, sh [N,K,3]) of a field under edits at points [N,3].
+
+    Colours are turned as the edits turn them and, after that, as the Jacobians `turn` [N,3,3] do.
+    """
+    mapped = below.to_canonical(points)
+    density = np.zeros(len(points), np.float32)
+    sh = np.zeros((len(points), *field.sh.shape[1:]), np.float32)
+    for number, source in enumerate((field, *below.layers)):
+        here = np.flatnonzero(mapped.layer == number)
+        if not len(here):
+            continue
+        jacobian = mapped.jacobian[here]
+        if turn is not None:
+            jacobian = jacobian @ np.linalg.inv(turn[here])
+        density[here], colours = interpolated(source, mapped.points[here])
+        sh[here] = rotated_sh(colours, _turns(jacobian))
+    return density, sh
 
 
 def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:

@@ -10,10 +10,12 @@ from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.edits import Edit
+from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block, block_of, world_of
+from cagefield.patches.cloning import cloned
 from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Mask
@@ -40,7 +42,7 @@ def patch_of(
     work = _Work.of(field, below, edit, ambience, settled)
     under, part = work.emptied, None
     lighting = None
-    support = None if edit.keep_source or edit.fill == "none" else work.support()
+    support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
         under = under.relit(lighting.where, np.exp(lighting.log_ratio))
@@ -52,6 +54,8 @@ def patch_of(
         footprint = footprint_of(under, support, work.part, hidden)
         if footprint is not None:
             under = rebuilt(under, footprint, work.inside)
+    if isinstance(edit.fill, Clone) and not edit.keep_source:
+        under = cloned(under, below, edit.inner, edit.fill.source, work.inside, work.surface)
     region, under = work.around(under)
     return Patch(region, under.layer(), None if part is None else part.layer())
 
@@ -106,20 +110,24 @@ class _Work:
         return Cage.box(0.5 * (low + high), high - low), under.cropped(first - 2, last + 2)
 
     @cached_property
+    def surface(self) -> Mask:
+        """Surface vertices outside of V^c."""
+        solid = self.emptied.solid
+        return np.asarray(
+            solid & ndimage.binary_dilation(~solid) & ~self.inside & lit_vertices(self.emptied)
+        )
+
+    @cached_property
     def rim(self) -> Mask:
-        """Surface vertices around V^c."""
-        block = self.emptied
-        spacing = tuple(float(edge) for edge in block.field.voxel_size)
+        """Those around V^c."""
+        spacing = tuple(float(edge) for edge in self.before.field.voxel_size)
         away = ndimage.distance_transform_edt(~self.inside, sampling=spacing)
         size = np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0])
-        near = away < max(RIM * max(spacing), 0.5 * float(size))
-        solid = block.solid
-        around = solid & ndimage.binary_dilation(~solid) & near & ~self.inside
-        return np.asarray(around & lit_vertices(block))
+        return np.asarray(self.surface & (away < max(RIM * max(spacing), 0.5 * float(size))))
 
     def support(self) -> Support | None:
         """What the part stood on."""
-        return support_of(self.emptied, self.part, self.rim)
+        return support_of(self.emptied, self.part, self.rim, self.surface)
 
     @cached_property
     def _distances(self) -> tuple[Distance, Distance]:

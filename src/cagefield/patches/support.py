@@ -56,10 +56,13 @@ class Support:
         return away @ self.axes.T, away @ self.normal
 
 
-def support_of(block: Block, part: Mask, ring: Mask, *, seed: int = 0) -> Support | None:
+def support_of(
+    block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0
+) -> Support | None:
     """The plane through surface vertices of the ring [X,Y,Z] that the part [X,Y,Z] stands on, or just over.
 
-    Each vertex counts by how near the part comes to it from above.
+    Each vertex counts by how near the part comes to it from above. All vertices of the surface [X,Y,Z] on
+    the plane are its members.
     """
     at = np.argwhere(ring).astype(np.float64)
     content = np.argwhere(part)
@@ -97,8 +100,12 @@ def support_of(block: Block, part: Mask, ring: Mask, *, seed: int = 0) -> Suppor
         n = spread if spread @ n > 0.0 else -spread
     aside = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     aside /= np.linalg.norm(aside)
-    member = np.flatnonzero((np.abs((at - centre) @ n) < 2.0 * NEAR) & (normals @ n > ALONG))
-    return Support(centre, n, np.stack([aside, np.cross(n, aside)]), at[member].astype(np.int64))
+    every = np.argwhere(surface)
+    member = (np.abs((every - centre) @ n) < 2.0 * NEAR) & (block.normals[surface] @ n > ALONG)
+    # Columns begin at a vertex: between two of them, half of the vertices would share a column.
+    vertex = at[np.argmin(((at - centre) ** 2).sum(axis=1))]
+    point = vertex + ((centre - vertex) @ n) * n
+    return Support(point, n, np.stack([aside, np.cross(n, aside)]), every[member])
 
 
 @dataclass(frozen=True)
