@@ -69,7 +69,15 @@ def _title(edit: Edit) -> str:
     else:
         how = "exact" if edit.lattice is None else f"lattice of {edit.lattice}^3 nodes"
         kind = f"continuous, {edit.shell} shell, {how}"
-    return f"{name}{kind}{hidden}"
+    return f"{name}{kind}{_left_out(edit)}{hidden}"
+
+
+def _left_out(edit: Edit) -> str:
+    """What a discrete edit leaves as it was, though others would not."""
+    if edit.adjustment == "continuous":
+        return ""
+    fill = ", fill: none" if edit.fill == "none" and not edit.keep_source else ""
+    return fill + (", relight: none" if edit.relight == "none" else "")
 
 
 def _details(edit: Edit, content: _Content) -> Iterable[str]:
