@@ -314,6 +314,16 @@ def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: S
     assert difference.max() < 1e-3 and w * h < 0.5 * SIDE * SIDE
 
 
+def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -> None:
+    edits = [PATCHED["copy"], PATCHED["move"]]
+    settled = shaded.patcher.patched(edits)
+    moved = [edits[0], edits[1].translate((0, 0, 0.1))]
+    moving = shaded.patcher.patched(moved, moving=True)
+    assert moving[0].patch is settled[0].patch is not None
+    assert moving[1].patch is not None and moving[1].patch.part is None
+    assert shaded.patcher.patched([edits[0].translate((0, 0, 0.1))], moving=True)[0].patch is None
+
+
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])
 def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCache, view: Any) -> None:
     before, after = STACKS["under another"]
