@@ -2,13 +2,15 @@
 
 python benchmarks/page_cycles.py [--cycles 100] [-o benchmarks/results/page_cycles.md]
 
-On a tiny scene with an edit: the editor with `?render=page`, whose view is turned until the page has drawn
-it, and the page of `cagefield export`. One tab goes there and back to an empty page; memory is read after
-garbage was collected. Then one renderer after the other in a page that stays, each disposed of.
+On tiny scenes with an edit, of voxels and of splats: the editor (voxels) with `?render=page`, whose view is
+turned until the page has drawn it, and the pages of `cagefield export`. One tab goes there and back to an
+empty page; memory is read after garbage was collected. Then one renderer after the other in a page that
+stays, each disposed of.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import re
@@ -30,14 +32,13 @@ from playwright.sync_api import Page, sync_playwright
 
 from cagefield.benchmarking.machine import cpu_model
 from cagefield.exporting.page import ScenePage
-from cagefield.formats.page_edits import encode_page_edits, for_pages
-from cagefield.formats.page_field import encode_page_field
-from cagefield.rendering.renderer import Renderer
+from cagefield.fields.splat import SplatField
 from cagefield.scene import Scene
 from editor_page import CHROMIUM, FLAGS, asking
 from field_page import FieldPage, field_page
 from gpu_objects import COUNT
 from page_fields import lumps_scene
+from splat_scenes import random_splats
 
 PATIENCE = 180.0
 Row = dict[str, float]
@@ -53,18 +54,22 @@ class PageCycles:
 
     def run(self) -> None:
         """Prints the tables."""
-        scene = lumps_scene()
+        scene, splats = lumps_scene(), splats_scene()
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "lumps"
             scene.save(folder)
             file = Path(scratch) / "lumps.html"
             file.write_text(ScenePage.of(scene, "lumps").one_file(), encoding="utf-8")
             editor, exported = self._editor(folder), self._pages(file.as_uri(), exported_page, ())
+            file.write_text(ScenePage.of(splats, "splats").one_file(), encoding="utf-8")
+            exported_splats = self._pages(file.as_uri(), exported_page, ())
         parts = [
             "# Pages that are opened and closed",
             f"## The editor, drawn by the page, {self.cycles} times\n\n{table(editor)}",
             f"## An exported page, {self.cycles} times\n\n{table(exported)}",
+            f"## An exported page of splats, {self.cycles} times\n\n{table(exported_splats)}",
             f"## A renderer in a page that stays, {self.cycles} times\n\n{table(self._renderers(scene))}",
+            f"## One of splats, {self.cycles} times\n\n{table(self._renderers(splats))}",
             "- Heap: of the tab, after garbage was collected. MB: resident (shared pages in parts), of all "
             "processes of the browser; of the server and its rendering process.\n"
             "- Slope: of the last three quarters, a hundred times.\n"
@@ -122,13 +127,13 @@ class PageCycles:
         return rows
 
     def _renderers(self, scene: Scene) -> list[Row]:
-        renderer = Renderer(scene.field, for_pages(scene.edits))
         camera = scene.cameras["test"][0].resized(60, 60)
         rows = []
-        with field_page() as page:
+        made = ScenePage.of(scene, "scene").files
+        field, edits = made["field"], made["edits"]
+        with field_page(splats=isinstance(scene.field, SplatField)) as page:
             page.page.evaluate(COUNT)
             session = page.page.context.new_cdp_session(page.page)
-            field, edits = encode_page_field(scene.field), encode_page_edits(renderer)
             for cycle in range(1, self.cycles + 1):
                 renderer_cycle(page, field, edits, camera)
                 if cycle % max(1, self.cycles // 10) == 0 or cycle == 1:
@@ -144,9 +149,15 @@ class PageCycles:
         return rows
 
 
+def splats_scene() -> Scene:
+    """Random splats, enough that a worker sorts them, some of them moved."""
+    scene, field = lumps_scene(), random_splats(40_000, degree=1)
+    return dataclasses.replace(scene, field=dataclasses.replace(field, log_scales=field.log_scales - 2.5))
+
+
 def renderer_cycle(page: FieldPage, field: bytes, edits: bytes, camera: Any) -> None:
     """A renderer that loads, draws with edits and is disposed of."""
-    page.page.evaluate("() => { window.r = new cagefieldViewer.FieldRenderer(gl); }")
+    page.page.evaluate("() => { window.r = new r.constructor(gl); }")
     page.load(field)
     page.edit(edits)
     page.draw(camera)

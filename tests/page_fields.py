@@ -17,9 +17,11 @@ SIZE = 120
 MOVE = Edit(Cage.box((0.6, 0.5, 0.3), (1.0, 0.9, 0.9)), adjustment="discrete").translate((0.0, -0.5, 0.8))
 
 
-def lumps(degree: int, contracted: bool, resolution: tuple[int, int, int] = (41, 36, 33)) -> VoxelField:
+def lumps(
+    degree: int, contracted: bool, resolution: tuple[int, int, int] = (41, 36, 33), seed: int = 0
+) -> VoxelField:
     """A field of random lumps with smooth surfaces and colours; a contracted one also far from its box."""
-    rng = np.random.default_rng(degree + 10 * contracted)
+    rng = np.random.default_rng(degree + 10 * contracted + seed)
     K = (degree + 1) ** 2
     noise = ndimage.gaussian_filter(rng.standard_normal(resolution), 2.5)
     density = 60.0 * noise / noise.std() - 40.0

@@ -3,92 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-import http.server
-import io
 import itertools
 import threading
-import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PIL import Image
 
 from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.partial import partial_edit
-from cagefield.errors import CagefieldError, EditError
+from cagefield.edits.patch import Patch
+from cagefield.errors import EditError
 from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
-from cagefield.formats.page_file import bytes_until
+from cagefield.exporting.path_states import path_edits
+from cagefield.fields.voxel import VoxelField
+from cagefield.formats.page_file import bytes_until, unpack
+from cagefield.formats.page_layers import layer_key
+from cagefield.formats.page_path import MAGIC, VERSION
 from cagefield.keyframe_files import dump_path
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.patches.patcher import Patcher
 from cagefield.rendering.metrics import psnr
-from cagefield.scene import Scene
+from cagefield.rendering.renderer import Renderer
 from commands import printed, refused
-from editor_page import CHROMIUM, FLAGS
-from gpu_objects import COUNT
+from exported_page import pixels, rendered, settle, shown, until, web_server
 from hand import Hand
 from page_fields import MOVE, SIZE, lumps, lumps_scene
-from splat_scenes import splat_scene
-
-
-@contextmanager
-def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
-    """The page of a file, its first whole picture drawn, or of an address; it asks no other for anything."""
-    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if CHROMIUM is None:
-        pytest.skip("no chromium on this machine")
-    complaints: list[str] = []
-    asked: list[str] = []
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        page = browser.new_page(viewport={"width": SIZE, "height": SIZE}, has_touch=touch, is_mobile=touch)
-        page.add_init_script(f"({COUNT})()")
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda said: complaints.append(said.text))
-        page.on("request", lambda request: asked.append(request.url))
-        url = address.as_uri() if isinstance(address, Path) else address
-        page.goto(url, wait_until="commit")
-        if isinstance(address, Path):
-            settle(page)
-        yield page
-        browser.close()
-    assert complaints == []
-    assert [other for other in asked if not other.startswith((url.rsplit("/", 1)[0], "data:"))] == []
-
-
-def until(page: Any, condition: str, seconds: float = 120.0) -> None:
-    """Waits until an expression is true; the page's policy forbids waiting inside it."""
-    end = time.monotonic() + seconds
-    while not page.evaluate(condition):
-        assert time.monotonic() < end, f"never came true: {condition}"
-        time.sleep(0.02)
-
-
-def settle(page: Any, level: str = "level?.last") -> None:
-    """Waits for the whole picture of the full level, or of a level, in `page`, a page or a frame."""
-    until(page, f"Boolean(window.cagefieldViewer?.viewer?.renderer.{level} && cagefieldViewer.viewer.whole)")
-    page.evaluate(
-        """document.querySelectorAll(".bar, .message, .arrived").forEach(e => e.style.visibility = "hidden")
-        || new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"""
-    )
-
-
-def pixels(page: Any) -> NDArray[np.uint8]:
-    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
-
-
-def rendered(scene: Scene, camera: Camera, edits: bool = True) -> NDArray[np.uint8]:
-    if not edits:
-        scene = dataclasses.replace(scene, edits=EditStack([]))
-    frame = scene.render(camera, background=scene.background)
-    assert frame is not None
-    return frame.rgb8()
+from page_layers import patch_by_hand
 
 
 def test_the_page_shows_the_edited_scene_and_the_one_before(tmp_path: Path) -> None:
@@ -184,11 +130,15 @@ def test_the_camera_path_is_played(tmp_path: Path) -> None:
 TURN = Edit(Cage.box((0, 0, 0), (0.8, 0.8, 0.8)), Cage.box((0, 0, 0), (1.7, 1.6, 1.5)))
 
 
+BARE: Any = {"fill": "none", "relight": "none"}
+"""Options of edits that have no patch, or one made by hand."""
+
+
 def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
-    gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6)))
-    scene = dataclasses.replace(
-        lumps_scene(), edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)), MOVE, gone])
-    )
+    scene = lumps_scene()
+    gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6))).replace(**BARE)
+    move = MOVE.replace(**BARE, patch=patch_by_hand(scene.field, MOVE.inner, part=True))
+    scene = dataclasses.replace(scene, edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)), move, gone]))
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (
         Keyframe(pose, 45.0, 2.0, {1: 0.0, 2: 0.0, 3: 0.0}),
@@ -211,6 +161,8 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
             settle(page)
             parts = line.parts(np.array([seconds]))
             there = [partial_edit(edit, float(parts[n][0])) for n, edit in enumerate(scene.edits, start=1)]
+            if parts[1][0] < 1.0:  # The patch shows what the turn makes once it is whole.
+                there = [edit and edit.replace(patch=None) for edit in there]
             stack = EditStack([edit for edit in there if edit is not None])
             camera = dataclasses.replace(_as_shown(scene.cameras["test"][0], 45.0))
             pictures.append(rendered(dataclasses.replace(scene, edits=stack), camera))
@@ -223,6 +175,48 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
         assert {**after, "Program": 0} == {**objects, "Program": 0}
     for one, other in itertools.pairwise(pictures):
         assert psnr(one, other) < 30.0
+
+
+class _Patches:
+    """Gives discrete edits one patch while they move, and another then."""
+
+    def __init__(self, moving: Patch, settled: Patch) -> None:
+        self.moving, self.settled = moving, settled
+
+    def patched(self, edits: Sequence[Edit], *, moving: bool = False) -> EditStack:
+        patch = self.moving if moving else self.settled
+        return EditStack(
+            edit if edit.adjustment == "continuous" else edit.replace(patch=patch) for edit in edits
+        )
+
+
+def test_patches_are_those_of_edits_that_have_begun_and_of_whole_ones() -> None:
+    scene = lumps_scene()
+    field = scene.field
+    assert isinstance(field, VoxelField)
+    patches = _Patches(*(patch_by_hand(field, MOVE.inner, part=n == 1, seed=n) for n in range(2)))
+    above = MOVE.translate((-0.1, 0.0, 0.0))
+    pose = tuple(scene.cameras["test"][0].c2w.ravel())
+    # The edit before goes all the way first.
+    keys = (
+        Keyframe(pose, 45.0, 0.3, {1: 0.0, 2: 0.0}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 0.5}),
+        Keyframe(pose, 45.0, 0.3, {1: 1.0, 2: 1.0}),
+    )
+    found = path_edits(Renderer(field), EditStack([MOVE, above]), keys, False, cast(Patcher, patches))
+    assert found is not None
+    header, arrays = unpack(found.data, MAGIC, VERSION, "a path")
+    shown = []
+    for state in arrays["states"]:
+        shown.append([number for number, *_ in header["layers"][state]])
+        places = [8 * place for _, place, *_ in header["layers"][state]]
+        rows = arrays[f"rows.{state}"]
+        have = [rows[44 * edit + row, 3] for edit in range(2) for row in (5, 7)]
+        assert [place for place in have if place > 0] == places
+    keys_of = [layer_key(layer) for patch in (patches.moving, patches.settled) for layer in patch.layers]
+    named = [[keys_of.index(header["layer_keys"][number]) for number in numbers] for numbers in shown]
+    # 0 is what a move left; 1 and 2 are a whole edit's.
+    assert list(dict.fromkeys(map(tuple, named))) == [(), (0,), (1, 2, 0), (1, 2, 1, 2)]
 
 
 def _as_shown(camera: Camera, fov_y_deg: float) -> Camera:
@@ -288,39 +282,6 @@ def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
             assert psnr(pixels(page), whole) >= 40.0
 
 
-@contextmanager
-def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> Iterator[str]:
-    """A server of a folder; of files named in `cuts` only so many bytes come before `go_on` is set."""
-
-    class Handler(http.server.SimpleHTTPRequestHandler):
-        def do_GET(self) -> None:
-            path = root / self.path.split("?")[0].lstrip("/")
-            data, cut = path.read_bytes(), cuts.get(path.name, 0)
-            self.send_response(200)
-            self.send_header("Content-Type", self.guess_type(str(path)))
-            self.send_header("Content-Length", str(len(data)))
-            self.end_headers()
-            self.wfile.write(data[:cut])
-            self.wfile.flush()
-            if cut:
-                go_on.wait(120.0)
-            self.wfile.write(data[cut:])
-
-        def log_message(self, *words: object) -> None:
-            """Says nothing."""
-
-    server = http.server.ThreadingHTTPServer(("localhost", 0), Handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
-        yield f"http://localhost:{server.server_address[1]}"
-    finally:
-        go_on.set()
-        server.shutdown()
-        server.server_close()
-        thread.join()
-
-
 def test_a_folder_on_a_disk_says_how_it_is_opened(tmp_path: Path) -> None:
     write_folder(tmp_path / "lumps", ScenePage.of(lumps_scene(), "lumps").folder())
     with shown((tmp_path / "lumps" / INDEX).as_uri()) as page:
@@ -347,8 +308,3 @@ def test_the_command_writes_a_page(tmp_path: Path, capsys: pytest.CaptureFixture
         (("-o", folder, "--embed", "--overwrite"), "holds no viewer.js and is left as it is"),
     ):
         assert said in refused(capsys, "export", folder, *words)
-
-
-def test_splats_are_refused() -> None:
-    with pytest.raises(CagefieldError, match="the scene holds splats; a page shows voxels"):
-        ScenePage.of(splat_scene(), "splats")

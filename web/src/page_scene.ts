@@ -67,7 +67,7 @@ export class PageScene {
         this.edits = { header, received, taken: performance.now() };
         done(null);
       } catch (error) {
-        if (error instanceof OutOfMemory) this.events.failed(error.message);
+        if (error instanceof TooLarge || error instanceof OutOfMemory) this.events.failed(error.message);
         done(said(error));
       }
     });

@@ -5,6 +5,10 @@ import type { Level, Vec3 } from "../src/field/level";
 import { Pacing } from "../src/field/pacing";
 import { Choice, memoryLimit } from "../src/field/choice";
 import { patched } from "../src/field/page_edits";
+import { indexWith, ownBricks, readLayer } from "../src/field/page_layers";
+import type { Layer } from "../src/field/page_layers";
+import { Places } from "../src/field/places";
+import { Stored } from "../src/field/stored";
 import { ByteReader, PageFile } from "../src/field/page_file";
 import { SETTLES, Still } from "../src/field/still";
 import { Orbit } from "../src/viewer/orbit";
@@ -48,13 +52,14 @@ describe("bricks in textures", () => {
     const layout = layoutOf(level(), 256);
     expect(layout.dims).toEqual([2, 1, 1]);
     expect(layout.count).toBe(2);
-    const filler = new Filler(level(), layout);
+    const filler = new Filler(layout, [Stored.ofLevel(level())]);
     const width = layout.across[0] * 9;
-    const plane = width * layout.across[1] * 9;
+    const slice = width * layout.across[1] * 9;
     for (let n = 0; n < 2; n++) {
       const [i, j, k] = layout.index.subarray(4 * layout.bricks[n]);
-      const layer = filler.layer(k);
-      const at = (x: number, y: number, z: number): number => x * plane + (j * 9 + y) * width + i * 9 + z;
+      const plane = layout.across[0] * layout.across[1];
+      const layer = filler.texels(layout.bricks.subarray(k * plane, (k + 1) * plane), layout.across[0], layout.across[1]);
+      const at = (x: number, y: number, z: number): number => x * slice + (j * 9 + y) * width + i * 9 + z;
       for (const [x, y, z] of [[0, 0, 0], [1, 8, 3], [1, 2, 8]] as Vec3[]) {
         const value = 100 * (8 * n + x) + 10 * y + z;
         expect(layer.density[at(x, y, z)]).toBe(value);
@@ -70,6 +75,85 @@ describe("bricks in textures", () => {
 
   it("are refused where textures are too small", () => {
     expect(() => layoutOf(level(), 9)).toThrow(TooLarge);
+  });
+});
+
+/** A layer of the same grid: vertex (9, 0, 0) has the density 7, and (9, 1, 0) none; brick 0 is as the field's. */
+function layer(key: string, cells = [0, 1]): Layer {
+  const masks = new Uint8Array(64);
+  // Of brick 1, in which (9, 0, 0) and (9, 1, 0) are the places 64 and 72.
+  masks[8] = 1;
+  masks[9] = 1;
+  return { key, low: [0, 0, 0], dims: [2, 1, 1], cells: Uint8Array.from(cells), bricks: Uint8Array.from([0, 1]), masks, density: Uint16Array.from([7, 0]), sh: Uint8Array.from([1, 128, 2, 128, 3, 128]) };
+} // prettier-ignore
+
+describe("layers of a field", () => {
+  it("are unpacked from their arrays", async () => {
+    const arrays: [string, string, Uint8Array<ArrayBuffer>][] = [
+      ["box", "i4", new Uint8Array(Int32Array.from([1, 2, 3, 1, 1, 2]).buffer)],
+      ["cells", "u1", Uint8Array.from([0, 2])],
+      ["bricks", "u1", Uint8Array.from([1, 0])],
+      ["masks", "u1", new Uint8Array(64).fill(3, 0, 1)],
+      ["density", "u1", Uint8Array.from([1, 2, 3, 4])],
+      ["sh", "u1", Uint8Array.from([1, 1, 0, 255, 2, 0])],
+    ];
+    const deflated = async (data: Uint8Array<ArrayBuffer>): Promise<Uint8Array> =>
+      new Uint8Array(await new Response(new Blob([data]).stream().pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
+    const blobs = await Promise.all(arrays.map(([, , data]) => deflated(data)));
+    const entries = arrays.map(([name, type], n) => ({ name: `layer.0.${name}`, type, shape: [], bytes: blobs[n].length }));
+    const text = new TextEncoder().encode(JSON.stringify({ arrays: entries }));
+    const start = new Uint8Array(16);
+    start.set(new TextEncoder().encode("somefile"));
+    new DataView(start.buffer).setUint32(8, 1, true);
+    new DataView(start.buffer).setUint32(12, text.length, true);
+    const whole = Uint8Array.from([...start, ...text, ...blobs.flatMap((blob) => [...blob])]);
+    const read = await readLayer(await PageFile.open(new ByteReader(whole.buffer), "somefile", 1), "layer.0", "a");
+    expect([read.key, read.low, read.dims]).toEqual(["a", [1, 2, 3], [1, 1, 2]]);
+    expect([[...read.cells], [...read.density], [...read.sh]]).toEqual([[0, 2], [0x301, 0x402], [129, 130, 128, 127, 130, 130]]); // prettier-ignore
+    const stored = new Stored(read, 8, read.low, read.dims);
+    expect([stored.slot(8, 16, 24), stored.slot(8, 16, 25), stored.slot(8, 16, 26), stored.slot(7, 16, 24)]).toEqual([0, 1, -1, -1]);
+  });
+
+  it("have their own vertices, and the field's where they have none", () => {
+    const layout = layoutOf(level(), 256, 3);
+    const stored = [new Stored(layer("a"), 8, [0, 0, 0], [2, 1, 1]), Stored.ofLevel(level())];
+    const { density, colours } = new Filler(layout, stored).texels([1], 1, 1);
+    expect([...density.subarray(81, 81 + 3)]).toEqual([7, 901, 902]);
+    expect([...colours[0].subarray(4 * 81, 4 * 81 + 3)]).toEqual([1, 2, 3]);
+    // Emptied there, and not what the field has.
+    expect([density[81 + 9], density[81 + 10]]).toEqual([0, 911]);
+    expect(density[0]).toBe(800);
+  });
+
+  it("are found behind the field, the bricks that are as the field's where these are", () => {
+    const layout = layoutOf(level(), 256, 3);
+    const entry = (index: Uint8Array, brick: number): number[] => [...index.subarray(4 * brick, 4 * brick + 4)];
+    const [first, second] = [layer("a"), layer("b", [2, 0])];
+    expect([...ownBricks(first, layout)]).toEqual([1]);
+    expect([...ownBricks(second, layout)]).toEqual([]);
+    const layers = [{ layer: first, place: 2, first: 0, end: 2 }, { layer: second, place: 4, first: -1, end: 2 }]; // prettier-ignore
+    const { dims, index } = indexWith(layout, layers, (each) => (each === first ? [2] : []));
+    expect(dims).toEqual([6, 1, 1]);
+    const place = (n: number): number[] => [n % layout.across[0], Math.floor(n / layout.across[0]) % layout.across[1], Math.floor(n / (layout.across[0] * layout.across[1])), 255]; // prettier-ignore
+    expect(entry(index, 0)).toEqual(place(0));
+    expect(entry(index, 2)).toEqual(place(0));
+    expect(entry(index, 3)).toEqual(place(2));
+    expect(entry(index, 4)).toEqual([0, 0, 0, 0]);
+    expect(entry(index, 5)).toEqual(place(1));
+  });
+
+  it("take places, keep them, and free them once they are not used", () => {
+    const places = new Places(10, 15);
+    expect([...(places.take("a", 2) ?? [])]).toEqual([10, 11]);
+    expect([...(places.take("b", 2) ?? [])]).toEqual([12, 13]);
+    expect(places.take("c", 2)).toBeNull();
+    expect([places.left, places.of("c")]).toEqual([1, null]);
+    places.keep(new Set(["b"]));
+    expect([places.left, places.of("a")]).toEqual([3, null]);
+    expect([...(places.take("c", 3) ?? [])]).toEqual([10, 11, 14]);
+    expect([...(places.of("b") ?? [])]).toEqual([12, 13]);
+    places.keep(new Set());
+    expect(places.left).toBe(5);
   });
 });
 

@@ -18,7 +18,7 @@ describe("splats from far to near", () => {
 
   it("leaves out hidden ones, and numbers changed ones after the others", () => {
     const means = Float32Array.of(0, 0, 1, 0, 0, 2, 0, 0, 3);
-    const changed = Float32Array.of(0, 0, 2.5, 0, 0, -2);
+    const changed = Float32Array.of(0, 0, 2.5, 0, 0, -2, NaN, 0, 2);
     const set = { means, hidden: Uint8Array.of(0, 1, 0), changed };
     expect([...depthOrder(set, depths)]).toEqual([2, 3, 0]);
   });

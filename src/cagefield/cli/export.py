@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -24,10 +25,14 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.cages import Cage
+    from cagefield.exporting.path_states import PathEdits
     from cagefield.fields.splat import SplatField
     from cagefield.scene import Scene
 
 What = Literal["splats", "mesh", "points", "page"]
+
+LARGE = 25e6
+"""Bytes of a page from which on a line warns."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class Export:
     """Scene folder."""
     out: Output
     """Splats: .ply, .compressed.ply, .spz, .sog, .splat or .glb; a mesh: .ply or .glb; points: .ply; a page
-    of a scene of voxels, one file that any browser opens without a server: .html; with --embed a folder."""
+    that any browser opens without a server: .html; with --embed a folder."""
     what: Annotated[What, tyro.conf.arg(name="as")] = "splats"
     """What to write; a file that ends in .html is a page."""
     embed: Flag = False
@@ -108,7 +113,14 @@ class Export:
         devices.start(self.device)
         path = self.scene / "camera_path.json"
         keys, loop = load_keys(path) if path.is_file() else ((), False)
-        page = ScenePage.of(scene, self.scene.resolve().name, keys, loop=loop)
+        with progress_bar("Edits along the path") as move:
+            page = ScenePage.of(
+                scene,
+                self.scene.resolve().name,
+                keys,
+                loop=loop,
+                on_progress=lambda done: move(done, 1.0, ""),
+            )
         if self.embed:
             written = page.folder()
             write_folder(self.out, written)
@@ -122,13 +134,14 @@ class Export:
         shown = f"{edits} edit{'s' * (edits != 1)}, " if edits else "no edits, "
         way = f"a camera path of {len(keys)} keys" if len(keys) > 1 else "no camera path"
         print(f"a page of {size / 1e6:.1f} MB: {shown}{way}")
-        if page.along is not None:
-            mean, most = (error / scene.field.sample_spacing for error in page.along.error)
-            print(
-                f"edits along the path: {page.along.states} states, lattices of {page.along.nodes}^3 nodes, "
-                f"{len(page.along.data) / 1e6:.1f} MB; between two states they are {mean:.2g} voxels beside "
-                f"the edits of that moment in the mean, {most:.2g} at 99% of the points"
+        if size > LARGE:
+            warnings.warn(
+                f"the page has {size / 1e6:.0f} MB, more than the {LARGE / 1e6:.0f} that most sites and "
+                "phones take well; a smaller field, or fewer splats, make a smaller one",
+                stacklevel=2,
             )
+        if page.along is not None:
+            print(_along(page.along, scene))
         print(f"written to {self.out}")
         if self.embed:
             name = self.out.resolve().name
@@ -223,3 +236,22 @@ class Export:
             points = points.take(np.flatnonzero(inside(cages, points.positions)))
         write_points(self.out, points.positions, points.rgb, points.normals)
         return f"{len(points)} points with normals and colours"
+
+
+def _along(along: PathEdits, scene: Scene) -> str:
+    """A line of figures of the edits along the path."""
+    states = f"edits along the path: {along.states} states, "
+    size = f"{len(along.data) / 1e6:.1f} MB; between two states "
+    if along.nodes is None:
+        whole = "" if along.split else "; on the way none is split where an edit bends or cuts it"
+        extent = 2.0 * float(scene.field.half_size.max())
+        mean, most = (100.0 * error / extent for error in along.error)
+        return (
+            f"{states}{size}splats are {mean:.2g}% of the scene's size beside the edits of that moment "
+            f"in the mean, {most:.2g}% for 99% of them{whole}"
+        )
+    mean, most = (error / scene.field.sample_spacing for error in along.error)
+    return (
+        f"{states}lattices of {along.nodes}^3 nodes, {size}they are {mean:.2g} voxels beside the edits of "
+        f"that moment in the mean, {most:.2g} at 99% of the points"
+    )

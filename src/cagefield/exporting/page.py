@@ -1,4 +1,4 @@
-"""A scene of voxels as a page, one file or a folder: the field, its edits along a camera path, a viewer."""
+"""A scene as a page, one file or a folder: voxels or splats, their edits along a camera path, a viewer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import html
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,12 +22,17 @@ from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.exporting import FOV_X, scene_up
 from cagefield.exporting.path_states import PathEdits, path_edits
-from cagefield.fields.voxel import VoxelField
+from cagefield.exporting.splat_path_states import splat_path_edits
+from cagefield.fields.splat import SplatField
 from cagefield.formats.page_edits import encode_page_edits, for_pages
 from cagefield.formats.page_field import encode_page_field
 from cagefield.formats.page_file import bytes_until
+from cagefield.formats.page_splat_edits import encode_page_splat_edits
+from cagefield.formats.page_splats import encode_page_splats
 from cagefield.keyframes import Keyframe, stills
+from cagefield.rendering.deformed_splats import changed_splats
 from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.splat_splitting import split_of
 from cagefield.scene import Scene
 
 _HERE = files("cagefield.exporting")
@@ -67,25 +72,26 @@ class ScenePage:
         *,
         loop: bool = False,
         step: float = 0.5,
+        on_progress: Callable[[float], None] = lambda done: None,
     ) -> ScenePage:
-        """The page of an edited scene of voxels, with the camera path of `keys`.
+        """The page of an edited scene, with the camera path of `keys`.
 
-        `step` is the distance between samples in voxels.
+        `step` is the distance between samples in voxels. `on_progress` is told how much is done of the edits
+        along the path.
 
         Raises:
-            CagefieldError: the scene holds splats.
+            CagefieldError: the scene holds discs (2DGS).
             EditError: edits that cannot be evaluated, or more than a page takes.
         """
         field = scene.field
-        if not isinstance(field, VoxelField):
-            raise CagefieldError(
-                "the scene holds splats; a page shows voxels: write the splats as .ply, .spz or .sog instead"
-            )
-        plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
-        found = {"field": encode_page_field(field, step=step, background=scene.background)}
-        if scene.edits.active:
-            found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
-        along = path_edits(plain, scene.edits, keys, loop)
+        if isinstance(field, SplatField):
+            found, along = _splat_files(scene, field, keys, loop, on_progress)
+        else:
+            plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
+            found = {"field": encode_page_field(field, step=step, background=scene.background)}
+            if scene.edits.active:
+                found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
+            along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
         if along is not None:
             found["path"] = along.data
         header = {
@@ -143,6 +149,31 @@ def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
     with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
         for name, data in written.items():
             (draft / name).write_bytes(data)
+
+
+def _splat_files(
+    scene: Scene,
+    field: SplatField,
+    keys: tuple[Keyframe, ...],
+    loop: bool,
+    on_progress: Callable[[float], None],
+) -> tuple[dict[str, bytes], PathEdits | None]:
+    """(files by name, edits along the path) of a scene of splats."""
+    if field.discs:
+        raise CagefieldError(
+            "the scene's splats are discs (2DGS), which pages do not draw; "
+            "export them as .ply, or render a video"
+        )
+    found = {"field": encode_page_splats(field, background=scene.background)}
+    preserve_opacity = scene.preserve_opacity
+    if scene.edits.active:
+        split = split_of(field, scene.edits)
+        changed = changed_splats(field, scene.edits, preserve_opacity=preserve_opacity, split=split)
+        found["edits"] = encode_page_splat_edits(field, changed)
+    along = splat_path_edits(
+        field, scene.edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
+    )
+    return found, along
 
 
 def _viewer() -> bytes:

@@ -2,24 +2,25 @@
 
     rows        [44 E + 2 B, 4] float32. Of each edit 8 rows, its numbers in `warps.packing`:
                     box's min, first | box's max, last | lattice's origin, nodes an axis |
-                    to nodes, row 0, continuous | row 1, simple | row 2 | node box's min, first node | max
+                    to nodes, row 0, continuous | row 1, simple | row 2, under | node box's min, first node |
+                    max, part
                 and the hexahedra 0 and 1, 18 rows each: W (its first w is the affine flag), c, the box of y,
                 the bend [4,3], the image [8,3]. Then min and max of the boxes outside which nothing changes.
     lattice.N   [2, 3 R^3] uint8, low and high bytes of float16 displacements in world units, of lattice N
+    layer.N.*   the arrays of layer N (`page_layers`), of those that the edits' patches have
     occupancy   [bx, by, bz] uint16, codes of the deformed field (`rendering.occupancy`), from `origin` on
 
 Inner cages are exact. Shells are lattices: an edit whose shell is evaluated exactly gets one of LATTICE nodes
 an axis, and finer ones than FINEST_LATTICE are made that coarse. In the GPU's texture every lattice begins at
 a multiple of ROW_OF_NODES nodes, so that one can be uploaded without the others.
 
-The header names lattices and the occupancy by keys, digests of their content. A file for a page that has
-some of them already leaves those out; of an occupancy whose grid the page has, it holds the part that
+The header names lattices, layers and the occupancy by keys, digests of their content. A file for a page that
+has some of them already leaves those out; of an occupancy whose grid the page has, it holds the part that
 changed, which `part` says: the key of the one before, and the part's first brick.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,6 +33,7 @@ from cagefield.edits import EditStack
 from cagefield.edits.edit import Edit
 from cagefield.errors import EditError
 from cagefield.formats.page_file import LEVEL, byte_planes, pack
+from cagefield.formats.page_layers import bricks_of, digest, encode_layer, layer_key
 from cagefield.rendering.occupancy import Occupancy
 from cagefield.rendering.renderer import Renderer
 from cagefield.typing import Float32
@@ -39,7 +41,7 @@ from cagefield.warps import packing as row_layout
 from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.edit_lattice import nodes_of
 
-MAGIC, VERSION = b"cageedit", 2
+MAGIC, VERSION = b"cageedit", 3
 
 LATTICE = 64
 """Nodes an axis of the lattices of edits that have none: 1.5 MB of halves."""
@@ -60,7 +62,7 @@ class PageEdits:
 
     data: bytes
     keys: tuple[str, ...] = ()
-    """Of the lattices and, last, the occupancy."""
+    """Of the lattices, the layers and, last, the occupancy."""
     occupancy: Occupancy | None = field(default=None, repr=False)
 
 
@@ -106,18 +108,25 @@ def encode_changed_edits(
             if key not in has and all(key != before["key"] for before in lattices):
                 arrays[f"lattice.{len(lattices)}"] = byte_planes(nodes.reshape(-1).astype(np.float16))
             lattices.append({"key": key, "nodes": len(nodes)})
+    layers: list[dict[str, Any]] = []
+    for layer, place in zip(renderer.edits.layers, renderer.edits.places, strict=True):
+        key = layer_key(layer)
+        if key not in has and all(key != before["key"] for before in layers):
+            arrays.update(encode_layer(layer, renderer.field, f"layer.{len(layers)}"))
+        layers.append({"key": key, **bricks_of(layer, place)})
     occupancy, codes = _occupancy(renderer.occupancy, has, occupancies or {})
     header = {
         "edits": len(edits),
         "boxes": len(stack.boxes) if edits else 0,
         "preserve_opacity": renderer.preserve_opacity,
         "lattices": lattices,
+        "layers": layers,
         "occupancy": occupancy,
     }
     arrays = {"rows": table, **arrays}
     if codes is not None:
         arrays["occupancy"] = codes.astype(np.uint16)
-    keys = (*(str(lattice["key"]) for lattice in lattices), str(occupancy["key"]))
+    keys = (*(str(each["key"]) for each in (*lattices, *layers)), str(occupancy["key"]))
     return PageEdits(pack(MAGIC, VERSION, header, arrays, level), keys, renderer.occupancy)
 
 
@@ -144,7 +153,7 @@ def _occupancy(
 ) -> tuple[dict[str, Any], NDArray[np.int32] | None]:
     """The header of an occupancy, and its codes, or the part of them that a page has to be sent."""
     codes, origin = occupancy.codes, [int(n) for n in occupancy.origin]
-    key = _digest(np.asarray([*origin, *codes.shape], np.int64), codes)
+    key = digest(np.asarray([*origin, *codes.shape], np.int64), codes)
     header: dict[str, Any] = {"key": key, "origin": origin, "dims": list(codes.shape), "part": None}
     if key in has:
         return header, None
@@ -169,15 +178,8 @@ _keys: WeakKeyDictionary[Edit, str] = WeakKeyDictionary()
 def _lattice_key(edit: Edit, nodes: Float32) -> str:
     """The key of an edit's lattice; worked out once in the edit's life."""
     if edit not in _keys:
-        _keys[edit] = _digest(nodes)
+        _keys[edit] = digest(nodes)
     return _keys[edit]
-
-
-def _digest(*arrays: NDArray[Any]) -> str:
-    content = hashlib.blake2b(digest_size=8)
-    for array in arrays:
-        content.update(np.ascontiguousarray(array).tobytes())
-    return content.hexdigest()
 
 
 def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
@@ -189,8 +191,9 @@ def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
     out[0:2, :3] = row[p.BOX : p.BOX + 6].reshape(2, 3)
     out[2:6, :3] = row[p.TO_NODES : p.TO_NODES + 12].reshape(4, 3)
     out[6:8, :3] = row[p.NODE_BOX : p.NODE_BOX + 6].reshape(2, 3)
-    out[:7, 3] = (
-        row[p.FIRST], row[p.LAST], row[p.RESOLUTION], row[p.CONTINUOUS], row[p.SIMPLE], 0.0, first_node,
+    out[:8, 3] = (
+        row[p.FIRST], row[p.LAST], row[p.RESOLUTION], row[p.CONTINUOUS], row[p.SIMPLE], row[p.UNDER],
+        first_node, row[p.PART],
     )  # fmt: skip
     for number in range(2):
         record = row[p.RECORDS + number * p.RECORD : p.RECORDS + (number + 1) * p.RECORD]

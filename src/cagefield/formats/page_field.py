@@ -28,6 +28,8 @@ from cagefield.errors import FieldError
 from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_file import byte_planes, from_byte_planes, pack, unpack
 from cagefield.rendering.occupancy import of_field
+from cagefield.typing import Float32
+from cagefield.warps.weak_memo import kept
 
 MAGIC, VERSION = b"cagepage", 1
 
@@ -147,32 +149,74 @@ _PARTS = ("bricks", "masks", "occupancy", "density", "sh")
 
 
 def _encode_level(field: VoxelField) -> Level:
-    stored = _shown(field)
-    bricks = _bricks(field.resolution)
-    flat = np.zeros(int(np.prod(field.resolution)), bool)
-    flat[field.vertices[stored]] = True
-    order, masks = _in_bricks(flat, field.resolution)
-    held = masks.any(axis=1)
-    slot = np.searchsorted(field.vertices, order)
-    unit = 1.0 / float(field.voxel_size.min())
-    half = np.clip(field.density[slot] / unit, -HALF_MAX, HALF_MAX).astype(np.float16)
-    steps = np.maximum(np.abs(field.sh[slot]).max(axis=(0, 2)) / 127.0, FINEST)
-    whole = 128 + np.round(field.sh[slot] / steps[:, None])
-    planes = whole.astype(np.uint8).transpose(1, 2, 0)
+    steps = steps_of(field)
+    shown = _shown(field)
+    parts = encode_vertices(
+        field.vertices[shown],
+        field.resolution,
+        quantised_density(field.density[shown], field),
+        quantised_colours(field.sh[shown], field),
+    )
     codes = of_field(field).codes.astype(np.uint16)
     header = {
         "resolution": list(field.resolution),
-        "vertices": len(order),
-        "unit": unit,
+        "vertices": parts["density"].shape[1],
+        "unit": unit_of(field),
         "steps": [float(s) for s in steps],
         "dims": list(codes.shape),
     }
     return header, {
-        "bricks": held.reshape(bricks).astype(np.uint8),
-        "masks": np.packbits(masks[held], axis=1, bitorder="little"),
+        "bricks": parts["bricks"],
+        "masks": parts["masks"],
         "occupancy": codes,
-        "density": byte_planes(half),
-        "sh": np.diff(planes, axis=2, prepend=np.uint8(128)),
+        "density": parts["density"],
+        "sh": parts["sh"],
+    }
+
+
+def unit_of(field: VoxelField) -> float:
+    """Density of 1 in a field's file, in world units: one over the shortest edge of its voxels."""
+    return 1.0 / float(field.voxel_size.min())
+
+
+@kept
+def steps_of(field: VoxelField) -> Float32:
+    """Steps [K] of a field's colour coefficients, of which 127 reach the largest that a picture shows."""
+    largest = np.abs(field.sh[_shown(field)]).max(axis=(0, 2), initial=0.0)
+    return np.maximum(largest / 127.0, FINEST).astype(np.float32)
+
+
+def quantised_density(density: Float32, field: VoxelField) -> NDArray[np.float16]:
+    """Densities [M] as the file of a field has them."""
+    return np.clip(density / unit_of(field), -HALF_MAX, HALF_MAX).astype(np.float16)
+
+
+def quantised_colours(sh: Float32, field: VoxelField) -> NDArray[np.uint8]:
+    """Coefficients [M,K,3] as the file of a field has them; those beyond its 127 steps are cut off."""
+    whole = 128 + np.round(sh / steps_of(field)[:, None])
+    return np.clip(whole, 0, 255).astype(np.uint8)
+
+
+def encode_vertices(
+    vertices: NDArray[np.int64],
+    resolution: tuple[int, int, int],
+    density: NDArray[np.float16],
+    sh: NDArray[np.uint8],
+) -> dict[str, NDArray[Any]]:
+    """The arrays `bricks`, `masks`, `density` and `sh` of vertices of a grid.
+
+    vertices [M]: linear indices, rising; density [M] and sh [M,K,3] quantised.
+    """
+    flat = np.zeros(int(np.prod(resolution)), bool)
+    flat[vertices] = True
+    order, masks = _in_bricks(flat, resolution)
+    held = masks.any(axis=1)
+    slot = np.searchsorted(vertices, order)
+    return {
+        "bricks": held.reshape(_bricks(resolution)).astype(np.uint8),
+        "masks": np.packbits(masks[held], axis=1, bitorder="little"),
+        "density": byte_planes(density[slot]),
+        "sh": np.diff(sh[slot].transpose(1, 2, 0), axis=2, prepend=np.uint8(128)),
     }
 
 

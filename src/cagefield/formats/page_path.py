@@ -5,6 +5,8 @@
     occupancy  [bx, by, bz] uint16, codes of a grid of bricks that holds the field in all states
     lattice.k  [2, 3 N] uint8, halves as in `page_edits`. Entry n of the header's `lattices` says which of
                them the edits of state n have
+    layer.k.*  as `page_layers` has them. Entry n of the header's `layers` has those of state n: [k, place,
+               first, end], see `page_layers.bricks_of`
     rows.n     as `page_edits` has them, of state n
 
 Only rows and nodes differ from state to state, so that a state is a mean of two where both have the same
@@ -22,8 +24,10 @@ from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
 from cagefield.edits.edit import Edit
+from cagefield.fields.voxel import VoxelField
 from cagefield.formats.page_edits import page_rows
 from cagefield.formats.page_file import byte_planes, pack
+from cagefield.formats.page_layers import bricks_of, encode_layer, layer_key
 from cagefield.rendering.occupancy import BRICK, Occupancy, encode, masks_of
 from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.packing import (
@@ -34,26 +38,29 @@ from cagefield.warps.packing import (
     LAST,
     LOW,
     OFFSET,
+    PART,
     RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
+    UNDER,
 )
 
-MAGIC, VERSION = b"cagepath", 1
+MAGIC, VERSION = b"cagepath", 2
 
 
 @dataclass(frozen=True)
 class PathState:
-    """A stack on the way: its active edits and, packed, their numbers and nodes."""
+    """A stack on the way: its active edits and, packed, their numbers and nodes; its layers' places."""
 
     edits: tuple[Edit, ...]
     packed: DeviceStack
+    places: tuple[int, ...]
 
     @classmethod
     def of(cls, edits: EditStack) -> PathState:
         """Raises EditError for a stack that cannot be evaluated."""
-        return cls(edits.active, DeviceStack.from_stack(edits))
+        return cls(edits.active, DeviceStack.from_stack(edits), edits.places)
 
     @property
     def lattices(self) -> list[NDArray[np.float32]]:
@@ -64,6 +71,7 @@ class PathState:
 
 
 def encode_page_path(
+    field: VoxelField,
     times: Sequence[float],
     order: Sequence[int],
     states: Sequence[PathState],
@@ -71,7 +79,7 @@ def encode_page_path(
     *,
     preserve_opacity: bool,
 ) -> bytes:
-    """The file of `states`, of which number `order[k]` is shown at `times[k]`.
+    """The file of `states` of a field, of which number `order[k]` is shown at `times[k]`.
 
     All states have lattices of the same sizes in the same order. Raises EditError for more edits than a page
     takes.
@@ -91,11 +99,24 @@ def encode_page_path(
             place = known.setdefault(lattice.tobytes(), len(known))
             arrays.setdefault(f"lattice.{place}", byte_planes(lattice.reshape(-1).astype(np.float16)))
             lattices[-1].append(place)
+    held: dict[str, int] = {}
+    layers: list[list[list[int]]] = []
+    for state in states:
+        layers.append([])
+        found = (layer for edit in state.edits for layer in edit.layers)
+        for layer, place in zip(found, state.places, strict=True):
+            key = layer_key(layer)
+            if key not in held:
+                held[key] = len(held)
+                arrays.update(encode_layer(layer, field, f"layer.{held[key]}"))
+            layers[-1].append([held[key], *bricks_of(layer, place).values()])
     header = {
         "edits": [len(state.edits) for state in states],
         "boxes": [len(state.packed.boxes) if state.edits else 0 for state in states],
         "lattices": lattices,
         "stored": len(known),
+        "layers": layers,
+        "layer_keys": list(held),
         "preserve_opacity": preserve_opacity,
         "origin": occupancy.origin.tolist(),
         "dims": list(occupancy.codes.shape),
@@ -103,9 +124,9 @@ def encode_page_path(
     return pack(MAGIC, VERSION, header, arrays)
 
 
-_KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE]
+_KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE, UNDER, PART]
 _KINDS += [RECORDS + number * RECORD + AFFINE for number in range(2)]
-"""Columns that say of what kind an edit is."""
+"""Columns that say of what kind an edit is, and where its layers lie."""
 
 
 def mixable(one: PathState, other: PathState) -> bool:

@@ -22,6 +22,9 @@ from cagefield.typing import Array, Float32, Mask
 AT_ONCE = 1 << 18
 """Vertices that are taken through the edits at a time."""
 
+NOTICED = 0.01
+"""A difference between colour coefficients that shows: a hundredth of the range, or less."""
+
 SOLID = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
@@ -111,6 +114,20 @@ class Block:
     def colours(self, where: Mask) -> Array:
         """Colours [N,3], the mean over directions, at the vertices of a mask with slots."""
         return np.asarray(0.5 + C0 * self.sh[self.slot[where], 0], np.float64)
+
+    def cropped(self, first: NDArray[np.int64], last: NDArray[np.int64]) -> Block:
+        """The vertices from `first` to `last` [3], both of them included, or as far as the block goes."""
+        first, last = np.maximum(first, 0), np.minimum(last, np.array(self.shape) - 1)
+        part = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
+        return replace(self, low=self.low + first, density=self.density[part], slot=self.slot[part])
+
+    def differs(self, other: Block) -> Mask:
+        """Vertices [X,Y,Z] where it has another density than a block of the same place, or other colours."""
+        changed = self.density != other.density
+        both = (self.slot >= 0) & (other.slot >= 0)
+        apart = np.abs(self.sh[self.slot[both]] - other.sh[other.slot[both]]).max(axis=(1, 2))
+        changed[both] |= apart > NOTICED
+        return np.asarray(changed | ((self.slot >= 0) != (other.slot >= 0)))
 
     def layer(self) -> VoxelField:
         """The block as a layer of the field: the vertices with colours, and its two corners."""

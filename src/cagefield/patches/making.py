@@ -13,7 +13,7 @@ from cagefield.edits import Edit
 from cagefield.edits.patch import Patch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import SOLID, Block, block_of
+from cagefield.patches.block import SOLID, Block, block_of, world_of
 from cagefield.patches.extent import RIM, patch_box
 from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
@@ -50,7 +50,8 @@ def patch_of(
         footprint = footprint_of(under, support, work.part, hidden)
         if footprint is not None:
             under = rebuilt(under, footprint, work.inside)
-    return Patch(work.region, under.layer(), None if part is None else part.layer())
+    region, under = work.around(under)
+    return Patch(region, under.layer(), None if part is None else part.layer())
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +84,18 @@ class _Work:
             emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
+
+    def around(self, under: Block) -> tuple[Cage, Block]:
+        """(the region that shows a block, the block): no more of it than differs from what was there."""
+        field, changed = under.field, np.argwhere(under.differs(self.before) | self.inside)
+        if not len(changed):
+            return self.region, under
+        first, last = changed.min(axis=0), changed.max(axis=0)
+        # A vertex shows in the cells around it, which need their own vertices.
+        low, high = world_of(field, np.stack([first - 1, last + 1]) + under.low)
+        if field.contracted and np.abs((np.stack([low, high]) - field.center) / field.half_size).max() > 1.0:
+            return self.region, under
+        return Cage.box(0.5 * (low + high), high - low), under.cropped(first - 2, last + 2)
 
     @cached_property
     def rim(self) -> Mask:
@@ -143,4 +156,6 @@ class _Work:
         lighting = Lighting(where, log).smoothed(block)
         block = block.relit(where, np.exp(lighting.log_ratio))
         kept = ndimage.binary_dilation(self.inside, iterations=2)
-        return replace(block, slot=np.where(kept, block.slot, -1))
+        at = np.argwhere(kept)
+        part = replace(block, slot=np.where(kept, block.slot, -1))
+        return part.cropped(at.min(axis=0), at.max(axis=0)) if len(at) else part

@@ -44,7 +44,8 @@ def seen_pairs(
     Without cameras it is looked at from around its bounds [2,3].
     """
     chance = np.random.default_rng(seed)
-    chosen = [cameras[int(n)] for n in np.linspace(0, len(cameras) - 1, VIEWS)] if cameras else around(bounds)
+    picked = {int(n) for n in np.linspace(0, len(cameras) - 1, VIEWS)} if cameras else set()
+    chosen = [cameras[n] for n in sorted(picked)] or around(bounds)
     found = [_pairs(render(smaller(camera)), smaller(camera), chance) for camera in chosen]
     return SeenPairs(*(np.concatenate([getattr(pair, f.name) for pair in found]) for f in fields(SeenPairs)))
 

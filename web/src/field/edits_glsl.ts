@@ -126,8 +126,9 @@ void interpolate(int e, int resolution_, vec3 at, inout vec3 p, inout vec3 v) {
   v += s.x * (x0 + f.z * (x1 - x0)) + s.y * (y0 + f.z * (y1 - y0)) + s.z * (z1 - z0);
 }
 
-// Takes a sample through the edit whose numbers begin at a row; true where it was emptied.
-bool mapEdit(int e, inout vec3 p, inout vec3 v) {
+// Takes a sample through the edit whose numbers begin at a row. Where it is to be read then: 0 in the field, or by
+// the place of a layer, how many vertices further along x; -1 nowhere.
+int mapEdit(int e, inout vec3 p, inout vec3 v) {
   bool continuous = rows[e + 3].w > 0.5;
   int resolution_ = int(rows[e + 2].w);
   int first = e + 8;
@@ -135,25 +136,25 @@ bool mapEdit(int e, inout vec3 p, inout vec3 v) {
     vec3 y = times(first, p - rows[first + 3].xyz);
     if (largest(abs(y)) <= 1.0 + EDGE) {
       image(clamp(y, -1.0, 1.0), first, p, v);
-      return false;
+      return 0;
     }
     vec3 at = times(e + 3, p - rows[e + 2].xyz);
     if (inBox(at, rows[e + 6].xyz, rows[e + 7].xyz)) interpolate(e, resolution_, at, p, v);
-    return false;
+    return 0;
   }
   float error;
   if (rows[e].w < 0.5) {
     vec3 xi = hexahedron(p, first, error);
     if (error <= EDGE) {
       image(xi, first, p, v);
-      return false;
+      return int(rows[e + 7].w);
     }
   }
-  if (rows[e + 1].w < 1.5) return false;
+  if (rows[e + 1].w < 1.5) return 0;
   hexahedron(p, first + 18, error);
-  if (!continuous) return error <= EDGE;
+  if (!continuous) return error <= EDGE ? int(rows[e + 5].w) : 0;
   if (error <= EDGE) interpolate(e, resolution_, times(e + 3, p - rows[e + 2].xyz), p, v);
-  return false;
+  return 0;
 }
 
 MAP_SAMPLE
@@ -191,11 +192,11 @@ export function unrolled(edits: number): number | null {
 
 /** The source for so many edits; see `unrolled`. */
 export function editsSource(count: number | null): string {
-  const one = (e: string): string => `if (inBox(p, rows[${e}].xyz, rows[${e} + 1].xyz) && mapEdit(${e}, p, v)) return true;`;
+  const one = (e: string): string => `if (place == 0 && inBox(p, rows[${e}].xyz, rows[${e} + 1].xyz)) place = mapEdit(${e}, p, v);`;
   const all =
     count === null
       ? [`for (int n = editCount - 1; n >= 0; n--) { ${one("n * ROW")} }`]
       : Array.from({ length: count }, (_, n) => one(`${count - 1 - n} * ROW`));
-  const body = ["bool mapSample(inout vec3 p, inout vec3 v) {", ...all.map((line) => `  ${line}`), "  return false;", "}"];
+  const body = ["int mapSample(inout vec3 p, inout vec3 v) {", "  int place = 0;", ...all.map((line) => `  ${line}`), "  return place;", "}"];
   return SOURCE.replace("MAP_SAMPLE", `${body.join("\n")}\n`);
 }

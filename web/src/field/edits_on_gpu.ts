@@ -31,6 +31,12 @@ export class EditsOnGpu {
     return this.occupancy?.texture ?? null;
   }
 
+  /** Counts bytes that were uploaded for the edits elsewhere. */
+  count(bytes: number): void {
+    this.uploaded.last += bytes;
+    this.uploaded.total += bytes;
+  }
+
   /** Takes other edits; throws where there are more than the shader holds, or than the GPU has memory for. */
   set(edits: PageEdits | null): void {
     this.uploaded.last = 0;

@@ -12,9 +12,7 @@
  */
 import { unrolled } from "./edits_glsl";
 import { EditsOnGpu } from "./edits_on_gpu";
-import { deleteField, uploadLevel, uploadOccupancy } from "./field_textures";
-import type { FieldTextures } from "./field_textures";
-import { programOf } from "./gl";
+import { OutOfMemory, programOf } from "./gl";
 import type { Program } from "./gl";
 import { readLevels } from "./level";
 import type { Level, Vec3 } from "./level";
@@ -23,8 +21,10 @@ import type { Variant } from "./march_glsl";
 import { reachOf, setField, setView } from "./march_uniforms";
 import type { PinholeCamera } from "./march_uniforms";
 import type { PageEdits } from "./page_edits";
+import type { PlacedLayer } from "./page_layers";
 import type { Bytes, OnArrival } from "./page_file";
 import { plainState, unbind, WHOLE } from "./present";
+import { ShownField } from "./shown_field";
 import type { SceneDrawer } from "./scene_drawer";
 import { Targets } from "./targets";
 import type { Reading } from "./targets";
@@ -51,14 +51,6 @@ export interface Picture {
   columns?: { first: number; count: number };
 }
 
-interface Shown {
-  level: Level;
-  textures: FieldTextures;
-  occupancy: WebGLTexture;
-  /** An occupancy without anything to leap over, for a coarse level under edits: theirs is that of the full one. */
-  solid: WebGLTexture | null;
-}
-
 /** Bytes of textures that a field may take unless the caller says otherwise. */
 const MEMORY = 768 * 2 ** 20;
 
@@ -76,7 +68,7 @@ export class FieldRenderer implements SceneDrawer {
   /** Milliseconds that the last new shader took to compile. */
   compileTime = 0;
   compiled = 0;
-  private shown: Shown | null = null;
+  private shown: ShownField | null = null;
   private readonly onGpu: EditsOnGpu;
   private readonly views: Views;
   private camera: PinholeCamera | null = null;
@@ -143,13 +135,14 @@ export class FieldRenderer implements SceneDrawer {
     this.shown = null;
     for (const part of [this.targets, this.views, this.onGpu]) part.forget();
     const turn = ++this.loading;
-    if (shown) await this.take(shown.level, () => turn === this.loading);
     this.setEdits(edits);
+    if (shown) await this.take(shown.level, () => turn === this.loading);
   }
 
   /** The edits that the field is seen through; null for none. Uploads what is other than before. */
   setEdits(edits: PageEdits | null): void {
     this.onGpu.set(edits);
+    this.putLayers();
   }
 
   /** Draws what the camera sees into `targets`; false while there is nothing to draw. */
@@ -184,13 +177,14 @@ export class FieldRenderer implements SceneDrawer {
     };
     bind("densityAtlas", gl.TEXTURE_3D, textures.density);
     bind("brickIndex", gl.TEXTURE_3D, textures.index);
-    bind("bricks", gl.TEXTURE_3D, active ? this.deformed(shown) : shown.occupancy);
+    bind("bricks", gl.TEXTURE_3D, active ? (level.last ? this.onGpu.bricks : shown.withoutLeaps) : shown.occupancy);
     textures.colours.forEach((texture, n) => bind(`colourAtlas${n}`, gl.TEXTURE_3D, texture));
     if (active) {
       bind("lattice", gl.TEXTURE_2D, this.onGpu.bind(program));
       gl.uniform1i(uniform("editCount"), active.edits);
       gl.uniform1i(uniform("boxCount"), active.boxes);
       gl.uniform1i(uniform("preserveOpacity"), Number(active.preserveOpacity));
+      gl.uniform1i(uniform("layered"), Number(shown.layered));
     }
     const { first, count } = picture.rows ?? { first: 0, count: height };
     const across = picture.columns ?? { first: 0, count: width };
@@ -241,26 +235,31 @@ export class FieldRenderer implements SceneDrawer {
   }
 
   private async take(level: Level, wanted: () => boolean): Promise<void> {
-    const textures = await uploadLevel(this.gl, level, this.memory, wanted);
-    if (textures === null) return;
+    const shown = await ShownField.upload(this.gl, this.memory, level, this.layers, wanted);
+    if (shown === null) return;
     this.drop();
-    this.shown = { level, textures, occupancy: uploadOccupancy(this.gl, level.occupancy), solid: null };
+    this.shown = shown;
+    this.putLayers();
+  }
+
+  /** The layers that the edits' patches have. */
+  private get layers(): readonly PlacedLayer[] {
+    return this.onGpu.edits?.layers ?? [];
+  }
+
+  private putLayers(): void {
+    try {
+      if (this.shown) this.onGpu.count(this.shown.putLayers(this.layers));
+    } catch (error) {
+      // The GPU had no memory for the field's textures with more room, and has those before no more.
+      if (error instanceof OutOfMemory) this.drop();
+      throw error;
+    }
   }
 
   private drop(): void {
-    if (!this.shown) return;
-    deleteField(this.gl, this.shown.textures);
-    this.gl.deleteTexture(this.shown.occupancy);
-    this.gl.deleteTexture(this.shown.solid);
+    this.shown?.dispose();
     this.shown = null;
-  }
-
-  /** The occupancy of the field under its edits. */
-  private deformed(shown: Shown): WebGLTexture | null {
-    if (shown.level.last) return this.onGpu.bricks;
-    const { occupancy } = shown.level;
-    shown.solid ??= uploadOccupancy(this.gl, { ...occupancy, codes: new Uint16Array(occupancy.codes.length).fill(255) });
-    return shown.solid;
   }
 
   /** The nearest and farthest distance of the field's box from the camera. */

@@ -30,18 +30,22 @@ export interface FieldHeader {
   levels: LevelHeader[];
 }
 
-/** One level: M vertices, brick by brick. */
-export interface Level {
-  field: FieldHeader;
-  header: LevelHeader;
-  /** Whether it is the full one. */
-  last: boolean;
+/** M vertices, brick by brick. */
+export interface Vertices {
   bricks: Uint8Array;
   masks: Uint8Array;
   /** [M] halves. */
   density: Uint16Array;
   /** [K, 3, M], 128 is 0. */
   sh: Uint8Array;
+}
+
+/** One level. */
+export interface Level extends Vertices {
+  field: FieldHeader;
+  header: LevelHeader;
+  /** Whether it is the full one. */
+  last: boolean;
   occupancy: Occupancy;
 }
 
@@ -60,22 +64,26 @@ export async function* readLevels(
       const bricks = (await file.read(`${number}.bricks`)) as Uint8Array;
       const masks = (await file.read(`${number}.masks`)) as Uint8Array;
       const codes = (await file.read(`${number}.occupancy`)) as Uint16Array;
-      const density = (await file.read(`${number}.density`)) as Uint8Array;
-      const sh = (await file.read(`${number}.sh`)) as Uint8Array;
+      const values = await readValues(file, `${number}`);
       yield {
         field: file.header,
         header,
         last: number === file.header.levels.length - 1,
         bricks,
         masks,
-        density: joined(density),
-        sh: summed(sh, header.vertices),
+        ...values,
         occupancy: { origin: [0, 0, 0], dims: header.dims, codes },
       };
     }
   } finally {
     reader.cancel();
   }
+}
+
+/** Densities and colours of vertices. */
+export async function readValues(file: PageFile<unknown>, name: string): Promise<{ density: Uint16Array; sh: Uint8Array }> {
+  const density = joined((await file.read(`${name}.density`)) as Uint8Array);
+  return { density, sh: summed((await file.read(`${name}.sh`)) as Uint8Array, density.length) };
 }
 
 /** Numbers of 16 bits whose low bytes come first, then their high ones. */
@@ -88,6 +96,7 @@ export function joined(planes: Uint8Array): Uint16Array {
 
 /** Rows of `count` bytes from their differences, in place. */
 export function summed(rows: Uint8Array, count: number): Uint8Array {
+  if (count === 0) return rows;
   for (let first = 0; first < rows.length; first += count) {
     let value = 128;
     for (let n = first; n < first + count; n++) rows[n] = value = (value + rows[n]) & 255;

@@ -39,6 +39,7 @@ uniform vec3 eye;
 uniform mat3 rotation;
 uniform vec4 lens;
 uniform float height;
+uniform bool layered;
 layout(location = 0) out vec4 outColour;
 layout(location = 1) out uint outDepth;
 #ifdef NORMALS
@@ -99,14 +100,15 @@ vec3 toGrid(vec3 p) {
   return g;
 }
 
-// The texel, whole where a vertex is, of grid coordinates in the atlas; false where their brick is empty.
-bool locate(vec3 g, out vec3 texel, out ivec3 corner) {
+// The texel, whole where a vertex is, of grid coordinates in the atlas, of the field or of the layer at a place; false
+// where their brick is empty.
+bool locate(vec3 g, int place, out vec3 texel, out ivec3 corner) {
   vec3 inside = clamp(g, vec3(0.0), vec3(resolution - 1));
   ivec3 b = min(ivec3(inside) / BRICK, indexDims - 1);
-  uvec4 place = texelFetch(brickIndex, b.zyx, 0);
-  corner = ivec3(place.xyz) * (BRICK + 1);
+  uvec4 entry = texelFetch(brickIndex, ivec3(b.zy, b.x + place / BRICK), 0);
+  corner = ivec3(entry.xyz) * (BRICK + 1);
   texel = vec3(corner) + (inside - vec3(b * BRICK)).zyx;
-  return place.a > 0u;
+  return entry.a > 0u;
 }
 
 // Gradient of the interpolated density in grid coordinates.
@@ -196,22 +198,24 @@ void main() {
     }
     bool alive = true;
     bool moved = false;
+    int place = 0;
     vec3 view = d;
 #ifdef EDITED
     if (t >= edited.x && t <= edited.y) {
       vec3 p = eye + t * d;
       vec3 canonical = p;
-      bool emptied = mapSample(canonical, view);
+      place = mapSample(canonical, view);
       vec3 by = abs(canonical - p);
       moved = max(max(by.x, by.y), by.z) > 0.0;
-      if (emptied) alive = false;
+      if (place < 0) alive = false;
+      else if (!layered) place = 0;
       if (moved) g = toGrid(canonical);
     }
 #endif
     vec3 texel;
     ivec3 corner;
     alive = alive && all(greaterThanEqual(g, vec3(-1e-3))) && all(lessThanEqual(g, vec3(resolution - 1) + 1e-3));
-    if (alive && locate(g, texel, corner)) {
+    if (alive && locate(g, place, texel, corner)) {
       vec3 at = (texel + 0.5) * atlasScale;
       float raw = textureLod(densityAtlas, at, 0.0).r * unit;
 #ifdef COUNT

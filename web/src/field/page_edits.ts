@@ -2,12 +2,15 @@
 import { joined } from "./level";
 import type { Occupancy, Vec3 } from "./level";
 import { ByteReader, PageFile } from "./page_file";
+import { readLayer } from "./page_layers";
+import type { PlacedLayer } from "./page_layers";
 
 interface EditsHeader {
   edits: number;
   boxes: number;
   preserve_opacity: boolean;
   lattices: { key: string; nodes: number }[];
+  layers: { key: string; place: number; first: number; end: number }[];
   occupancy: { key: string; origin: Vec3; dims: Vec3; part: { of: string; low: Vec3; dims: Vec3 } | null };
 }
 
@@ -32,18 +35,24 @@ export interface PageEdits {
   /** [edits * ROW + boxes * 2, 4]. */
   rows: Float32Array;
   lattices: Lattice[];
+  layers: PlacedLayer[];
   occupancy: DeformedOccupancy;
 }
 
 /** The edits of a file. What a file leaves out is that of `before`; throws where those do not have it either. */
 export async function readEdits(source: ArrayBuffer, before: PageEdits | null = null): Promise<PageEdits> {
-  const file = await PageFile.open<EditsHeader>(new ByteReader(source), "cageedit", 2);
+  const file = await PageFile.open<EditsHeader>(new ByteReader(source), "cageedit", 3);
   const { header } = file;
   const rows = (await file.read("rows")) as Float32Array;
   const lattices: Lattice[] = [];
   for (const [n, { key }] of header.lattices.entries()) {
     const known = [...lattices, ...(before?.lattices ?? [])].find((lattice) => lattice.key === key);
     lattices.push(known ?? { key, halves: joined((await file.read(`lattice.${n}`)) as Uint8Array) });
+  }
+  const layers: PlacedLayer[] = [];
+  for (const [n, { key, ...where }] of header.layers.entries()) {
+    const known = [...layers, ...(before?.layers ?? [])].find(({ layer }) => layer.key === key);
+    layers.push({ layer: known?.layer ?? (await readLayer(file, `layer.${n}`, key)), ...where });
   }
   const { key, origin, dims, part } = header.occupancy;
   const old = before?.occupancy ?? null;
@@ -55,7 +64,7 @@ export async function readEdits(source: ArrayBuffer, before: PageEdits | null = 
     else if (old?.key === part.of) occupancy = { key, origin, dims, codes: patched(old, part.low, part.dims, codes), changed: { ...part, codes } };
     else throw new Error("the edits are the change of ones that this page has not");
   }
-  return { edits: header.edits, boxes: header.boxes, preserveOpacity: header.preserve_opacity, rows, lattices, occupancy };
+  return { edits: header.edits, boxes: header.boxes, preserveOpacity: header.preserve_opacity, rows, lattices, layers, occupancy };
 }
 
 /** The codes of an occupancy with others in the part that begins at `low`. */

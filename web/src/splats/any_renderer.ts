@@ -142,7 +142,8 @@ function isOfSplats(edits: AnyEdits | null): edits is SplatEdits {
   return edits !== null && "hidden" in edits;
 }
 
-function magicOf(bytes: Bytes): string {
+/** The first 8 letters of a file: which kind it is of. */
+export function magicOf(bytes: Bytes): string {
   return String.fromCharCode(...bytes.subarray(0, 8));
 }
 

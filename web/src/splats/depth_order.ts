@@ -6,7 +6,7 @@ export interface SplatSet {
   means: Float32Array;
   /** [count], or null where none is hidden. */
   hidden: Uint8Array | null;
-  /** [M, 3], or null where none is changed. */
+  /** [M, 3], NaN where one is not shown; null where none is changed. */
   changed: Float32Array | null;
 }
 
@@ -41,7 +41,7 @@ export function depthOrder(set: SplatSet, depths: Depths): Uint32Array<ArrayBuff
     for (let n = own; n < most; n++) {
       const at = 3 * (n - own);
       const depth = x * changed[at] + y * changed[at + 1] + z * changed[at + 2] + offset;
-      if (depth < near) continue;
+      if (!(depth >= near)) continue;
       keys[count] = depth;
       numbers[count++] = n;
     }

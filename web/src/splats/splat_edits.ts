@@ -31,14 +31,31 @@ export interface SplatEdits {
 export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
   const file = await PageFile.open<EditsHeader>(new ByteReader(source), EDITS_MAGIC, VERSION);
   const { count, changed } = file.header;
-  const bits = (await file.read("hidden")) as Uint8Array;
-  const hidden = new Uint8Array(count);
-  for (let n = 0; n < count; n++) hidden[n] = (bits[n >> 3] >> (n & 7)) & 1;
+  const hidden = unpackedBits((await file.read("hidden")) as Uint8Array, count);
   const sources = (await file.read("sources")) as Int32Array;
   const means = (await file.read("means")) as Float32Array<ArrayBuffer>;
   const covariances = (await file.read("covariances")) as Float32Array<ArrayBuffer>;
   const opacities = wholes((await file.read("opacities")) as Uint8Array);
   const turns = wholes((await file.read("turns")) as Uint8Array);
+  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns) };
+}
+
+/** The first `count` bits, 0 or 1, the lowest of a byte first. */
+export function unpackedBits(bits: Uint8Array, count: number): Uint8Array<ArrayBuffer> {
+  const out = new Uint8Array(count);
+  for (let n = 0; n < count; n++) out[n] = (bits[n >> 3] >> (n & 7)) & 1;
+  return out;
+}
+
+/** The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3, M]. */
+export function changedRecords(
+  sources: Int32Array,
+  means: Float32Array<ArrayBuffer>,
+  covariances: Float32Array<ArrayBuffer>,
+  opacities: Uint16Array,
+  turns: Uint16Array,
+): Uint32Array<ArrayBuffer> {
+  const changed = sources.length;
   const records = new Uint32Array(CHANGED * changed);
   const [mean, covariance] = [new Uint32Array(means.buffer), new Uint32Array(covariances.buffer)];
   for (let n = 0; n < changed; n++) {
@@ -49,5 +66,5 @@ export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
     records[at + 10] = turns[n] | (turns[changed + n] << 16);
     records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
   }
-  return { count, hidden, changed, means, records };
+  return records;
 }

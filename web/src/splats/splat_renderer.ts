@@ -6,6 +6,7 @@
  * that is blended over what is there. The order of many splats comes from a worker: while the view is turned a
  * picture has the order of a moment ago, and `onOrder` says when it is worth drawing again.
  */
+import { TooLarge } from "../field/atlas";
 import type { LoadOptions, Picture } from "../field/field_renderer";
 import { programOf } from "../field/gl";
 import type { Program } from "../field/gl";
@@ -27,9 +28,10 @@ import { projecting } from "./project_glsl";
 import { Projection } from "./projection";
 import { same, Sorter } from "./sorter";
 import type { Order } from "./sorter";
+import { CHANGED } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
 import { readSplatLevels } from "./splat_file";
-import { SplatStore } from "./splat_store";
+import { PROJECTED, SplatStore } from "./splat_store";
 import { WordTexture } from "./splat_textures";
 
 type GL = WebGL2RenderingContext;
@@ -43,14 +45,15 @@ const OUTSIDE = 0.3;
 interface Changed {
   edits: SplatEdits;
   texture: WordTexture;
-  /** The splats that are drawn with these edits. */
+  /** The splats that are drawn with these edits, and those of the field they were made of. */
   set: SplatSet | null;
+  own: SplatSet | null;
 }
 
 export class SplatRenderer implements SceneDrawer<SplatEdits> {
   background: Vec3 = [1, 1, 1];
   near = 0;
-  /** Whether the edits are seen; false shows the splats before them. Splats are shown without until all are there. */
+  /** Whether the edits are seen, of the splats that are there; false shows those before them. */
   edited = true;
   readonly targets: Targets;
   readonly inBands = false;
@@ -92,9 +95,8 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     for (const sorter of Object.values(this.sorters)) sorter.onOrder = call;
   }
 
-  /** Edits are of all splats: before all are there they cannot be seen. */
   get editable(): boolean {
-    return this.store?.isWhole ?? false;
+    return this.count > 0;
   }
 
   /** Splats that can be drawn, without edits. */
@@ -158,7 +160,7 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.setEdits(changed?.edits ?? null);
   }
 
-  /** What edits changed; null for nothing. Throws where it is of other splats. */
+  /** What edits changed; null for nothing. Throws where it is of other splats, `TooLarge` beyond the memory. */
   setEdits(edits: SplatEdits | null): void {
     this.changed?.texture.dispose();
     this.changed = null;
@@ -166,9 +168,12 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     if (edits === null || (edits.changed === 0 && !edits.hidden.includes(1))) return;
     if (this.store !== null && edits.count !== this.store.header.count)
       throw new Error(`edits of ${edits.count} splats, the page has ${this.store.header.count}; reload it`);
+    const bytes = this.bytes + (4 * CHANGED + PROJECTED) * edits.changed;
+    if (bytes > this.memory)
+      throw new TooLarge(`the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`);
     const texture = new WordTexture(this.gl, edits.records.length);
     if (edits.changed > 0) texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
-    this.changed = { edits, texture, set: null };
+    this.changed = { edits, texture, set: null, own: null };
     this.uploaded.last = edits.changed > 0 ? edits.records.byteLength : 0;
     this.uploaded.total += this.uploaded.last;
   }
@@ -247,8 +252,11 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
   /** The splats that are drawn: the same object while they are the same. */
   private shown(store: SplatStore): SplatSet {
     const { changed } = this;
-    if (!this.edited || changed === null || !store.isWhole) return store.set;
-    changed.set ??= { means: store.set.means, hidden: changed.edits.hidden, changed: changed.edits.means };
+    if (!this.edited || changed === null) return store.set;
+    if (changed.set === null || changed.own !== store.set) {
+      changed.own = store.set;
+      changed.set = { means: store.set.means, hidden: changed.edits.hidden, changed: arrivedOf(changed.edits, store) };
+    }
     return changed.set;
   }
 
@@ -378,4 +386,14 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     }
     return program;
   }
+}
+
+const mebibytes = (bytes: number): number => Math.ceil(bytes / 2 ** 20);
+
+/** The means of changed splats, NaN where those whose colours they have are not there yet. */
+function arrivedOf({ means, records, changed }: SplatEdits, store: SplatStore): Float32Array {
+  if (store.isWhole) return means;
+  const out = Float32Array.from(means);
+  for (let n = 0; n < changed; n++) if (records[CHANGED * n + 3] >= store.count) out[3 * n] = NaN;
+  return out;
 }

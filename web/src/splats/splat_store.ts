@@ -9,7 +9,7 @@ import { WordTexture } from "./splat_textures";
 type GL = WebGL2RenderingContext;
 
 /** Bytes of a projected splat, with its normal, and of its number in the order. */
-const PROJECTED = 16 * (OUTPUTS + 1) + 4;
+export const PROJECTED = 16 * (OUTPUTS + 1) + 4;
 
 export class SplatStore {
   /** The splats as they are without edits. */

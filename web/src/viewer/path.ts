@@ -30,3 +30,12 @@ export function viewAt({ stills, seconds, loop }: Path, time: number): View {
     fov_y_deg: one.fov_y_deg + t * (other.fov_y_deg - one.fov_y_deg),
   };
 }
+
+/** Between which two of rising times a moment lies, the first of them, and at which share of the way. */
+export function placeAt(times: Float32Array, seconds: number): { first: number; share: number } {
+  const last = times.length - 1;
+  let first = 0;
+  while (first < last - 1 && times[first + 1] <= seconds) first++;
+  const share = (seconds - times[first]) / Math.max(1e-9, times[first + 1] - times[first]);
+  return { first, share: Math.max(0, Math.min(1, share)) };
+}

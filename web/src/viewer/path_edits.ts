@@ -3,9 +3,11 @@ import { ROW } from "../field/edits_glsl";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
-import type { Bytes } from "../field/page_file";
 import type { Lattice, PageEdits } from "../field/page_edits";
+import { readLayer } from "../field/page_layers";
+import type { Layer, PlacedLayer } from "../field/page_layers";
 import { mixedHalves } from "./halves";
+import { placeAt } from "./path";
 
 interface PathHeader {
   edits: number[];
@@ -13,6 +15,9 @@ interface PathHeader {
   /** Of each state, which lattices its edits have; and how many there are. */
   lattices: number[][];
   stored: number;
+  /** Of each state, [layer, place, first, end] of those that its edits have (see `PlacedLayer`); and their keys. */
+  layers: [number, number, number, number][][];
+  layer_keys: string[];
   preserve_opacity: boolean;
   origin: Vec3;
   dims: Vec3;
@@ -23,6 +28,7 @@ interface State {
   boxes: number;
   rows: Float32Array;
   lattices: Lattice[];
+  layers: PlacedLayer[];
 }
 
 /** Rows of an edit of which lower and upper ends of a box are kept: its own, and those of its two hexahedra. */
@@ -37,8 +43,8 @@ export class PathEdits {
     private readonly states: State[],
   ) {}
 
-  static async read(source: ReadableStream<Bytes> | ArrayBuffer): Promise<PathEdits> {
-    const file = await PageFile.open<PathHeader>(new ByteReader(source), "cagepath", 1);
+  static async read(source: ArrayBuffer): Promise<PathEdits> {
+    const file = await PageFile.open<PathHeader>(new ByteReader(source), "cagepath", 2);
     const { header } = file;
     const times = (await file.read("times")) as Float32Array;
     const order = (await file.read("states")) as Uint16Array;
@@ -47,8 +53,11 @@ export class PathEdits {
     const stored: Lattice[] = [];
     for (const n of header.edits.keys()) rows.push((await file.read(`rows.${n}`)) as Float32Array);
     for (let k = 0; k < header.stored; k++) stored.push({ key: `${k}`, halves: joined((await file.read(`lattice.${k}`)) as Uint8Array) });
+    const layers: Layer[] = [];
+    for (const [k, key] of header.layer_keys.entries()) layers.push(await readLayer(file, `layer.${k}`, key));
     const states = header.edits.map((edits, n) => {
-      return { edits, boxes: header.boxes[n], rows: rows[n], lattices: header.lattices[n].map((k) => stored[k]) };
+      const placed = header.layers[n].map(([k, place, first, end]) => ({ layer: layers[k], place, first, end }));
+      return { edits, boxes: header.boxes[n], rows: rows[n], lattices: header.lattices[n].map((k) => stored[k]), layers: placed };
     });
     const occupancy = { key: "path", origin: header.origin, dims: header.dims, codes, changed: null };
     return new PathEdits(header, times, order, occupancy, states);
@@ -56,13 +65,10 @@ export class PathEdits {
 
   /** The edits at seconds from the path's begin. */
   at(seconds: number): PageEdits {
-    const { times, order, states } = this;
-    const last = times.length - 1;
-    let k = 0;
-    while (k < last - 1 && times[k + 1] <= seconds) k++;
-    const share = Math.max(0, Math.min(1, (seconds - times[k]) / Math.max(1e-9, times[k + 1] - times[k])));
-    const one = states[order[k]];
-    const other = states[order[k + 1]];
+    const { order, states } = this;
+    const { first, share } = placeAt(this.times, seconds);
+    const one = states[order[first]];
+    const other = states[order[first + 1]];
     const near = share < 0.5 ? one : other;
     if (one === other || !alike(one, other)) return this.edits(near, near.rows, near.lattices);
     const lattices = one.lattices.map((lattice, n) => {
@@ -73,8 +79,8 @@ export class PathEdits {
     return this.edits(one, mixedRows(one, other, share), lattices);
   }
 
-  private edits({ edits, boxes }: State, rows: Float32Array, lattices: Lattice[]): PageEdits {
-    return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattices, occupancy: this.occupancy };
+  private edits({ edits, boxes, layers }: State, rows: Float32Array, lattices: Lattice[]): PageEdits {
+    return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattices, layers, occupancy: this.occupancy };
   }
 }
 

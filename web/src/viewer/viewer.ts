@@ -1,8 +1,7 @@
 /** An exported scene: its field and edits, with orbit, before/after and the camera path; no server of its own. */
-import { FieldRenderer } from "../field/field_renderer";
 import { finished, Pacing } from "../field/pacing";
-import { readEdits } from "../field/page_edits";
-import type { PageEdits } from "../field/page_edits";
+import { AnyRenderer, magicOf, readAnyEdits } from "../splats/any_renderer";
+import type { AnyEdits } from "../splats/any_renderer";
 import { listen } from "./fingers";
 import { Orbit } from "./orbit";
 import { viewAt } from "./path";
@@ -10,6 +9,7 @@ import type { Path, View } from "./path";
 import { PathEdits } from "./path_edits";
 import { open, whole } from "./sources";
 import type { FileEntry } from "./sources";
+import { SPLAT_PATH, SplatPath } from "./splat_path";
 import type { Vec3 } from "./vectors";
 
 /** What an exported file says of its scene. */
@@ -28,7 +28,7 @@ const STILL = 120;
 const MOST_PIXELS_PER_POINT = 2;
 
 export class SceneViewer {
-  readonly renderer: FieldRenderer;
+  readonly renderer: AnyRenderer;
   orbit: Orbit;
   private readonly gl: WebGL2RenderingContext;
   private readonly pacing = new Pacing();
@@ -42,9 +42,9 @@ export class SceneViewer {
   pictures = 0;
   private playing: number | null = null;
   /** The scene's edits; undefined while they are on their way. */
-  private edits: PageEdits | null | undefined;
+  private edits: AnyEdits | null | undefined;
   /** The edits along the path, and whether it can be played. */
-  private along: PathEdits | null = null;
+  private along: PathEdits | SplatPath | null = null;
   canPlay = false;
 
   constructor(
@@ -56,7 +56,7 @@ export class SceneViewer {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
     if (!gl) throw new Error("This browser has no WebGL2, which the scene is drawn with.");
     this.gl = gl;
-    this.renderer = new FieldRenderer(gl);
+    this.renderer = new AnyRenderer(gl);
     this.renderer.background = header.background ?? [1, 1, 1];
     this.orbit = new Orbit(header.start.c2w, header.up, header.centre);
     this.fov = header.start.fov_y_deg;
@@ -85,7 +85,7 @@ export class SceneViewer {
       },
     });
     await edits;
-    if (files.path) this.along = await PathEdits.read(await open("path", files.path));
+    if (files.path) this.along = await readPath(await whole(await open("path", files.path)));
     this.canPlay = this.header.path !== null;
     this.arrived(1);
   }
@@ -93,7 +93,7 @@ export class SceneViewer {
   /** Loads the scene's edits, once there is something to see. */
   private async loadEdits(): Promise<void> {
     const { files } = this.header;
-    this.edits = files.edits ? await readEdits(await whole(await open("edits", files.edits))) : null;
+    this.edits = files.edits ? await readAnyEdits(await whole(await open("edits", files.edits)), null) : null;
     this.renderer.setEdits(this.edits);
     this.touch();
   }
@@ -132,7 +132,7 @@ export class SceneViewer {
   /** Shows a moment of the camera path. */
   seek(path: Path, seconds: number): void {
     const time = path.loop ? seconds % path.seconds : Math.min(seconds, path.seconds);
-    if (this.along) this.renderer.setEdits(this.along.at(time));
+    if (this.along) this.renderer.setEdits(this.along.at(time) ?? this.edits ?? null);
     this.look(viewAt(path, time));
   }
 
@@ -188,9 +188,10 @@ export class SceneViewer {
     const size = still ? [width, height] : [width, height].map((n) => Math.max(8, Math.round(n * scale)));
     this.aim(size[0], size[1]);
     const first = still ? this.row : 0;
-    const count = still ? Math.min(pacing.rows(width, height), height - first) : size[1];
+    const count = still && renderer.inBands ? Math.min(pacing.rows(width, height), height - first) : size[1];
     const moved = this.moved;
-    if (!renderer.render({ rows: { first, count } })) return;
+    const sorted = performance.now() - moved > STILL;
+    if (!renderer.render({ rows: { first, count }, sorted })) return;
     const whole = first + count >= size[1];
     if (whole) {
       renderer.show(width, height);
@@ -199,7 +200,8 @@ export class SceneViewer {
     pacing.took(size[0] * count, await finished(gl));
     if (this.moved !== moved) return;
     this.sketched = true;
-    if (still) this.row = whole ? null : first + count;
+    // Splats in the order of a moment ago are drawn anew.
+    if (still) this.row = !whole ? first + count : renderer.inOrder ? null : 0;
   }
 
   private aim(width: number, height: number): void {
@@ -207,4 +209,8 @@ export class SceneViewer {
     this.renderer.setSize(width, height);
     this.renderer.setCamera({ c2w: this.orbit.c2w, width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2 });
   }
+}
+
+async function readPath(file: ArrayBuffer): Promise<PathEdits | SplatPath> {
+  return magicOf(new Uint8Array(file)) === SPLAT_PATH ? await SplatPath.read(file) : await PathEdits.read(file);
 }

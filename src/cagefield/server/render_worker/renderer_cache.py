@@ -115,15 +115,16 @@ class RendererCache:
         voxel = self.scene.field.sample_spacing
         inner = Cage.box(self._middle, 8.0 * voxel)
         edit = Edit(inner, inner.grown(8.0 * voxel), lattice=8).translate((2.0 * voxel, 0.0, 0.0))
+        size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
+        camera = Camera.look_at(
+            self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
+        )
         if stage is WarmStage.DELETION:
             self.plain.with_edits(EditStack([Edit.delete(inner)]))
+            self.plain.render(camera)  # as patches do, to find out about the light
             return
         renderer = self.plain.with_edits(EditStack([edit]), coarse=stage is not WarmStage.EXACT_EDIT)
         if stage is WarmStage.PICTURE:
-            size = float(np.linalg.norm(self._middle)) + 4.0 * self._radius
-            camera = Camera.look_at(
-                self._middle + size * np.array([1.0, 0.0, 0.3]), self._middle, width=8, height=8, fov_x=0.5
-            )
             renderer.render(camera)
 
     def renderer(self, shown: Shown, exact: bool, proceed: Callable[[], None] | None = None) -> AnyRenderer:

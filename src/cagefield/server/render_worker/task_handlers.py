@@ -134,12 +134,10 @@ class TaskHandlers:
         if isinstance(field, SplatField):
             edits = EditStack(self._renderers.edits(task.shown.edits))
             return dense(task.cage, deformed_splats(field, edits)).tolist()
-        from cagefield.warps.device_stack import DeviceStack
+        from cagefield.rendering.edited_field import EditedField
 
-        points = probes(task.cage)
-        stack = DeviceStack.from_stack(EditStack(self._renderers.edits(task.shown.edits)))
-        along = np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1))
-        canonical, _, _, emptied = stack.to_canonical(points.astype(np.float32), along)
-        sigma, _ = field(canonical.astype(np.float64), along)
-        found = (np.asarray(sigma) * field.sample_spacing > DENSE) & ~emptied
-        return found.tolist()
+        points = probes(task.cage).astype(np.float32)
+        edits = self._renderers.scene.patcher.patched(self._renderers.edits(task.shown.edits), moving=True)
+        edited = EditedField(field, edits, field.bounds, preserve_opacity=False)
+        sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
+        return (sigma * field.sample_spacing > DENSE).tolist()

@@ -1,0 +1,112 @@
+"""Exported pages in headless Chromium, without a server or with one that stops in the middle."""
+
+from __future__ import annotations
+
+import dataclasses
+import http.server
+import io
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from cagefield.cameras import Camera
+from cagefield.edits import EditStack
+from cagefield.scene import Scene
+from editor_page import CHROMIUM, FLAGS
+from gpu_objects import COUNT
+from page_fields import SIZE
+
+
+@contextmanager
+def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
+    """The page of a file, its first whole picture drawn, or of an address; it asks no other for anything."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine")
+    complaints: list[str] = []
+    asked: list[str] = []
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        page = browser.new_page(viewport={"width": SIZE, "height": SIZE}, has_touch=touch, is_mobile=touch)
+        page.add_init_script(f"({COUNT})()")
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda said: complaints.append(said.text))
+        page.on("request", lambda request: asked.append(request.url))
+        url = address.as_uri() if isinstance(address, Path) else address
+        page.goto(url, wait_until="commit")
+        if isinstance(address, Path):
+            settle(page)
+        yield page
+        browser.close()
+    assert complaints == []
+    assert [other for other in asked if not other.startswith((url.rsplit("/", 1)[0], "data:"))] == []
+
+
+def until(page: Any, condition: str, seconds: float = 120.0) -> None:
+    """Waits until an expression is true; the page's policy forbids waiting inside it."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, f"never came true: {condition}"
+        time.sleep(0.02)
+
+
+def settle(page: Any, level: str = "level?.last") -> None:
+    """Waits for the whole picture of the full level, or of a level, in `page`, a page or a frame."""
+    until(page, f"Boolean(window.cagefieldViewer?.viewer?.renderer.{level} && cagefieldViewer.viewer.whole)")
+    page.evaluate(
+        """document.querySelectorAll(".bar, .message, .arrived").forEach(e => e.style.visibility = "hidden")
+        || new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"""
+    )
+
+
+def pixels(page: Any) -> NDArray[np.uint8]:
+    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+
+
+def rendered(scene: Scene, camera: Camera, edits: bool = True) -> NDArray[np.uint8]:
+    if not edits:
+        scene = dataclasses.replace(scene, edits=EditStack([]))
+    frame = scene.render(camera, background=scene.background)
+    assert frame is not None
+    return frame.rgb8()
+
+
+@contextmanager
+def web_server(root: Path, cuts: Mapping[str, int], go_on: threading.Event) -> Iterator[str]:
+    """A server of a folder; of files named in `cuts` only so many bytes come before `go_on` is set."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def do_GET(self) -> None:
+            path = root / self.path.split("?")[0].lstrip("/")
+            data, cut = path.read_bytes(), cuts.get(path.name, 0)
+            self.send_response(200)
+            self.send_header("Content-Type", self.guess_type(str(path)))
+            self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data[:cut])
+            self.wfile.flush()
+            if cut:
+                go_on.wait(120.0)
+            self.wfile.write(data[cut:])
+
+        def log_message(self, *words: object) -> None:
+            """Says nothing."""
+
+    server = http.server.ThreadingHTTPServer(("localhost", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://localhost:{server.server_address[1]}"
+    finally:
+        go_on.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
