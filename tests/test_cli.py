@@ -194,6 +194,28 @@ def test_edit_check_writes_nothing(capsys: pytest.CaptureFixture[str], scene: Pa
     assert files_of(scene.parent) == before
 
 
+def test_edit_check_names_what_is_not_filled(
+    capsys: pytest.CaptureFixture[str], scene: Path, edit_file: Path
+) -> None:
+    away = """\
+  - name: moved
+    adjustment: discrete
+    inner: {center: [0, 0, 0.6], size: 0.3}
+    operations: [{translate: [0, 0, 0.2]}]
+"""
+    bare = "    fill: none\n    relight: none\n"
+    copy = away + "    keep_source: true\n" + bare
+    edit_file.write_text(GOOD_EDIT + bare + away + "    relight: none\n" + copy)
+    text = printed(capsys, "edit", scene, edit_file, "--check")
+    assert '1. "lift": continuous, flow shell, exact\n' in text
+    assert '2. "gone": delete, fill: none, relight: none\n' in text
+    assert '3. "moved": discrete move, relight: none\n' in text
+    assert '4. "moved": discrete copy, relight: none\n' in text  # which uncovers nothing
+    edit_file.write_text(GOOD_EDIT + away)
+    text = printed(capsys, "edit", scene, edit_file, "--check")
+    assert '2. "gone": delete\n' in text and '3. "moved": discrete move\n' in text
+
+
 INSIDE_OUT = "[[1,0,0],[0,0,0],[1,1,0],[0,1,0],[1,0,1],[0,0,1],[1,1,1],[0,1,1]]"
 
 

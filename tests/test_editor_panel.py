@@ -22,7 +22,7 @@ from PIL import Image
 from cagefield.edits import load_edits, parse_edits
 from editor_cone import EDITS, cone, difference, moved
 from editor_jobs import read_video, render
-from editor_page import PATIENCE, EditorPage, editor_page
+from editor_page import PATIENCE, EditorPage, asking, editor_page
 from editor_server import EditorServer, editor_server
 
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -104,6 +104,49 @@ def test_views_show_depth_opacity_and_normals(editor: EditorPage) -> None:
     editor.press("v")  # the last view's next is the first again
     editor.settle()
     assert difference(editor.pixels(), colour) < 0.1
+
+
+def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
+    opened: EditorPage, server: EditorServer, folder: Path
+) -> None:
+    """The cone's foot, which the cage leaves, is gone with it; the switch and its key show it again."""
+    (folder / "gone.yaml").write_text(
+        "- {name: gone, delete: true, inner: {center: [0.65, 0.5, -0.2], size: [0.36, 0.34, 0.36]}}"
+    )
+    tab = opened.tab(asking(server.link, "server"))
+    try:
+        tab.ready()
+        tab.loaded(folder / "gone.yaml")
+        column, row = np.round(tab.part("face", 5)).astype(int) - [round(tab.box["x"]), round(tab.box["y"])]
+
+        def redness() -> float:
+            """How much more red than green the ground is where the cone stood."""
+            red, green, _ = tab.pixels()[row - 4 : row + 5, column - 4 : column + 5].mean(axis=(0, 1))
+            return float(red - green)
+
+        fill, shadows = (
+            tab.page.locator(".pane .tp-lblv", has_text=label)
+            for label in ("Fill what is uncovered", "Shadows go along")
+        )
+        assert "goes on where it was" in fill.get_attribute("title")
+        assert redness() < 0.1
+        filled = tab.pixels()
+        tab.changed(fill.locator(".tp-ckbv_w").click)
+        assert tab.edit["fill"] == "none" and redness() > 0.25
+        tab.changed(lambda: tab.press("Shift+U"))
+        assert tab.edit["relight"] == "none" and redness() > 0.25
+        # A copy uncovers nothing, and a continuous edit has neither.
+        kind = tab.page.locator(".pane .tp-lblv", has_text="Delete").locator("select")
+        for label, shown in (("Copy", (False, True)), ("Continuous", (False, False))):
+            tab.changed(lambda label=label: kind.select_option(label=label))
+            assert (fill.is_visible(), shadows.is_visible()) == shown
+            tab.changed(lambda: tab.press("Control+z"))
+        tab.changed(lambda: tab.press("Shift+U"))
+        tab.changed(lambda: tab.press("u"))
+        assert not fill.locator("input").is_disabled() and fill.locator("input").is_checked()
+        assert difference(tab.pixels(), filled) < 0.1
+    finally:
+        tab.page.close()
 
 
 def test_the_split_shows_before_on_its_left_and_after_on_its_right(editor: EditorPage) -> None:

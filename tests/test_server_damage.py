@@ -11,14 +11,17 @@ from cagefield import devices
 from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
+from cagefield.patches.light import Ambience, reaches_of
 from cagefield.rendering.renderer import Renderer
+from cagefield.scene import Scene
 from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, pixels, screen_bounds, tiles, union
+from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
 from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
-from scenes import ball_scene
+from scenes import ball_field, ball_scene
 from sent_pictures import pixels_of
 
 SIDE = 64
@@ -274,6 +277,51 @@ def test_pictures_are_the_same_outside_what_is_rendered(renderers: RendererCache
     difference[y : y + h, x : x + w] = 0.0
     # Samples may lie elsewhere along a ray where the edits reach beyond the grid; nothing else differs.
     assert difference.max() < 0.02 and w * h < 0.9 * SIDE * SIDE
+
+
+PART_OF_BALL = Cage.box((0.4, 0, 0.25), (0.3, 0.3, 0.25))
+PATCHED = {
+    "delete": Edit.delete(PART_OF_BALL),
+    "move": Edit(PART_OF_BALL, adjustment="discrete").translate((0.3, 0, 0.1)),
+    "copy": Edit(PART_OF_BALL, adjustment="discrete", keep_source=True).translate((0.2, 0, 0.15)),
+}
+
+
+@pytest.fixture(scope="module")
+def shaded() -> Scene:
+    """A ball of small voxels, whose colours are said to follow its openness."""
+    field = ball_field(resolution=65)
+    scene = Scene(field)
+    scene.patcher.__dict__["ambience"] = Ambience(reaches_of(field), (0.1, 0.2, 0.3, 0.3))
+    return scene
+
+
+@pytest.mark.parametrize("name", PATCHED)
+def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: Scene, name: str) -> None:
+    patched = PATCHED[name]
+    bare = patched.replace(fill="none", relight="none")
+    extent = PatchExtent(shaded.field)
+    region = shaded.patcher.patched([patched])[0].boxes
+    assert (extent.boxes(patched).min(axis=(0, 1)) <= region.min(axis=(0, 1))).all()
+    assert (extent.boxes(patched).max(axis=(0, 1)) >= region.max(axis=(0, 1))).all()
+    assert np.array_equal(extent.boxes(bare), bare.boxes)
+    first, second = (shaded.with_edits(EditStack([edit])).render(CAMERA).rgb for edit in (bare, patched))
+    changed = EditStack([patched]).changed_boxes(EditStack([bare]), extent.boxes)
+    x, y, w, h = pixels(screen_bounds(CAMERA, changed), SIDE, SIDE)
+    difference = np.abs(first - second).max(axis=2)
+    assert difference.max() > 0.1
+    difference[y : y + h, x : x + w] = 0.0
+    assert difference.max() < 1e-3 and w * h < 0.5 * SIDE * SIDE
+
+
+def test_edits_that_stay_keep_their_shadows_while_another_moves(shaded: Scene) -> None:
+    edits = [PATCHED["copy"], PATCHED["move"]]
+    settled = shaded.patcher.patched(edits)
+    moved = [edits[0], edits[1].translate((0, 0, 0.1))]
+    moving = shaded.patcher.patched(moved, moving=True)
+    assert moving[0].patch is settled[0].patch is not None
+    assert moving[1].patch is not None and moving[1].patch.part is None
+    assert shaded.patcher.patched([edits[0].translate((0, 0, 0.1))], moving=True)[0].patch is None
 
 
 @pytest.mark.parametrize("view", ["colour", "depth", "opacity", "normals"])

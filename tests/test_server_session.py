@@ -16,6 +16,7 @@ from cagefield.server.editor.document import Document
 from cagefield.server.editor.drag_solver import Target, move_corners
 from cagefield.server.editor.history import History
 from cagefield.server.editor.session import Session
+from cagefield.server.protocol.conversion import edit_state
 
 BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 INNER = Cage.box((0, 0, 0), 0.4)
@@ -270,6 +271,31 @@ def test_kinds_keep_what_the_other_kinds_cannot_have() -> None:
     s.change(1, kind="continuous")
     edit = s.document.entry(1).edit
     assert (edit.falloff, edit.width, edit.operations) == ("linear", 0.5, (Translate((0.1, 0, 0)),))
+
+
+def test_fill_and_shadows_are_switched_undone_and_kept_through_kinds() -> None:
+    s = session(CUP.translate((0, 0.1, 0)))
+    assert (CUP.fill, CUP.relight) == ("surroundings", "occlusion")
+    s.change(1, fill="none")
+    s.change(1, relight="none")
+    assert s.history.names == ("Open", "Fill of cup", "Shadows of cup") and not s.saved
+    state = edit_state(s.document.entry(1), None, None)
+    assert (state.fill, state.relight) == ("none", "none")
+    for kind in ("continuous", "copy", "delete", "move"):
+        s.change(1, kind=kind)  # type: ignore[arg-type]
+        edit = s.document.entry(1).edit
+        assert (edit.fill, edit.relight) == ("none", "none") and s.problem(edit) is None
+    for _ in range(5):
+        s.undo()
+    edit = s.document.entry(1).edit
+    assert (edit.fill, edit.relight) == ("none", "occlusion")
+    s.undo()
+    assert s.document.entry(1).edit.fill == "surroundings" and s.saved
+    s.redo()
+    assert s.document.entry(1).edit.fill == "none"
+    s.change(1, locked=True)
+    with pytest.raises(EditError, match="locked"):
+        s.change(1, fill="surroundings")
 
 
 def test_a_discrete_edit_that_becomes_continuous_gets_an_outer_cage_it_fits() -> None:

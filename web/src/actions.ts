@@ -4,7 +4,7 @@ import { leading } from "./drag";
 import type { App } from "./app";
 import type { Command, EditState, Mirror, Place, Vec3 } from "./protocol";
 import { isSplats, openAddress, send } from "./upload";
-import { selected, target, type CageName, type Editor, type Tool, type View } from "./store";
+import { fillable, relightable, selected, target, type CageName, type Editor, type Tool, type View } from "./store";
 
 const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
 const CAGES: CageName[] = ["inner", "outer", "both"];
@@ -90,6 +90,22 @@ export class Actions {
     this.withSelected((edit) => {
       const kind = edit.kind === "continuous" ? "move" : "continuous";
       this.app.send({ type: "change", edit: edit.id, kind });
+    });
+  }
+
+  /** Fills what a move or a delete uncovers, or leaves it. */
+  toggleFill(): void {
+    this.withSelected((edit) => {
+      if (!fillable(this.app.store.now)) this.app.say("only a move or a delete of voxels uncovers something to fill", "warning");
+      else this.app.send({ type: "change", edit: edit.id, fill: edit.fill === "none" ? "surroundings" : "none" });
+    });
+  }
+
+  /** Lets shadows go along with a discrete edit, or stay. */
+  toggleShadows(): void {
+    this.withSelected((edit) => {
+      if (!relightable(this.app.store.now)) this.app.say("shadows go along only with a discrete edit of voxels", "warning");
+      else this.app.send({ type: "change", edit: edit.id, relight: edit.relight === "none" ? "occlusion" : "none" });
     });
   }
 

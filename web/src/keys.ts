@@ -24,6 +24,8 @@ export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: 
     { group: "Cages", keys: ["C"], what: "Set mode: inner cage, outer cage, both", run: () => actions.nextCage() },
     { group: "Cages", keys: ["I"], what: "Fit the inner cage to what is dense inside it", run: () => actions.fitInner() },
     { group: "Edits", keys: ["D"], what: "Discrete or continuous", run: () => actions.toggleKind() },
+    { group: "Edits", keys: ["U"], what: "Fill what is uncovered, or leave it", run: () => actions.toggleFill() },
+    { group: "Edits", keys: ["Shift+U"], what: "Shadows go along, or stay", run: () => actions.toggleShadows() },
     { group: "Edits", keys: ["H"], what: "Hide or show", run: () => actions.hide() },
     { group: "Edits", keys: ["Delete", "Backspace"], what: "Remove", run: () => actions.remove() },
     { group: "Edits", keys: ["Ctrl+D"], what: "Duplicate", run: () => actions.duplicate() },

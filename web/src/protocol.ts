@@ -140,6 +140,8 @@ export interface Change {
   shell?: ("flow" | "trilinear") | null;
   falloff?: ("smooth" | "linear") | null;
   width?: number | null;
+  fill?: ("surroundings" | "none") | null;
+  relight?: ("occlusion" | "none") | null;
   /**
    * 0: exact
    */
@@ -404,6 +406,8 @@ export interface EditState {
   shell: "flow" | "trilinear";
   falloff: "smooth" | "linear";
   width: number;
+  fill: "surroundings" | "none";
+  relight: "occlusion" | "none";
   lattice: number;
   lattice_error: [number, number] | null;
   inner: Corners;

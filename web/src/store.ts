@@ -152,3 +152,14 @@ export function obstacle(edit: EditState, mode: Editor["mode"]): string | null {
   if (mode === "edit" && edit.kind === "delete") return "a delete has nothing to move; choose another kind, or Set mode (Tab)";
   return null;
 }
+
+/** Whether the selected edit has light that goes along: discrete ones of voxels have. */
+export function relightable(editor: Editor): boolean {
+  const edit = selected(editor);
+  return edit !== null && edit.kind !== "continuous" && editor.hello?.splats !== true;
+}
+
+/** Whether the selected edit uncovers something that can be filled; a copy leaves its source where it is. */
+export function fillable(editor: Editor): boolean {
+  return relightable(editor) && selected(editor)?.kind !== "copy";
+}

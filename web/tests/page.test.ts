@@ -3,11 +3,11 @@ import { Connection, socketAddress, type Handlers, type Socket } from "../src/co
 import { HELD, bindings, named } from "../src/keys";
 import { Latency } from "../src/latency";
 import { cageOverlay } from "../src/cage_overlay";
-import { START, Store, obstacle, selected, target } from "../src/store";
-import type { Actions } from "../src/actions";
+import { START, Store, fillable, obstacle, relightable, selected, target } from "../src/store";
+import { Actions } from "../src/actions";
 import type { App } from "../src/app";
 import type { Pointer } from "../src/pointer";
-import type { Preview } from "../src/protocol";
+import type { Hello, Preview } from "../src/protocol";
 import { edit, state } from "./fake_server";
 
 describe("the connection", () => {
@@ -67,6 +67,18 @@ describe("the store", () => {
     expect(target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) })).toBe("inner");
   });
 
+  it("knows what can be filled, and what light can go along with", () => {
+    const hello = { splats: false } as Hello;
+    const kinds = (["continuous", "move", "copy", "delete"] as const).map((kind) => {
+      const now = { ...START, hello, state: state({ edits: [edit({ kind })] }) };
+      return [fillable(now), relightable(now)];
+    });
+    expect(kinds).toEqual([[false, false], [true, true], [false, true], [true, true]]);
+    const splats = { ...START, hello: { splats: true } as Hello, state: state({ edits: [edit({ kind: "delete" })] }) };
+    expect([fillable(splats), relightable(splats)]).toEqual([false, false]);
+    expect([fillable(START), relightable(START)]).toEqual([false, false]);
+  });
+
   it("says why an edit cannot be dragged", () => {
     expect(obstacle(edit(), "edit")).toBeNull();
     expect(obstacle(edit({ locked: true }), "edit")).toMatch(/locked/);
@@ -115,6 +127,25 @@ describe("keys", () => {
       expect(all).toContain(key);
     }
     for (const { keys } of HELD) for (const key of keys) expect(all).not.toContain(key);
+  });
+
+  it("switch what is filled, and whether shadows go along, where there is such a thing", () => {
+    const store = new Store();
+    const app = { store, send: vi.fn(), say: vi.fn() };
+    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, { saveAs: vi.fn() });
+    const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
+    store.set({ state: state({ edits: [edit({ kind: "move" })] }) });
+    press("U");
+    expect(app.send).toHaveBeenLastCalledWith({ type: "change", edit: 1, fill: "none" });
+    press("Shift+U");
+    expect(app.send).toHaveBeenLastCalledWith({ type: "change", edit: 1, relight: "none" });
+    store.set({ state: state({ edits: [edit({ kind: "copy", fill: "none", relight: "none" })] }) });
+    press("Shift+U");
+    expect(app.send).toHaveBeenLastCalledWith({ type: "change", edit: 1, relight: "occlusion" });
+    expect(app.say).not.toHaveBeenCalled();
+    press("U");
+    expect(app.say).toHaveBeenCalledOnce();
+    expect(app.send).toHaveBeenCalledTimes(3);
   });
 
   it("are named as they are shown", () => {

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield import hex_determinant
+from cagefield.edits.options import Clone
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.splat import SplatField
@@ -69,7 +70,16 @@ def _title(edit: Edit) -> str:
     else:
         how = "exact" if edit.lattice is None else f"lattice of {edit.lattice}^3 nodes"
         kind = f"continuous, {edit.shell} shell, {how}"
-    return f"{name}{kind}{hidden}"
+    return f"{name}{kind}{_left_out(edit)}{hidden}"
+
+
+def _left_out(edit: Edit) -> str:
+    """What a discrete edit leaves as it was, though others would not."""
+    if edit.adjustment == "continuous":
+        return ""
+    word = "clone" if isinstance(edit.fill, Clone) else edit.fill
+    fill = f", fill: {word}" if word != "surroundings" and not edit.keep_source else ""
+    return fill + (", relight: none" if edit.relight == "none" else "")
 
 
 def _details(edit: Edit, content: _Content) -> Iterable[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import SupportsIndex
 
@@ -140,21 +140,23 @@ class EditStack:
         """The box [2,3] that holds `boxes`; (inf, -inf) when nothing is changed."""
         return bounds_of(self.boxes)
 
-    def changed_boxes(self, before: EditStack) -> Array:
+    def changed_boxes(self, before: EditStack, boxes_of: Callable[[Edit], Array] | None = None) -> Array:
         """Boxes [B,2,3] (min, max) outside all of which this stack maps points as another one does.
 
         They are those of the edits that the stacks do not share, in deformed space, and of the later edits
-        that take points there.
+        that take points there. `boxes_of` gives an edit's boxes where they are others than its `boxes`.
         """
+        boxes_of = boxes_of or _own_boxes
         old, new = before.active, self.active
         least = min(len(old), len(new))
         first = next((n for n in range(least) if old[n] != new[n]), least)
         shared = next((n for n in range(least - first) if old[-1 - n] != new[-1 - n]), least - first)
         replaced = (*old[first : len(old) - shared], *new[first : len(new) - shared])
-        changed = np.concatenate([np.zeros((0, 2, 3)), *(edit.boxes for edit in replaced)])
+        changed = np.concatenate([np.zeros((0, 2, 3)), *(boxes_of(edit) for edit in replaced)])
         for edit in new[len(new) - shared :]:
-            if _meet(np.concatenate([edit.boxes, edit.inner.aabb[None]]), changed):
-                changed = np.concatenate([changed, edit.boxes])
+            boxes = boxes_of(edit)
+            if _meet(np.concatenate([boxes, edit.inner.aabb[None]]), changed):
+                changed = np.concatenate([changed, boxes])
         return changed
 
     def lattice_errors(self, voxel_size: float, *, samples: int = 5_000) -> tuple[LatticeError, ...]:
@@ -224,6 +226,10 @@ class EditStack:
             mapped = edit.warp.to_deformed(p[rows])
             p[rows], J[rows], hidden[rows] = mapped.points, mapped.jacobian @ J[rows], mapped.lost
         return DeformedPoints(p, J, hidden)
+
+
+def _own_boxes(edit: Edit) -> Array:
+    return edit.boxes
 
 
 def _meet(boxes: Array, others: Array) -> bool:

@@ -23,9 +23,7 @@ NEAREST = 24
 """Differences at the rim that a vertex takes the mean of."""
 
 
-def cloned(
-    block: Block, below: EditStack, inner: Cage, source: Cage, inside: Mask, surface: Mask
-) -> Block:
+def cloned(block: Block, below: EditStack, inner: Cage, source: Cage, inside: Mask, surface: Mask) -> Block:
     """The block with the vertices in V^c, `inside` [X,Y,Z], showing what is in the source cage.
 
     surface [X,Y,Z]: the surface vertices around V^c, to whose colours it is blended.
@@ -49,13 +47,20 @@ def cloned(
     if not len(at) or not len(to):
         return filled
     _, nearest = cKDTree(to).query(at)
+    # Upper sides go on with upper sides, not with what lies under them.
+    along = filled.normals
+    alike = (along[tuple(at.T)] * along[tuple(to[nearest].T)]).sum(axis=1) > 0.3
+    at, nearest = at[alike], nearest[alike]
+    if not len(at):
+        return filled
     width = int(np.prod(sh.shape[1:]))
     own = coefficients[filled.slot[tuple(at.T)]].reshape(-1, width)
     there = coefficients[filled.slot[tuple(to[nearest].T)]].reshape(-1, width)
     places = np.argwhere(where)
     count = min(NEAREST, len(at))
     distance, chosen = cKDTree(at).query(places, k=[*range(1, count + 1)])
-    weight = 1.0 / np.maximum(distance, 0.5) ** 2
+    facing_same = np.einsum("nc,nkc->nk", along[where], along[tuple(at.T)][chosen])
+    weight = np.maximum(facing_same, 0.01) / np.maximum(distance, 0.5) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
     added = np.einsum("nk,nkc->nc", weight, (there - own)[chosen])
     coefficients[rows] += added.reshape(sh.shape).astype(np.float32)

@@ -94,7 +94,7 @@ def distance_in_field(field: VoxelField) -> Distance:
     """The distance to what is solid in all of a field, on a grid of at most FINEST vertices an axis."""
     stride = -(-max(field.resolution) // FINEST)
     solid = np.zeros(field.resolution, bool)
-    solid.reshape(-1)[field.vertices[field.density * field.sample_spacing > SOLID]] = True
+    solid.reshape(-1)[_solid_vertices(field)] = True
     solid = np.pad(solid, [(0, -n % stride) for n in field.resolution])
     nx, ny, nz = (n // stride for n in solid.shape)
     pooled = solid.reshape(nx, stride, ny, stride, nz, stride).any(axis=(1, 3, 5))
@@ -115,15 +115,29 @@ def nearness(distance: Distance, points: Array, normals: AnyArray, reaches: Sequ
     return np.clip(1.0 - np.stack(found, axis=1), 0.0, 1.0)
 
 
+def _solid_vertices(field: VoxelField) -> NDArray[np.int64]:
+    return np.asarray(field.vertices[field.density * field.sample_spacing > SOLID])
+
+
+def reaches_of(field: VoxelField) -> tuple[float, ...]:
+    """The reaches r at which a field's colours are compared with its openness, world units.
+
+    Shares of the diagonal of what is solid; none for a field of less than ENOUGH solid vertices.
+    """
+    solid = _solid_vertices(field)
+    if len(solid) < ENOUGH:
+        return ()
+    at = np.stack(np.unravel_index(solid[:: max(1, len(solid) // 100_000)], field.resolution), axis=1)
+    span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * field.voxel_size
+    return tuple(share * float(np.linalg.norm(span)) for share in REACHES)
+
+
 def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
     """The weights that explain the colours of a field's surfaces, as they are seen."""
     nothing = Ambience((), ())
-    dense = field.vertices[field.density * field.sample_spacing > SOLID]
-    if len(dense) < ENOUGH or len(pairs.points) < ENOUGH:
+    if len(pairs.points) < ENOUGH or _solid_vertices(field).size < ENOUGH:
         return nothing
-    at = np.stack(np.unravel_index(dense[:: max(1, len(dense) // 100_000)], field.resolution), axis=1)
-    span = np.subtract(*np.percentile(at, [99, 1], axis=0)) * field.voxel_size
-    reaches = tuple(share * float(np.linalg.norm(span)) for share in REACHES)
+    reaches = reaches_of(field)
     distance = distance_in_field(field)
     first = nearness(distance, pairs.points, pairs.normals, reaches)
     second = nearness(distance, pairs.other_points, pairs.other_normals, reaches)

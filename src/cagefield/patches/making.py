@@ -16,13 +16,11 @@ from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block, block_of, world_of
 from cagefield.patches.cloning import cloned
+from cagefield.patches.extent import RIM, patch_box
 from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Mask
 from cagefield.warps.inner_map import HexahedronMap
-
-RIM = 6.0
-"""A support is looked for within this distance of V^c, voxels, or within half of its size."""
 
 CLOSE = 3.0
 """Surfaces are hidden by what comes this near to them, voxels."""
@@ -81,14 +79,8 @@ class _Work:
     ) -> _Work:
         settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
-        box = edit.inner.aabb
-        margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
-        if ambience is not None and ambience.shows:
-            margin = max(margin, 1.5 * ambience.reach + RIM * voxel)
-            if settled:
-                moved = edit.deformed.aabb
-                box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
-        box = box + margin * np.array([[-1.0], [1.0]])
+        reach = ambience.reach if ambience is not None and ambience.shows else 0.0
+        box = patch_box(edit, voxel, reach, settled=settled)
         before = block_of(field, below, box)
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
         emptied = before
@@ -113,9 +105,7 @@ class _Work:
     def surface(self) -> Mask:
         """Surface vertices outside of V^c."""
         solid = self.emptied.solid
-        return np.asarray(
-            solid & ndimage.binary_dilation(~solid) & ~self.inside & lit_vertices(self.emptied)
-        )
+        return np.asarray(solid & ndimage.binary_dilation(~solid) & ~self.inside & lit_vertices(self.emptied))
 
     @cached_property
     def rim(self) -> Mask:

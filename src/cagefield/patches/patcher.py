@@ -44,14 +44,16 @@ class Patcher:
         """The stack of the edits, in order, with their patches.
 
         While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
-        place: this does not depend on where that is. `proceed` is called between patches, and may raise.
+        place: this does not depend on where that is. Edits that stay meanwhile keep the patches they have.
+        `proceed` is called between patches, and may raise.
         """
         made: list[Edit] = []
         for edit in edits:
-            if isinstance(self._field, VoxelField) and wants_patch(edit, moving):
+            if isinstance(self._field, VoxelField) and wants_patch(edit):
                 if proceed is not None:
                     proceed()
-                edit = edit.replace(patch=self._patch(self._field, tuple(made), edit, moving))
+                patch = self._patch(self._field, tuple(made), edit, moving)
+                edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
         return EditStack(made)
 
@@ -62,21 +64,18 @@ class Patcher:
             return Ambience((), ())
         return ambience_of(self._field, seen_pairs(self._render, self._cameras, self._field.bounds))
 
-    def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch:
+    def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | None:
+        """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
         relit = edit.relight == "occlusion" and self.ambience.shows
-        key: Key = (
-            *stack.active,
-            edit.inner,
-            None if moving or not relit else edit.deformed,
-            edit.deleted,
-            edit.keep_source,
-            edit.fill,
-            relit,
-        )
+        what: Key = (*stack.active, edit.inner, edit.deleted, edit.keep_source, edit.fill, relit)
+        settled: Key = (*what, edit.deformed if relit else None)
+        key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key]
+        if not wants_patch(edit, moving):
+            return None
         patch = patch_of(field, stack, edit, self.ambience if relit else None, settled=not moving)
         self._kept[key] = patch
         while len(self._kept) > KEPT:

@@ -56,9 +56,7 @@ class Support:
         return away @ self.axes.T, away @ self.normal
 
 
-def support_of(
-    block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0
-) -> Support | None:
+def support_of(block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0) -> Support | None:
     """The plane through surface vertices of the ring [X,Y,Z] that the part [X,Y,Z] stands on, or just over.
 
     Each vertex counts by how near the part comes to it from above. All vertices of the surface [X,Y,Z] on

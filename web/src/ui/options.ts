@@ -1,12 +1,12 @@
 /** The selected edit's options and numbers. */
-import { Pane } from "tweakpane";
+import { Pane, type BladeApi } from "tweakpane";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import { extent } from "../cage";
 import { leading } from "../drag";
 import { tidy, type Operation } from "../operations";
 import type { Change, EditState, Vec3 } from "../protocol";
-import { selected, target } from "../store";
+import { fillable, relightable, selected, target } from "../store";
 import { h, section } from "./dom";
 
 interface Point {
@@ -25,7 +25,7 @@ export function options(app: App, actions: Actions): HTMLElement {
   const operations = h("ol", { class: "operations" });
   const pane = new Pane({ container: host });
   const model = {
-    kind: "continuous", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "",
+    kind: "continuous", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relights: true,
     margin: 0.2, preserve: false,
     position: point(0, 0, 0), turn: point(0, 0, 0), scale: point(1, 1, 1),
   }; // prettier-ignore
@@ -81,6 +81,12 @@ export function options(app: App, actions: Actions): HTMLElement {
     kind.addBinding(model, "lattice", { label: "Lattice", options: LATTICES }).on("change", ({ value }) => change({ lattice: value })),
     kind.addBinding(model, "error", { label: "Its error", readonly: true }),
   ] as const;
+  const fills = kind.addBinding(model, "fills", { label: "Fill what is uncovered" });
+  fills.on("change", ({ value }) => change({ fill: value ? "surroundings" : "none" }));
+  explained(fills, "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).");
+  const relights = kind.addBinding(model, "relights", { label: "Shadows go along" });
+  relights.on("change", ({ value }) => change({ relight: value ? "occlusion" : "none" }));
+  explained(relights, "Soft shadows where things touch leave with the thing and appear at its new place; off, they stay (Shift+U).");
   kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
@@ -102,7 +108,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     const { pivot } = leading(app.shown(edit), target(now));
     Object.assign(model, {
       kind: edit.kind, shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
-      error: latticeError(edit), preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
+      error: latticeError(edit), fills: edit.fill !== "none", relights: edit.relight !== "none", preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
     }); // prettier-ignore
     if (marginOf !== edit.id) {
       marginOf = edit.id;
@@ -112,7 +118,9 @@ export function options(app: App, actions: Actions): HTMLElement {
     for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
     falloff.hidden = width.hidden = edit.kind !== "continuous" || edit.shell !== "flow";
     error.hidden = lattice.hidden || edit.lattice === 0;
-    for (const binding of [shell, lattice]) binding.disabled = edit.locked;
+    relights.hidden = !relightable(now);
+    fills.hidden = !fillable(now);
+    for (const binding of [shell, lattice, fills, relights]) binding.disabled = edit.locked;
     filling = true;
     pane.refresh();
     filling = false;
@@ -121,6 +129,14 @@ export function options(app: App, actions: Actions): HTMLElement {
   });
   return whole;
 } // prettier-ignore
+
+/** Gives a switch a tooltip, and its name and the tooltip to screen readers: its label is only beside it. */
+function explained(binding: BladeApi, what: string): void {
+  binding.element.title = what;
+  const input = binding.element.querySelector("input")!;
+  input.setAttribute("aria-label", binding.element.querySelector(".tp-lblv_l")!.textContent);
+  input.setAttribute("aria-description", what);
+}
 
 function latticeError(edit: EditState): string {
   if (edit.lattice_error === null) return "being measured";

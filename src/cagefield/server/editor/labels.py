@@ -8,12 +8,18 @@ from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Target
 
 _TARGETS: dict[Target, str] = {"field": "", "inner": " inner cage", "outer": " outer cage", "both": " cages"}
+_OPTIONS = {"relight": "shadows"}
 _WORDS = {"translation": "Move", "rotation": "Rotate", "scaling": "Scale", "shear": "Shear"}
 
 
 def named(operation: Operation, target: Target, entry: Entry) -> str:
     """An operation as the history lists it."""
     return f"{_WORDS.get(operation.noun, operation.noun.capitalize())}{_TARGETS[target]}{of(entry)}"
+
+
+def option_word(name: str) -> str:
+    """An option of edits, named as in `Edit`, as the history lists it."""
+    return _OPTIONS.get(name, name)
 
 
 def of(entry: Entry) -> str:

@@ -24,7 +24,7 @@ from cagefield.server.editor.drags import Drags
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
-from cagefield.server.editor.labels import fresh_name, named, of
+from cagefield.server.editor.labels import fresh_name, named, of, option_word
 from cagefield.server.editor.mirror import mirrored
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.editor.path_preview import Preview
@@ -210,7 +210,10 @@ class Session:
         locked: bool | None = None,
         **options: object,
     ) -> None:
-        """An edit's options; `options` are fields of `Edit`: name, enabled, falloff, width, lattice."""
+        """An edit's options; `options` are other fields of `Edit`: name, enabled, falloff, width, fill, ...
+
+        A continuous edit keeps `fill` and `relight` for when it is discrete again.
+        """
         before = self.document.entry(number)
         entry = before if locked is None else replace(before, locked=locked)
         if entry.locked and (kind or shell or set(options) - {"enabled"}):
@@ -223,7 +226,7 @@ class Session:
         ]
         if options.get("enabled") is not None:
             words.append("show" if options["enabled"] else "hide")
-        words += [name for name in options if name != "enabled"]
+        words += [option_word(name) for name in options if name != "enabled"]
         if entry != before:
             self._put(f"{', '.join(words).capitalize()}{of(before)}", entry)
 

@@ -16,9 +16,11 @@ from cagefield.server.protocol.common import (
     DrawnHere,
     EditId,
     FalloffName,
+    FillName,
     JobKind,
     Key,
     Message,
+    RelightName,
     ShellName,
     SplatForm,
     Text,
@@ -172,6 +174,8 @@ class Change(Message):
     shell: ShellName | None = None
     falloff: FalloffName | None = None
     width: Annotated[float, Field(gt=0, le=1)] | None = None
+    fill: FillName | None = None
+    relight: RelightName | None = None
     lattice: Annotated[int, Field(ge=0, le=LATTICE_RANGE[1])] | None = Field(
         default=None, description="0: exact"
     )

@@ -99,6 +99,8 @@ def edit_state(
         shell=cast(Any, edit.shell),
         falloff=cast(Any, edit.falloff),
         width=edit.width,
+        fill="none" if edit.fill == "none" else "surroundings",
+        relight=edit.relight,
         lattice=edit.lattice or 0,
         lattice_error=error,
         inner=corners(edit.inner),

@@ -12,11 +12,13 @@ from cagefield.server.protocol.common import (
     Corners,
     EditId,
     FalloffName,
+    FillName,
     JobKind,
     Key,
     Level,
     Message,
     Pose,
+    RelightName,
     ShellName,
     Vec3,
     View,
@@ -56,6 +58,8 @@ class EditState(Message):
     shell: ShellName
     falloff: FalloffName
     width: float
+    fill: FillName
+    relight: RelightName
     lattice: int
     """Nodes along an axis, 0 where it is exact."""
     lattice_error: tuple[float, float] | None

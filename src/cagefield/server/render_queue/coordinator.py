@@ -22,6 +22,7 @@ from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_queue.binary_messages import edits_message, picture_message
 from cagefield.server.render_queue.damage import WHOLE, Rect, screen_bounds
 from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher, Stamp, TooManyError
+from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import spread
 from cagefield.server.render_worker.pictures import Display
@@ -71,6 +72,7 @@ class Coordinator:
         shown = store.scene.field
         self.spread = spread(shown) if isinstance(shown, SplatField) else 0.0
         """How far beside where an edit maps points its content shows, world units."""
+        self._patches = PatchExtent(shown)
         self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self.spread > 0.0)
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
         self.greeting: str | None = None
@@ -261,7 +263,7 @@ class Coordinator:
         if opacity != other:
             return WHOLE
         beside = np.array([[-self.spread], [self.spread]])
-        return screen_bounds(camera, after.changed_boxes(before) + beside)
+        return screen_bounds(camera, after.changed_boxes(before, self._patches.boxes) + beside)
 
     def deliver(self, request: Request, stamp: Stamp, done: PictureDone) -> None:
         """A picture for a page."""
