@@ -222,3 +222,24 @@ def test_a_distorted_camera_is_rendered_with_its_own_rays():
     plain = render_sampled(field, bent, near=1.5, far=5.5, samples=600, background="white")
     assert psnr(fused.rgb, plain.rgb) > 50
     assert psnr(fused.rgb, sampled(field).rgb) < 40
+
+
+@pytest.mark.parametrize("edited", [False, True])
+def test_a_field_ends_at_its_grid(edited: bool) -> None:
+    """The last bricks of 17 cells reach beyond the grid, where nothing is."""
+    n = 18
+    field = VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]),
+        (n,) * 3,
+        np.arange(n**3),
+        np.full(n**3, 1.5, np.float32),
+        np.full((n**3, 1, 3), 0.8, np.float32),
+    )
+    inner = Cage.box((0.4, 0.4, 0.4), 0.3)
+    edits = EditStack(
+        [Edit(inner, inner.grown(0.2), lattice=8).translate((0.05, 0.0, 0.0))] if edited else []
+    )
+    camera = Camera.look_at((3.0, 2.4, 1.8), (0.6, 0.5, 0.4), width=32, height=32, fov_x=0.5)
+    frame = Renderer(field, edits, step=0.1).render(camera, background="black")
+    oracle = render_sampled(field, camera, samples=1200, background="black", edits=edits)
+    assert frame is not None and psnr(frame.rgb, oracle.rgb) > 45.0

@@ -67,7 +67,9 @@ class Patcher:
     def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | None:
         """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
-        relit = edit.relight == "occlusion" and self.ambience.shows
+        # A drag does not wait for the light to be found out about.
+        known = not moving or "ambience" in self.__dict__
+        relit = edit.relight == "occlusion" and known and self.ambience.shows
         what: Key = (*stack.active, edit.inner, edit.deleted, edit.keep_source, edit.fill, relit)
         settled: Key = (*what, edit.deformed if relit else None)
         key = (*what, None) if moving and settled not in self._kept else settled

@@ -12,7 +12,7 @@ from cagefield.cameras import Camera
 from cagefield.rendering.render_result import RenderResult
 from cagefield.typing import Array
 
-VIEWS, PIXELS = 40, 200
+VIEWS, PIXELS = 28, 200
 """Pictures, and their longer edge in pixels."""
 
 APART = (5, 14)
