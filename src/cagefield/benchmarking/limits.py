@@ -1,4 +1,4 @@
-"""What editing a captured field cannot do: old shadows stay behind, and what no photo saw is not there.
+"""What moving content alone cannot do: shadows stay behind, and what no photo saw is not there.
 
 Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", the section on limits.
 """
@@ -118,9 +118,11 @@ def _shots(case: Case, bench: Workbench, front: Camera, cameras: Sequence[Camera
     center, extent = model.part_box(model.part_names, 0.05)
     turn = Edit(Cage.box(center, extent), adjustment="discrete").rotate((0.0, 0.0, np.pi))
     turned = model.move(model.part_names, rotate=(0.0, 0.0, np.pi), pivot=center).carrying_light()
+    alone = EditStack(edit.replace(fill="none", relight="none") for edit in case.edits)
+    turn = turn.replace(fill="none", relight="none")
     one_side = bench.one_sided(case.scene, front, REACH)
     return _Shots(
-        edited=seen(scene.with_edits(case.edits), cameras),
+        edited=seen(scene.with_edits(alone), cameras),
         old_shadows=photos(moved, cameras),
         new_shadows=photos(moved.with_its_own_occlusion(), cameras),
         one_side=seen(one_side, cameras),
