@@ -61,7 +61,7 @@ def brute(scene: ProceduralScene, mapping: PointMap, camera: Camera, spacing: fl
             origins[row] + t[:, None] * directions[row], np.tile(directions[row], (len(t), 1))
         )
         distance = field.distance(np.ascontiguousarray(at.points, np.float32))[0]
-        inside[row] = (distance[~at.emptied] < 0).any()
+        inside[row] = (distance[at.layer >= 0] < 0).any()
     return inside.reshape(camera.height, camera.width)
 
 

@@ -1,5 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
+import { largest } from "../src/field/gl";
 import { joined, summed } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
 import { Pacing } from "../src/field/pacing";
@@ -283,4 +284,10 @@ describe("the viewer's camera", () => {
     expect(viewAt(path, 9).c2w[3]).toBeCloseTo(2);
     expect(viewAt({ ...path, loop: true }, 3).c2w[3]).toBeCloseTo(1);
   }); // prettier-ignore
+});
+
+test("a lost context, which knows no limits, is no reason to give up", () => {
+  const gl = (said: number | null): WebGL2RenderingContext => ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
+  expect(largest(gl(null), 0)).toBeGreaterThan(4096);
+  expect(largest(gl(2048), 0)).toBe(2048);
 });

@@ -1,6 +1,6 @@
 /** An edit stack on the GPU: only what is other than before is uploaded. */
 import { LATTICE_WIDTH, MOST_ROWS } from "./edits_glsl";
-import { checkMemory, plainUnpacking, setFilter, texture3D } from "./gl";
+import { checkMemory, largest, plainUnpacking, setFilter, texture3D } from "./gl";
 import type { PageEdits } from "./page_edits";
 
 type GL = WebGL2RenderingContext;
@@ -91,7 +91,7 @@ export class EditsOnGpu {
       1,
       heights.reduce((sum, height) => sum + height, 0),
     );
-    if (rows > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number)) throw new Error("the edits' lattices do not fit into a texture of the GPU");
+    if (rows > largest(gl, gl.MAX_TEXTURE_SIZE)) throw new Error("the edits' lattices do not fit into a texture of the GPU");
     if (this.lattices === null || rows > this.lattices.rows) {
       gl.deleteTexture(this.lattices?.texture ?? null);
       this.lattices = { texture: this.latticeTexture(rows), rows, placed: [] };

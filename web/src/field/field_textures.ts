@@ -1,7 +1,7 @@
 /** A level of a field on the GPU. */
 import { bytesOf, Filler, layoutOf, TooLarge } from "./atlas";
 import type { Layout, Texels } from "./atlas";
-import { checkMemory, plainUnpacking, texture3D } from "./gl";
+import { checkMemory, largest, plainUnpacking, texture3D } from "./gl";
 import type { Level, Occupancy, Vec3 } from "./level";
 import { Stored } from "./stored";
 
@@ -29,7 +29,7 @@ const LEAST_SPARE = 64;
  * where it takes more than `limit` bytes.
  */
 export function layoutWithin(gl: GL, level: Level, limit: number, placesFor: (layout: Layout) => number): Layout {
-  const side = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number;
+  const side = largest(gl, gl.MAX_3D_TEXTURE_SIZE);
   const needed = placesFor(layoutOf(level, side));
   const least = layoutOf(level, side, needed);
   const bytes = bytesOf(least);

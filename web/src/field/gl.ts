@@ -86,3 +86,11 @@ export function plainUnpacking(gl: GL): void {
   for (const name of [gl.UNPACK_ROW_LENGTH, gl.UNPACK_IMAGE_HEIGHT, gl.UNPACK_SKIP_PIXELS, gl.UNPACK_SKIP_ROWS, gl.UNPACK_SKIP_IMAGES])
     gl.pixelStorei(name, 0);
 }
+
+/**
+ * A limit of the GPU, such as its largest texture. A lost context says null, and is no reason to give up: what does not
+ * reach it is uploaded again once it is restored.
+ */
+export function largest(gl: GL, limit: GLenum): number {
+  return (gl.getParameter(limit) as number | null) ?? 1 << 14;
+}

@@ -1,6 +1,6 @@
 /** Splats on the GPU: records and coefficients in textures of whole numbers, four words a texel. */
 import { TooLarge } from "../field/atlas";
-import { plainUnpacking, setFilter } from "../field/gl";
+import { largest, plainUnpacking, setFilter } from "../field/gl";
 import { WIDTH } from "./project_glsl";
 
 type GL = WebGL2RenderingContext;
@@ -18,7 +18,7 @@ export class WordTexture {
     words: number,
   ) {
     this.rows = Math.max(1, Math.ceil(words / (4 * WIDTH)));
-    const most = gl.getParameter(gl.MAX_TEXTURE_SIZE) as number;
+    const most = largest(gl, gl.MAX_TEXTURE_SIZE);
     if (this.rows > most) throw new TooLarge(`the splats take ${this.rows} rows of a texture, more than the ${most} that the GPU has`);
     while (gl.getError() !== gl.NO_ERROR);
     this.texture = gl.createTexture();
