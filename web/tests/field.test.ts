@@ -286,7 +286,7 @@ describe("the viewer's camera", () => {
   }); // prettier-ignore
 });
 
-test("a lost context, which knows no limits, is no reason to give up", () => {
+it("a lost context, which knows no limits, is no reason to give up", () => {
   const gl = (said: number | null): WebGL2RenderingContext => ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
   expect(largest(gl(null), 0)).toBeGreaterThan(4096);
   expect(largest(gl(2048), 0)).toBe(2048);
