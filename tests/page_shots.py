@@ -34,3 +34,14 @@ def filled(picture: NDArray[np.float64]) -> float:
 
 def db(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(-10.0 * np.log10(np.mean(np.square(one - other))))
+
+
+def alike(pair: tuple[EditorPage, EditorPage]) -> float:
+    """dB between what both pages show at rest, the first by itself."""
+    pictures = []
+    for page in pair:
+        page.page.bring_to_front()
+        page.settle()
+        pictures.append(page.pixels())
+    assert filled(pictures[0]) > 0.02
+    return db(*pictures)

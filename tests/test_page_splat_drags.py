@@ -9,7 +9,7 @@ import pytest
 
 from editor_page import EditorPage, asking, editor_page
 from editor_server import editor_server
-from page_shots import HALF, db, filled
+from page_shots import HALF, alike, db, filled
 from splat_scenes import splat_scene
 
 SHELL = """\
@@ -49,17 +49,6 @@ def pair(files: Path) -> Iterator[tuple[EditorPage, EditorPage]]:
             page.settle()
         first.until("cagefield.page.here === 'all' && cagefield.page.draws")
         yield first, second
-
-
-def alike(pair: tuple[EditorPage, EditorPage]) -> float:
-    """dB between what both pages show at rest, the first by itself."""
-    pictures = []
-    for page in pair:
-        page.page.bring_to_front()
-        page.settle()
-        pictures.append(page.pixels())
-    assert filled(pictures[0]) > 0.02
-    return db(*pictures)
 
 
 def test_a_drag_of_splats_is_drawn_by_the_page_and_ends_as_the_server_draws_it(

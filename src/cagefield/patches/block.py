@@ -5,6 +5,7 @@ Notation: vertices of the block are numbered from its lowest one; `low` is that 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -158,9 +159,17 @@ def block_of(field: VoxelField, below: EditStack, box: Array) -> Block:
     # Normals need three vertices.
     shape = np.minimum(np.maximum(high - low + 1, 3), last - low + 1)
     block = _stored(field, low, shape)
-    for first in range(0, int(shape.prod()) if below.active else 0, AT_ONCE):
-        block = _through(block, below, np.arange(first, min(first + AT_ONCE, int(shape.prod()))))
-    return block
+    if not below.active:
+        return block
+    parts = [
+        _changed(block, below, np.arange(first, min(first + AT_ONCE, block.density.size)))
+        for first in range(0, block.density.size, AT_ONCE)
+    ]
+    rows, raw, sh = (np.concatenate(column) for column in zip(*parts, strict=True))
+    density, slot, stored = block.density.copy(), block.slot.copy(), raw > 0.0
+    density.flat[rows], slot.flat[rows] = raw, -1
+    slot.flat[rows[stored]] = len(block.sh) + np.arange(int(stored.sum()))
+    return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, sh[stored]]))
 
 
 def world_of(field: VoxelField, g: AnyField | NDArray[np.int64]) -> Array:
@@ -186,22 +195,20 @@ def _stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64])
     return Block(field, low, density, slot, field.sh[rows][inside])
 
 
-def _through(block: Block, below: EditStack, rows: NDArray[np.int64]) -> Block:
-    """The block with some of its vertices (flat indices) as the edits make them."""
+def _changed(
+    block: Block, below: EditStack, rows: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Float32, Float32]:
+    """(rows [M], density [M], sh [M,K,3]) of those of some vertices (flat indices) that the edits change."""
     points = world_of(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
-    changed = np.zeros(len(rows), bool)
+    near = np.zeros(len(rows), bool)
     for box in below.boxes:
-        changed |= ((points >= box[0]) & (points <= box[1])).all(axis=1)
-    rows, points = rows[changed], points[changed]
+        near |= ((points >= box[0]) & (points <= box[1])).all(axis=1)
+    rows, points = rows[near], points[near]
     mapped = below.to_canonical(points)
     changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
-    rows, points = rows[changed], points[changed]
-    raw, sh = sampled(block.field, below, points)
-    density, slot = block.density.copy(), block.slot.copy()
-    stored = raw > 0.0
-    density.flat[rows], slot.flat[rows] = raw, -1
-    slot.flat[rows[stored]] = len(block.sh) + np.arange(int(stored.sum()))
-    return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, sh[stored]]))
+    sources = (block.field, *below.layers)
+    read = _read(sources, mapped.layer[changed], mapped.points[changed], mapped.jacobian[changed])
+    return rows[changed], *read
 
 
 def sampled(
@@ -212,17 +219,21 @@ def sampled(
     Colours are turned as the edits turn them and, after that, as the Jacobians `turn` [N,3,3] do.
     """
     mapped = below.to_canonical(points)
+    jacobian = mapped.jacobian if turn is None else mapped.jacobian @ np.linalg.inv(turn)
+    return _read((field, *below.layers), mapped.layer, mapped.points, jacobian)
+
+
+def _read(
+    sources: Sequence[VoxelField], layer: NDArray[np.int64], points: Array, jacobian: Array
+) -> tuple[Float32, Float32]:
+    """(density [N], sh [N,K,3]) at canonical points of the sources that `layer` [N] says, colours turned."""
     density = np.zeros(len(points), np.float32)
-    sh = np.zeros((len(points), *field.sh.shape[1:]), np.float32)
-    for number, source in enumerate((field, *below.layers)):
-        here = np.flatnonzero(mapped.layer == number)
-        if not len(here):
-            continue
-        jacobian = mapped.jacobian[here]
-        if turn is not None:
-            jacobian = jacobian @ np.linalg.inv(turn[here])
-        density[here], colours = interpolated(source, mapped.points[here])
-        sh[here] = rotated_sh(colours, _turns(jacobian))
+    sh = np.zeros((len(points), *sources[0].sh.shape[1:]), np.float32)
+    for number, source in enumerate(sources):
+        here = np.flatnonzero(layer == number)
+        if len(here):
+            density[here], colours = interpolated(source, points[here])
+            sh[here] = rotated_sh(colours, _turns(jacobian[here]))
     return density, sh
 
 

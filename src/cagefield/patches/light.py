@@ -174,10 +174,6 @@ class Lighting:
         smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
         return replace(self, log_ratio=smooth)
 
-    def stronger(self, factor: float) -> Lighting:
-        """The same to the power of a factor."""
-        return replace(self, log_ratio=factor * self.log_ratio)
-
     def dense(self, block: Block) -> Array:
         """The log of the ratio [X,Y,Z], 0 elsewhere."""
         out = np.zeros(block.shape)
