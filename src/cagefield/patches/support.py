@@ -190,6 +190,12 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
     hole = footprint.hole[u, v]
     around = footprint.around[u, v] & ~removed[tuple(voxels.T)]
     level = (height >= DEEP) & (height <= HIGH)
+    # What stands or hangs above V^c is not of the part, and stays.
+    gone = removed[tuple(voxels.T)]
+    top = np.full(footprint.hole.shape, -np.inf)
+    np.maximum.at(top, (u[gone], v[gone]), height[gone])
+    nearest = ndimage.distance_transform_edt(np.isinf(top), return_distances=False, return_indices=True)
+    hole &= height <= top[tuple(nearest)][u, v] + 0.5
     profile = _profile(block, voxels[around & level], height[around & level])
     # Crusts of what was taken away, between the support and V^c.
     nearby = ndimage.binary_dilation(removed, iterations=4)
