@@ -18,7 +18,7 @@ from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import Adjustment, Fill, Relight, problem_of_options
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.fields.voxel import VoxelField
@@ -88,7 +88,7 @@ class Edit:
     width: float = 1.0
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
-    patch: Patch | None = None
+    patch: Patch | SplatPatch | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -198,7 +198,7 @@ class Edit:
         self.check()
         inner = HexahedronMap(self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
-            region = None if self.patch is None else self.patch.region
+            region = None if self.patch is None else self.patch.read_instead
             return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region)
         return ContinuousWarp(inner, self.outer, self._last_shell)
 

@@ -8,8 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
 from cagefield.cages import Cage
+from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.typing import Array, Float32, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +33,77 @@ class Patch:
     part: VoxelField | None = None
 
     @property
+    def read_instead(self) -> Cage | None:
+        """Where, outside of V, layers are read and not the field."""
+        return self.region
+
+    @property
     def layers(self) -> tuple[VoxelField, ...]:
         """`under`, and `part` where there is one."""
         return (self.under,) if self.part is None else (self.under, self.part)
+
+
+@dataclass(frozen=True, eq=False)
+class NewLight:
+    """The log of what the light at points of a grid is multiplied by, values [X,Y,Z].
+
+    Vertex (0, 0, 0) lies at `origin` [3], the next ones `spacing` apart, world units; `known` [X,Y,Z] are
+    those with a value.
+    """
+
+    origin: Array
+    spacing: float
+    values: Float32
+    known: Float32
+
+    def at(self, points: Array) -> Array:
+        """The log of the ratio [N] at points [N,3]: that of the known vertices around, 0 where none is."""
+        g = ((points - self.origin) / self.spacing).T
+        total = ndimage.map_coordinates(self.known, g, np.float64, order=1)
+        values = ndimage.map_coordinates(self.values * self.known, g, np.float64, order=1)
+        return np.asarray(np.where(total > 1e-3, values / np.maximum(total, 1e-3), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class SplatPatch:
+    """What a discrete edit of splats shows beside what it moves: fill, and new light.
+
+    Attributes:
+        field: the field whose splats the new ones are copies of.
+        region: outside of this cage and of V nothing changes.
+        gone: [X,Y,Z], vertices of `light`'s grid around which splats outside of V^c are taken away.
+        light: that of splats outside of V^c.
+        part: that of the content of V^c, None where it stays.
+        sources: [A] int64, rows of the field of the new splats; points: [A,3] where they are; jacobian:
+            [A,3,3], what their shapes were multiplied by, d(deformed)/d(canonical); gains: [A,3], what their
+            red, green and blue are multiplied by.
+    """
+
+    field: SplatField
+    region: Cage
+    gone: Mask
+    light: NewLight
+    part: NewLight | None
+    sources: NDArray[np.int64]
+    points: Array
+    jacobian: Array
+    gains: Array
+
+    @property
+    def read_instead(self) -> Cage | None:
+        """None: splats have no layers."""
+        return None
+
+    @property
+    def layers(self) -> tuple[VoxelField, ...]:
+        """None."""
+        return ()
+
+    def takes_away(self, points: Array) -> Mask:
+        """[N], True for points [N,3] whose splats go."""
+        if not self.gone.any():
+            return np.zeros(len(points), bool)
+        g = np.round((points - self.light.origin) / self.light.spacing).astype(np.int64)
+        inside = ((g >= 0) & (g < self.gone.shape)).all(axis=1)
+        g[~inside] = 0
+        return np.asarray(self.gone[tuple(g.T)] & inside)

@@ -1,4 +1,4 @@
-"""The patch of one discrete edit: what it took away is filled, and light goes along."""
+"""What one discrete edit took away is filled, and light goes along: on a block of a voxel field's grid."""
 
 from __future__ import annotations
 
@@ -29,33 +29,76 @@ UNSURE = 0.2
 """Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
 
 
-def patch_of(
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What was worked out for a discrete edit.
+
+    before: the block as the edits below make it; under: with V^c emptied, filled and in its new light; inside
+    [X,Y,Z]: V^c; light: on all but the part, and part_light: on the part, None where these stay as they were;
+    support: what was filled, None where nothing was.
+    """
+
+    work: _Work
+    under: Block
+    light: Lighting | None
+    part_light: Lighting | None
+    support: Support | None
+
+    @property
+    def before(self) -> Block:
+        return self.work.before
+
+    @property
+    def inside(self) -> Mask:
+        return self.work.inside
+
+    @cached_property
+    def emptied(self) -> Block:
+        """The block with V^c emptied, in its new light, before it is filled."""
+        return _lit(self.work.emptied, self.light)
+
+
+def made_of(
     field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
-) -> Patch:
-    """The patch of a discrete edit of a field under the edits below it; `ambience` None leaves the light.
+) -> Made:
+    """What a discrete edit of a field makes of it, under the edits below; `ambience` None leaves the light.
 
     A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
     is moved to, and keeps the light that it had.
     """
     work = _Work.of(field, below, edit, ambience, settled)
-    under, part = work.emptied, None
-    lighting = None
+    lighting = part_light = None
     support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
-        under = under.relit(lighting.where, np.exp(lighting.log_ratio))
-        part = work.relit_part(ambience) if work.settled else None
+        part_light = work.part_light(ambience) if work.settled else None
+    under = _lit(work.emptied, lighting)
     if support is not None:
         hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
         if lighting is not None:
             hidden |= lighting.dense(under) > UNSURE
         footprint = footprint_of(under, support, work.part, hidden)
-        if footprint is not None:
+        if footprint is None:
+            support = None
+        else:
             under = rebuilt(under, footprint, work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         under = cloned(under, below, edit.inner, edit.fill.source, work.inside, work.surface)
-    region, under = work.around(under)
+    return Made(work, under, lighting, part_light, support)
+
+
+def patch_of(
+    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+) -> Patch:
+    """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
+    made = made_of(field, below, edit, ambience, settled=settled)
+    region, under = made.work.around(made.under)
+    part = None if made.part_light is None else made.work.relit_part(made.part_light)
     return Patch(region, under.layer(), None if part is None else part.layer())
+
+
+def _lit(block: Block, light: Lighting | None) -> Block:
+    return block if light is None else block.relit(light.where, np.exp(light.log_ratio))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +189,8 @@ class _Work:
         ]
         return Lighting(where, logs[1] - logs[0]).smoothed(block)
 
-    def relit_part(self, ambience: Ambience) -> Block:
-        """The content of V^c in the light of its new place; no more than that has colours."""
+    def part_light(self, ambience: Ambience) -> Lighting:
+        """What the light on the content of V^c is multiplied by at its new place."""
         block = self.before
         where = lit_vertices(block) & self.inside
         points, normals = block.positions(where), block.normals[where]
@@ -159,8 +202,11 @@ class _Work:
         new = nearness(after, moved, turned, ambience.reaches)
         old = nearness(before, points[inside], normals[inside], ambience.reaches)
         log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
-        lighting = Lighting(where, log).smoothed(block)
-        block = block.relit(where, np.exp(lighting.log_ratio))
+        return Lighting(where, log).smoothed(block)
+
+    def relit_part(self, light: Lighting) -> Block:
+        """The content of V^c in the light of its new place; no more than that has colours."""
+        block = _lit(self.before, light)
         kept = ndimage.binary_dilation(self.inside, iterations=2)
         at = np.argwhere(kept)
         part = replace(block, slot=np.where(kept, block.slot, -1))

@@ -8,12 +8,14 @@ from functools import cached_property
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
 from cagefield.patches.seen import seen_pairs
+from cagefield.patches.splats import splat_patch_of
+from cagefield.patches.voxelised import voxelised_whole
 from cagefield.rendering.render_result import RenderResult
 
 KEPT = 16
@@ -26,7 +28,7 @@ class Patcher:
     """Gives discrete edits the patches that their `fill` and `relight` ask for.
 
     `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
-    from there by `render`, which draws the field without edits, with normals. Splats have no patches yet.
+    from there by `render`, which draws the field without edits, with normals.
     """
 
     def __init__(
@@ -36,7 +38,7 @@ class Patcher:
         render: Callable[[Camera], RenderResult],
     ) -> None:
         self._field, self._cameras, self._render = field, cameras, render
-        self._kept: OrderedDict[Key, Patch] = OrderedDict()
+        self._kept: OrderedDict[Key, Patch | SplatPatch] = OrderedDict()
 
     def patched(
         self, edits: Sequence[Edit], *, moving: bool = False, proceed: Callable[[], None] | None = None
@@ -49,10 +51,10 @@ class Patcher:
         """
         made: list[Edit] = []
         for edit in edits:
-            if isinstance(self._field, VoxelField) and wants_patch(edit):
+            if wants_patch(edit):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(self._field, tuple(made), edit, moving)
+                patch = self._patch(tuple(made), edit, moving)
                 edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
         return EditStack(made)
@@ -60,11 +62,12 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness."""
-        if not isinstance(self._field, VoxelField):
-            return Ambience((), ())
-        return ambience_of(self._field, seen_pairs(self._render, self._cameras, self._field.bounds))
+        pairs = seen_pairs(self._render, self._cameras, self._field.bounds)
+        if isinstance(self._field, VoxelField):
+            return ambience_of(self._field, pairs)
+        return ambience_of(voxelised_whole(self._field), pairs)
 
-    def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | None:
+    def _patch(self, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | SplatPatch | None:
         """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
         # A drag does not wait for the light to be found out about.
@@ -78,7 +81,12 @@ class Patcher:
             return self._kept[key]
         if not wants_patch(edit, moving):
             return None
-        patch = patch_of(field, stack, edit, self.ambience if relit else None, settled=not moving)
+        ambience = self.ambience if relit else None
+        patch: Patch | SplatPatch
+        if isinstance(self._field, VoxelField):
+            patch = patch_of(self._field, stack, edit, ambience, settled=not moving)
+        else:
+            patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving)
         self._kept[key] = patch
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

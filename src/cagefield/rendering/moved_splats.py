@@ -6,6 +6,8 @@ an edit) as a whole. With V^c the canonical and V the deformed inner cage of a d
 - in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
 - in V but not in V^c: hidden, for V shows what was in V^c.
 
+With a patch, splats around V^c get new light, or go, and new ones fill what was uncovered: copies of others.
+
 Of a stack, each edit takes what the ones before it made: originals and copies alike.
 """
 
@@ -19,10 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat import SplatField
+from cagefield.sh import brightened
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
+
+UNSEEN = 0.01
+"""The log of a change of light that is left out."""
 
 KEPT_STACKS = 6
 """Stacks of edits of one field whose splats are kept, so that a longer stack begins where they end."""
@@ -40,12 +47,20 @@ class MovedSplats:
         source: [M] int64, the numbers of the splats that are shown elsewhere, any number of times.
         points: [M,3], their means in deformed space.
         jacobian: [M,3,3], d(deformed)/d(canonical) there.
+        gains: [M,3], what their red, green and blue are multiplied by; None where that is 1 for all.
     """
 
     left: Mask
     source: NDArray[np.int64]
     points: Array
     jacobian: Array
+    gains: Array | None = None
+
+    def sh(self, harmonics: NDArray[np.float32]) -> NDArray[np.float32] | None:
+        """The harmonics [M,K,3] of those shown elsewhere, of the field's [N,K,3]; None where they have its."""
+        if self.gains is None:
+            return None
+        return brightened(harmonics[self.source], self.gains)
 
     @classmethod
     def at_rest(cls, count: int) -> MovedSplats:
@@ -68,12 +83,22 @@ class MovedSplats:
     def without(self, gone: Mask) -> MovedSplats:
         """The same, those that are True in `gone` [N] shown nowhere."""
         kept = ~gone[self.source]
-        return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept])
+        gains = None if self.gains is None else self.gains[kept]
+        return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
 
     def then(
-        self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
+        self, edit: Edit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
-        """What one more edit makes of these. Raises `EditError` where it cannot be evaluated."""
+        """What one more edit makes of a field's. Raises `EditError` where it cannot be evaluated."""
+        moved, carried = self._moved(edit, field.means, coarse, proceed)
+        if isinstance(edit.patch, SplatPatch):
+            return moved._patched(edit, edit.patch, field, carried)
+        return moved
+
+    def _moved(
+        self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
+    ) -> tuple[MovedSplats, Array]:
+        """(what an edit's map makes of these, where those of its last rows [C,3] were that it took along)."""
         from cagefield.rendering.kernels.splat_deforming import changes, in_boxes, times
 
         warp = edit.exact_warp
@@ -101,12 +126,50 @@ class MovedSplats:
             composed = np.ascontiguousarray(jacobian[again])
             times(composed, self.jacobian[near[come[again] - len(still)]])
             jacobian[again] = composed
-        return MovedSplats(
+        gains = None
+        if self.gains is not None:
+            before = np.concatenate([np.ones((len(still), 3)), self.gains[near]])
+            gains = np.concatenate([self.gains[stays], before[come]])
+        moved = MovedSplats(
             left,
             np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come]]),
             np.concatenate([self.points[stays], mapped.points[come]]),
             np.concatenate([self.jacobian[stays], jacobian]),
+            gains,
         )
+        return moved, points[come]
+
+    def _patched(self, edit: Edit, patch: SplatPatch, field: SplatField, carried: Array) -> MovedSplats:
+        """These with the patch of the edit that moved them; `carried` [C,3] is where its last rows were."""
+        from cagefield.rendering.kernels.splat_deforming import in_boxes
+
+        here = len(self.source) - len(carried)
+        gains = np.ones((len(self.source), 3)) if self.gains is None else self.gains.copy()
+        if patch.part is not None and len(carried):
+            gains[here:] *= np.exp(patch.part.at(carried))[:, None]
+        # What the edit left: splats in their own places, and those that earlier edits took there.
+        inside = np.empty(len(field), bool)
+        in_boxes(field.means, patch.region.aabb[None], inside)
+        still = np.flatnonzero(inside & ~self.left)
+        points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
+        outside = ~edit.inner.contains(points)
+        gone = patch.takes_away(points) & outside
+        log = np.where(outside, patch.light.at(points), 0.0)
+        lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
+        gains[:here] *= np.exp(log[len(still) :])[:, None]
+        left = self.left.copy()
+        left[still[gone[: len(still)]]] = True
+        left[still[lit]] = True
+        kept = np.ones(len(self.source), bool)
+        kept[:here] = ~gone[len(still) :]
+        turn = np.tile(np.eye(3), (len(lit), 1, 1))
+        parts = [
+            (self.source[kept], self.points[kept], self.jacobian[kept], gains[kept]),
+            (still[lit], points[lit], turn, np.tile(np.exp(log[lit])[:, None], 3)),
+        ]
+        if patch.field is field:
+            parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
+        return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -139,7 +202,7 @@ def moved_splats(
     moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(len(field)), 0)
     found = [start] if start else []
     for number, edit in enumerate(active[count:], start=count + 1):
-        moved = moved.then(edit, field.means, coarse, proceed)
+        moved = moved.then(edit, field, coarse, proceed)
         found.append(_KnownStack(active[:number], coarse, moved))
     kept = [*reversed(found), *(k for k in known if k is not start)][:KEPT_STACKS]
     sizes = np.cumsum([len(k.moved.source) for k in kept])
