@@ -167,8 +167,9 @@ def _splat_files(
     found = {"field": encode_page_splats(field, background=scene.background)}
     preserve_opacity = scene.preserve_opacity
     if scene.edits.active:
-        split = split_of(field, scene.edits)
-        changed = changed_splats(field, scene.edits, preserve_opacity=preserve_opacity, split=split)
+        edits = scene.patched_edits
+        split = split_of(field, edits)
+        changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
         found["edits"] = encode_page_splat_edits(field, changed)
     along = splat_path_edits(
         field, scene.edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress

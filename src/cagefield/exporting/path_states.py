@@ -187,7 +187,7 @@ def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Pa
     edit, part = edits[number], parts[number]
     if part < 1.0 and not edit.deleted:
         edit = on_way[number]
-    if edit.patch is None or part <= 0.0:
+    if not isinstance(edit.patch, Patch) or part <= 0.0:
         return None
     low, high = edit.patch.region.aabb
     for before, there in zip(edits.edits[:number], parts, strict=False):

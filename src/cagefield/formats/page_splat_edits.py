@@ -8,6 +8,8 @@ field, in the page's order, and M that come (moved ones, copies, the children of
     means        [M, 3] float32, in deformed space, less the field's centre
     covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
     opacities    [2, M] uint8, high bytes first, of 65535 o
+    gains        [M] int32: what the red, green and blue of a source's colour is multiplied by, see
+                 `encode_gains`
     turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
                  along R^T d
 
@@ -37,7 +39,7 @@ from cagefield.quaternions import quaternions_of
 from cagefield.rendering.deformed_splats import ChangedSplats
 from cagefield.typing import Float32
 
-MAGIC, VERSION = b"cagesped", 1
+MAGIC, VERSION = b"cagesped", 2
 
 LEVEL = 1
 """Of deflate: floats hardly get smaller, and a drag waits for them."""
@@ -46,7 +48,7 @@ LEVEL = 1
 @dataclass(frozen=True)
 class PageSplatEdits:
     """What a file holds: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
-    [M], turns [M,4] (w, x, y, z)."""
+    [M], turns [M,4] (w, x, y, z), gains [M,3]."""
 
     hidden: NDArray[np.bool_]
     sources: NDArray[np.int32]
@@ -54,6 +56,7 @@ class PageSplatEdits:
     covariances: Float32
     opacities: Float32
     turns: Float32
+    gains: Float32
 
 
 def encode_page_splat_edits(field: SplatField, changed: ChangedSplats) -> bytes:
@@ -64,6 +67,7 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats) -> bytes:
     splats = changed.splats
     header = {"count": len(field), "changed": len(splats)}
     turns = np.eye(3)[None] if splats.rotations is None else splats.rotations
+    gains = np.ones((len(splats), 3), np.float32) if changed.gains is None else changed.gains
     arrays: dict[str, NDArray[Any]] = {
         "hidden": np.packbits(changed.hidden[order], bitorder="little"),
         "sources": place[changed.sources],
@@ -71,8 +75,25 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats) -> bytes:
         "covariances": splats.covariances,
         "opacities": byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64))),
         "turns": encode_rotations(np.broadcast_to(quaternions_of(turns), (len(splats), 4)), bits=15),
+        "gains": encode_gains(gains),
     }
     return pack(MAGIC, VERSION, header, arrays, level=LEVEL)
+
+
+GAIN_STEP = 1.0 / 128.0
+"""Of the base-2 logarithm of a gain: half a percent."""
+
+
+def encode_gains(gains: Float32) -> NDArray[np.int32]:
+    """Gains [M,3] as [M]: 10 bits each, red the lowest, of 512 + log2(gain) / GAIN_STEP."""
+    codes = np.clip(512 + np.round(np.log2(np.maximum(gains, 1e-6)) / GAIN_STEP), 0, 1023).astype(np.int32)
+    return np.asarray(codes[:, 0] | codes[:, 1] << np.int32(10) | codes[:, 2] << np.int32(20))
+
+
+def decode_gains(codes: NDArray[np.int32]) -> Float32:
+    """The gains [M,3] of what `encode_gains` made."""
+    parts = codes[:, None] >> np.array([0, 10, 20], np.int32) & np.int32(1023)
+    return np.asarray(np.exp2((parts.astype(np.float32) - 512.0) * GAIN_STEP), np.float32)
 
 
 def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
@@ -91,6 +112,7 @@ def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
             "covariances": (changed, 6),
             "opacities": (2, changed),
             "turns": (2, 3, changed),
+            "gains": (changed,),
         }
         parts: dict[str, Any] = {name: arrays[name] for name in shapes}
     except (ValueError, KeyError, TypeError) as error:
@@ -106,4 +128,5 @@ def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
         parts["covariances"],
         (from_byte_pairs(parts["opacities"]) / 65535.0).astype(np.float32),
         decode_rotations(parts["turns"]),
+        decode_gains(parts["gains"]),
     )

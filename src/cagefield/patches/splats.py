@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from cagefield.cages import Cage
@@ -28,13 +29,13 @@ from cagefield.patches.block import Block, interpolated, world_of
 from cagefield.patches.extent import patch_box
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.making import Made, made_of
-from cagefield.patches.support import Support
+from cagefield.patches.support import KNOTS, Support
 from cagefield.patches.voxelised import voxel_for, voxelised
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.baked_splats import where_they_are
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
 from cagefield.sh import C0
-from cagefield.typing import Array, Mask
+from cagefield.typing import AnyArray, Array, Mask
 from cagefield.warps.inner_map import HexahedronMap
 
 WIDE = 0.7
@@ -51,6 +52,9 @@ UPWARDS = 0.3
 
 ENOUGH = 8
 """Splats that lie flat, from which on others are not copied."""
+
+FAR, OFF = 12.0, 1.0
+"""Splats show how high the surface is, up to this far from a new one, and how far that may be off; voxels."""
 
 NEAREST = 12
 """Splats of which one is copied."""
@@ -69,18 +73,37 @@ def splat_patch_of(
     field: SplatField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
 ) -> SplatPatch:
     """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
-    moved = moved_splats(field, below)
-    splats = where_they_are(field, moved)
     reach = ambience.reach if ambience is not None and ambience.shows else 0.0
     place = settled and not edit.deleted
+    moved = _around(field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, reach)))
+    splats = where_they_are(field, moved)
     voxel = voxel_for(splats, patch_box(edit, 0.0, reach, settled=place))
     box = patch_box(edit, voxel, reach, settled=place) + 3.0 * voxel * np.array([[-1.0], [1.0]])
-    if isinstance(edit.fill, Clone):
-        source = edit.fill.source.aabb
-        box = np.stack([np.minimum(box[0], source[0]), np.maximum(box[1], source[1])])
-    grid = voxelised(splats, box, voxel)
+    grid = voxelised(splats, _box_of(edit, box), voxel)
     made = made_of(grid, EditStack(), edit, ambience, settled=settled)
     return _Splats.of(field, splats, grid, moved).patch(field, edit, made)
+
+
+def _box_of(edit: Edit, box: Array) -> Array:
+    """A box [2,3], grown by the cage that an edit clones."""
+    if not isinstance(edit.fill, Clone):
+        return box
+    source = edit.fill.source.aabb
+    return np.stack([np.minimum(box[0], source[0]), np.maximum(box[1], source[1])])
+
+
+def _around(field: SplatField, moved: MovedSplats, box: Array) -> MovedSplats:
+    """Those of a field's splats that may reach into a box [2,3], half as large again."""
+    box = box + 0.25 * (box[1] - box[0]) * np.array([[-1.0], [1.0]])
+
+    def reaches(points: AnyArray, rows: NDArray[np.int64] | slice) -> Mask:
+        reach = 3.0 * np.exp(field.log_scales[rows].max(axis=1, keepdims=True))
+        return np.asarray(((points + reach >= box[0]) & (points - reach <= box[1])).all(axis=1))
+
+    here = reaches(moved.points, moved.source)
+    gains = None if moved.gains is None else moved.gains[here]
+    left = moved.left | ~reaches(field.means, slice(None))
+    return MovedSplats(left, moved.source[here], moved.points[here], moved.jacobian[here], gains)
 
 
 _New: TypeAlias = tuple[NDArray[np.int64], Array, Array, Array]
@@ -123,6 +146,7 @@ class _Splats:
         kept = self._beside(made, inner, fresh, support.normal)
         if not len(at) or not len(kept):
             return _NONE
+        at = self._levelled(kept, under, support, at)
         points = world_of(under.field, at + under.low)
         frames = rotation_matrices(self.splats.quaternions[kept].astype(np.float64))
         scales = np.exp(self.splats.log_scales[kept].astype(np.float64))
@@ -136,14 +160,28 @@ class _Splats:
         wanted = np.full(scales.shape, WIDE * voxel)
         wanted[each, thin] = np.minimum(scales[each, thin], THICK * voxel)
         shapes = (frames * (wanted / scales)[:, None]) @ np.swapaxes(frames, 1, 2)
-        return kept[nearest], points, _turns(across, normals) @ shapes, colours
+        return kept[nearest], points, _turns(np.asarray(across), normals) @ shapes, colours
+
+    def _levelled(self, kept: NDArray[np.int64], under: Block, support: Support, at: Array) -> Array:
+        """Block coordinates [A,3] taken, by OFF at most, to where some splats' surface goes on."""
+        g = self.grid.grid_coordinates(self.splats.means[kept].astype(np.float64)) - under.low
+        (uv, height), (to, now) = support.local(g), support.local(at)
+        members = np.flatnonzero(cKDTree(at).query(g, distance_upper_bound=FAR)[0] < FAR)
+        members = members[np.abs(height[members] - np.median(now)) < FAR]
+        if len(members) < ENOUGH:
+            return at
+        _, first = np.unique(np.round(uv[members], 3), axis=0, return_index=True)
+        members = members[first][:KNOTS]
+        spline = RBFInterpolator(uv[members], height[members], neighbors=32, smoothing=1.0)
+        off = np.clip(spline(to) - now, -OFF, OFF)
+        return np.asarray(at + off[:, None] * support.normal)
 
     def _alike(self, kept: NDArray[np.int64], points: Array, colours: Array) -> NDArray[np.int64]:
-        """Which [A] of some splats to copy: of those near points [A,3], the one whose colour [A,3] is nearest."""
+        """Which [A] of some splats to copy: near points [A,3], those whose colours are nearest to [A,3]."""
         count = min(NEAREST, len(kept))
         _, near = cKDTree(self.splats.means[kept]).query(points, k=[*range(1, count + 1)])
-        ratio = np.log(np.maximum(self.colours(kept), DARK))[near] - np.log(np.maximum(colours, DARK))[:, None]
-        best = np.argmin((ratio**2).sum(axis=2), axis=1)
+        own, wanted = (np.log(np.maximum(rgb, DARK)) for rgb in (self.colours(kept), colours))
+        best = np.argmin(((own[near] - wanted[:, None]) ** 2).sum(axis=2), axis=1)
         return np.asarray(near[np.arange(len(points)), best])
 
     def _beside(self, made: Made, inner: Cage, fresh: Mask, normal: Array) -> NDArray[np.int64]:

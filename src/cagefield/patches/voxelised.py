@@ -26,11 +26,16 @@ VERTICES = (40, 112)
 """Vertices along the longest edge of a grid that splats are worked out on, at least and at most."""
 
 
+def coarsest_voxel(box: Array) -> float:
+    """The largest edge that a voxel has for a world-space box [2,3]."""
+    return float((box[1] - box[0]).max()) / VERTICES[0]
+
+
 def voxel_for(splats: SplatField, box: Array) -> float:
     """The edge of a voxel, world units, that shows what splats in a world-space box [2,3] show."""
     inside = ((splats.means >= box[0]) & (splats.means <= box[1])).all(axis=1)
-    edge = float((box[1] - box[0]).max())
-    least, most = edge / VERTICES[1], edge / VERTICES[0]
+    most = coarsest_voxel(box)
+    least = most * VERTICES[0] / VERTICES[1]
     if not inside.any():
         return most
     return float(np.clip(splats.take(inside).sample_spacing, least, most))

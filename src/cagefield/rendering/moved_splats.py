@@ -57,7 +57,7 @@ class MovedSplats:
     gains: Array | None = None
 
     def sh(self, harmonics: NDArray[np.float32]) -> NDArray[np.float32] | None:
-        """The harmonics [M,K,3] of those shown elsewhere, of the field's [N,K,3]; None where they have its."""
+        """The harmonics [M,K,3] of those shown elsewhere, from the field's [N,K,3]; None for its own."""
         if self.gains is None:
             return None
         return brightened(harmonics[self.source], self.gains)

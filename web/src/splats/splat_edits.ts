@@ -3,13 +3,16 @@ import { ByteReader, PageFile } from "../field/page_file";
 import { wholes } from "./splat_file";
 
 export const EDITS_MAGIC = "cagesped";
-const VERSION = 1;
+const VERSION = 2;
 
 /**
  * Words of a changed splat's record: the mean's floats, whose harmonics it has; its covariance's floats (xx, xy, xz,
- * yy | yz, zz); its turn and opacity.
+ * yy | yz, zz); its turn and opacity; what its colour is multiplied by, and three that say nothing.
  */
-export const CHANGED = 12;
+export const CHANGED = 16;
+
+/** A gain of 1 in red, green and blue (see `cagefield.formats.page_splat_edits.encode_gains`). */
+const NO_GAIN = 512 | (512 << 10) | (512 << 20);
 
 interface EditsHeader {
   /** Splats of the field that was edited. */
@@ -37,7 +40,8 @@ export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
   const covariances = (await file.read("covariances")) as Float32Array<ArrayBuffer>;
   const opacities = wholes((await file.read("opacities")) as Uint8Array);
   const turns = wholes((await file.read("turns")) as Uint8Array);
-  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns) };
+  const gains = (await file.read("gains")) as Int32Array;
+  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns, gains) };
 }
 
 /** The first `count` bits, 0 or 1, the lowest of a byte first. */
@@ -47,13 +51,14 @@ export function unpackedBits(bits: Uint8Array, count: number): Uint8Array<ArrayB
   return out;
 }
 
-/** The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3, M]. */
+/** The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3, M], gains [M] if there are any. */
 export function changedRecords(
   sources: Int32Array,
   means: Float32Array<ArrayBuffer>,
   covariances: Float32Array<ArrayBuffer>,
   opacities: Uint16Array,
   turns: Uint16Array,
+  gains: Int32Array | null,
 ): Uint32Array<ArrayBuffer> {
   const changed = sources.length;
   const records = new Uint32Array(CHANGED * changed);
@@ -65,6 +70,7 @@ export function changedRecords(
     for (let k = 0; k < 6; k++) records[at + 4 + k] = covariance[6 * n + k];
     records[at + 10] = turns[n] | (turns[changed + n] << 16);
     records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
+    records[at + 12] = gains ? gains[n] : NO_GAIN;
   }
   return records;
 }

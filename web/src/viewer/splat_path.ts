@@ -89,7 +89,7 @@ export class SplatPath {
       means = mixed(means, others.means, partners, 3, away);
       covariances = mixed(covariances, others.covariances, partners, 6, away);
     }
-    const records = changedRecords(state.sources, means, covariances, state.opacities, state.turns);
+    const records = changedRecords(state.sources, means, covariances, state.opacities, state.turns, null);
     return { count: header.count, hidden: unpackedBits(state.hidden, header.count), changed: state.sources.length, means, records };
   }
 
