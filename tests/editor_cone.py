@@ -55,7 +55,7 @@ def difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 def enlarged(picture: NDArray[np.float64], width: int, height: int) -> NDArray[np.float64]:
-    """A picture [H,W,3] in [0,1] as one of fewer pixels shows it: rays through their middles, then smoothed."""
+    """A picture [H,W,3] in [0,1] as one of fewer pixels shows it, through whose middles its rays go."""
     down, across = picture.shape[:2]
     rows = ((np.arange(height) + 0.5) * down / height).astype(int)
     columns = ((np.arange(width) + 0.5) * across / width).astype(int)

@@ -169,7 +169,7 @@ def _splat_files(
     if scene.edits.active:
         split = split_of(field, scene.edits)
         changed = changed_splats(field, scene.edits, preserve_opacity=preserve_opacity, split=split)
-        found["edits"] = encode_page_splat_edits(field, changed)
+        found["edits"] = encode_page_splat_edits(field, changed, packed=True)
     along = splat_path_edits(
         field, scene.edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
     )

@@ -15,9 +15,9 @@ from cagefield.keyframes import Keyframe, Timeline
 from cagefield.rendering.deformed_splats import changed_splats
 from cagefield.rendering.splat_splitting import Split, split_of
 
-BUDGET = 16 << 20
-"""Bytes of splats that move, before they are deflated. Where all states would take more, splats that the
-edits bend or cut are not split; where that is too much too, there are fewer states."""
+BUDGET = 48 << 20
+"""Bytes of splats that move, before they are deflated to about a sixth. Where all states would take more,
+splats that the edits bend or cut are not split; where that is too much too, there are fewer states."""
 
 LEAST_STATES = 8
 
@@ -40,7 +40,7 @@ def splat_path_edits(
 
     def state(stack: EditStack) -> SplatPathState:
         changed = changed_splats(field, stack, preserve_opacity=preserve_opacity, split=split)
-        return SplatPathState.of(field, changed)
+        return SplatPathState.of(field, changed, split)
 
     line = Timeline(keys, loop=loop)
     wanted = state_times(line, edits, MOST_STATES)

@@ -28,7 +28,7 @@ from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
-from cagefield.typing import Float32, Mask
+from cagefield.typing import Array, Float32, Mask
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_splitting import Split
@@ -165,11 +165,15 @@ class ChangedSplats:
         hidden: [N], True where the field's splat is not shown as it is.
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
         splats: the M new ones; their `sh` are those of their sources.
+        rows: [M] int64, what they are made of: splats of the field, and, from N on, children of the split.
+        jacobian: [M,3,3], d(deformed)/d(canonical) at their means.
     """
 
     hidden: Mask
     sources: NDArray[np.int64]
     splats: DeformedSplats
+    rows: NDArray[np.int64]
+    jacobian: Array
 
 
 def changed_splats(
@@ -187,7 +191,7 @@ def changed_splats(
         moved = moved.without(split.parents)
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     opacities = field.opacities[moved.source] if own is None else own
-    sources = moved.source
+    sources, made_of, jacobian = moved.source, moved.source, moved.jacobian
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
         more = _deformed(split.children, others, preserve_opacity, None)
@@ -201,8 +205,12 @@ def changed_splats(
         )
         opacities, rotations = np.concatenate([opacities, more.opacities]), np.concatenate([rotations, turns])
         sources = np.concatenate([sources, split.sources[rows]])
+        made_of = np.concatenate([made_of, len(field) + rows])
+        of_children = np.tile(np.eye(3), (len(more), 1, 1))
+        of_children[Places(others).moved] = others.jacobian
+        jacobian = np.concatenate([jacobian, of_children])
     new = DeformedSplats(means, covariances, opacities, field.sh[sources], rotations, field.antialiased)
-    return ChangedSplats(moved.left, sources, new)
+    return ChangedSplats(moved.left, sources, new, made_of, jacobian)
 
 
 _NO_TURN = np.eye(3, dtype=np.float32)

@@ -1,9 +1,10 @@
 /** Splats that edits changed, as they come over the wire (see `cagefield.formats.page_splat_edits`). */
 import { ByteReader, PageFile } from "../field/page_file";
-import { wholes } from "./splat_file";
+import { axesOf, covariancesOf } from "./shapes";
+import { meansOf, wholes } from "./splat_file";
 
 export const EDITS_MAGIC = "cagesped";
-const VERSION = 1;
+const VERSION = 2;
 
 /**
  * Words of a changed splat's record: the mean's floats, whose harmonics it has; its covariance's floats (xx, xy, xz,
@@ -15,6 +16,9 @@ interface EditsHeader {
   /** Splats of the field that was edited. */
   count: number;
   changed: number;
+  /** Whether means and shapes are quantised. */
+  packed: boolean;
+  log_scales: [number, number];
 }
 
 export interface SplatEdits {
@@ -30,13 +34,17 @@ export interface SplatEdits {
 
 export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
   const file = await PageFile.open<EditsHeader>(new ByteReader(source), EDITS_MAGIC, VERSION);
-  const { count, changed } = file.header;
-  const hidden = unpackedBits((await file.read("hidden")) as Uint8Array, count);
+  const { count, changed, packed, log_scales: logs } = file.header;
+  const bytes = async (name: string): Promise<Uint8Array> => (await file.read(name)) as Uint8Array;
+  const floats = async (name: string): Promise<Float32Array<ArrayBuffer>> => (await file.read(name)) as Float32Array<ArrayBuffer>;
+  const hidden = unpackedBits(await bytes("hidden"), count);
   const sources = (await file.read("sources")) as Int32Array;
-  const means = (await file.read("means")) as Float32Array<ArrayBuffer>;
-  const covariances = (await file.read("covariances")) as Float32Array<ArrayBuffer>;
-  const opacities = wholes((await file.read("opacities")) as Uint8Array);
-  const turns = wholes((await file.read("turns")) as Uint8Array);
+  const means = packed ? meansOf(await floats("chunks"), await bytes("means"), changed) : await floats("means");
+  const covariances = packed
+    ? covariancesOf(axesOf(wholes(await bytes("rotations")), wholes(await bytes("scales")), logs))
+    : await floats("covariances");
+  const opacities = wholes(await bytes("opacities"));
+  const turns = wholes(await bytes("turns"));
   return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns) };
 }
 
