@@ -170,9 +170,15 @@ def _splat_files(
         edits = scene.patched_edits
         split = split_of(field, edits)
         changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
-        found["edits"] = encode_page_splat_edits(field, changed)
+        found["edits"] = encode_page_splat_edits(field, changed, packed=True)
     along = splat_path_edits(
-        field, scene.edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
+        field,
+        scene.edits,
+        keys,
+        loop,
+        scene.patcher,
+        preserve_opacity=preserve_opacity,
+        on_progress=on_progress,
     )
     return found, along
 

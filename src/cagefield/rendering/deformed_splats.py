@@ -167,11 +167,15 @@ class ChangedSplats:
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
         splats: the M new ones; their `sh` are those of their sources, times `gains`.
         gains: [M,3], what the red, green and blue of their sources is multiplied by; None where that is 1.
+        rows: [M] int64, what they are made of: splats of the field, and, from N on, children of the split.
+        jacobian: [M,3,3], d(deformed)/d(canonical) at their means.
     """
 
     hidden: Mask
     sources: NDArray[np.int64]
     splats: DeformedSplats
+    rows: NDArray[np.int64]
+    jacobian: Array
     gains: Float32 | None = None
 
 
@@ -190,7 +194,7 @@ def changed_splats(
         moved = moved.without(split.parents)
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     opacities = field.opacities[moved.source] if own is None else own
-    sources, gains = moved.source, moved.gains
+    sources, made_of, jacobian, gains = moved.source, moved.source, moved.jacobian, moved.gains
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
         more = _deformed(split.children, others, preserve_opacity, None)
@@ -205,12 +209,17 @@ def changed_splats(
         )
         opacities, rotations = np.concatenate([opacities, more.opacities]), np.concatenate([rotations, turns])
         sources = np.concatenate([sources, split.sources[rows]])
+        made_of = np.concatenate([made_of, len(field) + rows])
+        of_children = np.tile(np.eye(3), (len(more), 1, 1))
+        of_children[Places(others).moved] = others.jacobian
+        jacobian = np.concatenate([jacobian, of_children])
         if gains is not None or others.gains is not None:
             own_gains = np.concatenate([np.ones((len(resting), 3)), _gains_of(others)])[in_order]
             gains = np.concatenate([_gains_of(moved), own_gains])
     sh = field.sh[sources] if gains is None else brightened(field.sh[sources], gains)
     new = DeformedSplats(means, covariances, opacities, sh, rotations, field.antialiased)
-    return ChangedSplats(moved.left, sources, new, None if gains is None else gains.astype(np.float32))
+    told = None if gains is None else gains.astype(np.float32)
+    return ChangedSplats(moved.left, sources, new, made_of, jacobian, told)
 
 
 def _gains_of(moved: MovedSplats) -> Array:
