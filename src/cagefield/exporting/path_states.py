@@ -80,7 +80,7 @@ def path_edits(
     if times is None:
         return None
     on_way = for_pages(patcher.patched(edits.edits, moving=True))
-    edits = for_pages(patcher.patched(edits.edits))
+    edits = for_pages(patcher.patched(edits.edits, bending=False))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]

@@ -37,7 +37,7 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
-    on_way, edits = patcher.patched(edits.edits, moving=True), patcher.patched(edits.edits)
+    on_way, edits = patcher.patched(edits.edits, moving=True), patcher.patched(edits.edits, bending=False)
 
     # Split for the whole edits, once, so that the same splats are on their way in all states.
     split: Split | None = split_of(field, edits)
