@@ -65,7 +65,7 @@ class Edit:
       sheets is shown.
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
       leaves it as it was trained, a `Clone` copies a cage.
-    - relight: "occlusion" takes contact shadows along, of a discrete edit; "none" leaves them.
+    - relight: "occlusion" takes contact shadows along; "none" leaves them.
     - patch: of a discrete edit, what the field that it was made for shows where something was taken away
       (`cagefield.patches.patched`); no part of edit files.
 
