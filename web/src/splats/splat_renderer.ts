@@ -69,6 +69,8 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
   private gathering: Gathering;
   private store: SplatStore | null = null;
   private changed: Changed | null = null;
+  /** Splats of edits that are to be shown next. */
+  private prepared: { edits: SplatEdits; set: SplatSet; own: SplatSet } | null = null;
   private camera: PinholeCamera | null = null;
   private loading = 0;
   private readonly programs = new Map<string, Program>();
@@ -160,10 +162,20 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     this.setEdits(changed?.edits ?? null);
   }
 
+  /** Has the splats of edits sorted, and is done when `setEdits` with the same edits need not wait for that. */
+  async prepare(edits: SplatEdits): Promise<void> {
+    const { store, camera } = this;
+    if (store === null || camera === null || !this.edited || edits.changed === 0 || edits.count !== store.header.count) return;
+    const set = changedSet(edits, store);
+    this.prepared = { edits, set, own: store.set };
+    await this.sorters.after.prepare(set, this.depths(store, camera));
+  }
+
   /** What edits changed; null for nothing. Throws where it is of other splats, `TooLarge` beyond the memory. */
   setEdits(edits: SplatEdits | null): void {
+    const { prepared } = this;
     this.changed?.texture.dispose();
-    this.changed = null;
+    this.changed = this.prepared = null;
     this.uploaded.last = 0;
     if (edits === null || (edits.changed === 0 && !edits.hidden.includes(1))) return;
     if (this.store !== null && edits.count !== this.store.header.count)
@@ -173,7 +185,8 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
       throw new TooLarge(`the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`);
     const texture = new WordTexture(this.gl, edits.records.length);
     if (edits.changed > 0) texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
-    this.changed = { edits, texture, set: null, own: null };
+    const { set, own } = prepared?.edits === edits ? prepared : { set: null, own: null };
+    this.changed = { edits, texture, set, own };
     this.uploaded.last = edits.changed > 0 ? edits.records.byteLength : 0;
     this.uploaded.total += this.uploaded.last;
   }
@@ -255,9 +268,14 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     if (!this.edited || changed === null) return store.set;
     if (changed.set === null || changed.own !== store.set) {
       changed.own = store.set;
-      changed.set = { means: store.set.means, hidden: changed.edits.hidden, changed: arrivedOf(changed.edits, store) };
+      changed.set = changedSet(changed.edits, store);
     }
     return changed.set;
+  }
+
+  /** Orders that the page has made itself, and waited for. */
+  get sortedHere(): number {
+    return this.sorters.before.sortedHere + this.sorters.after.sortedHere;
   }
 
   private eye(store: SplatStore, { c2w }: PinholeCamera): Vec3 {
@@ -389,6 +407,10 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
 }
 
 const mebibytes = (bytes: number): number => Math.ceil(bytes / 2 ** 20);
+
+function changedSet(edits: SplatEdits, store: SplatStore): SplatSet {
+  return { means: store.set.means, hidden: edits.hidden, changed: arrivedOf(edits, store) };
+}
 
 /** The means of changed splats, NaN where those whose colours they have are not there yet. */
 function arrivedOf({ means, records, changed }: SplatEdits, store: SplatStore): Float32Array {
