@@ -183,7 +183,7 @@ class _Patches:
     def __init__(self, moving: Patch, settled: Patch) -> None:
         self.moving, self.settled = moving, settled
 
-    def patched(self, edits: Sequence[Edit], *, moving: bool = False) -> EditStack:
+    def patched(self, edits: Sequence[Edit], *, moving: bool = False, bending: bool = True) -> EditStack:
         patch = self.moving if moving else self.settled
         return EditStack(
             edit if edit.adjustment == "continuous" else edit.replace(patch=patch) for edit in edits
