@@ -330,3 +330,24 @@ def test_a_clone_fills_with_what_another_cage_holds(scenes: tuple[Scene, Scene])
     assert all(parse_edits(dump_edits(stack)) == stack for stack in edits.values())
     hole, clone = (db(seen(scene.with_edits(stack)), seen(truth)) for stack in edits.values())
     assert clone > hole + 3.0 and clone > 24.0, (hole, clone)
+
+
+def test_the_rim_of_a_part_blends_into_what_it_is_put_into() -> None:
+    """A piece of floor, set into the floor elsewhere: its colours differ, and a feathered seam is softer."""
+    scene = Scene(room(False), cameras={"train": cameras()})
+    piece = Cage.box((-0.4, -0.4, FLOOR), (0.5, 0.5, 0.4))
+    above = Camera.look_at((0.35, 0.3, 1.5), (0.35, 0.31, FLOOR), width=64, height=64, fov_x=0.4)
+    steps = {}
+    for feather in (0.0, 1.0, 4.0):
+        edit = Edit(piece, adjustment="discrete", keep_source=True, relight="none", feather=feather)
+        moved = EditStack([edit.translate((0.75, 0.7, 0.0))])
+        assert parse_edits(dump_edits(moved)) == moved
+        picture = scene.with_edits(moved).render(above).rgb
+        steps[feather] = float(np.abs(np.diff(picture, axis=1)).max())
+    assert steps[4.0] < steps[1.0] < 0.9 * steps[0.0] and steps[4.0] < 0.6 * steps[0.0], steps
+
+
+def test_widths_of_seams_that_make_no_sense_are_refused() -> None:
+    for feather in (-1.0, 9.0, float("nan")):
+        with pytest.raises(EditError, match="feather must be 0"):
+            Edit(cage(), adjustment="discrete", feather=feather)

@@ -17,7 +17,7 @@ from cagefield.edits import operations as ops
 from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
-from cagefield.edits.options import Adjustment, Fill, Relight, problem_of_options
+from cagefield.edits.options import FEATHER, Adjustment, Fill, Relight, problem_of_options
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.errors import CageError, DeviceError, EditError
@@ -66,6 +66,7 @@ class Edit:
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
       leaves it as it was trained, a `Clone` copies a cage.
     - relight: "occlusion" takes contact shadows along; "none" leaves them.
+    - feather: of a discrete edit of voxels, how many voxels along the faces of V blend into what is there.
     - patch: of a discrete edit, what the field that it was made for shows where something was taken away
       (`cagefield.patches.patched`); no part of edit files.
 
@@ -88,6 +89,7 @@ class Edit:
     width: float = 1.0
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
+    feather: float = FEATHER
     patch: Patch | SplatPatch | None = None
 
     def __post_init__(self) -> None:
@@ -104,7 +106,7 @@ class Edit:
             deleted=self.deleted,
             fading=(self.falloff, self.width),
             lattice=self.lattice,
-            surroundings=(self.fill, self.relight),
+            surroundings=(self.fill, self.relight, self.feather),
         )
         if problem is not None:
             raise self._error(problem)

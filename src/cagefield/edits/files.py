@@ -48,7 +48,7 @@ from cagefield.edits.edit import Edit, ImpossibleEditError
 from cagefield.edits.names import mended, problem_of_name
 from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
-from cagefield.edits.options import Clone, problem_of_lattices
+from cagefield.edits.options import FEATHER, Clone, problem_of_lattices
 from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
@@ -152,6 +152,7 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
             "allow_folding",
             "fill",
             "relight",
+            "feather",
         ),
     )
     inner = _cage(keys["inner"])
@@ -172,8 +173,9 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
     for name in ("keep_source", "enabled", "allow_folding"):
         if name in keys:
             options[name] = keys[name].boolean()
-    if "width" in keys:
-        options["width"] = keys["width"].number()
+    for name in ("width", "feather"):
+        if name in keys:
+            options[name] = keys[name].number()
     if "lattice" in keys and not keys["lattice"].is_null:
         options["lattice"] = keys["lattice"].integer(2, 512)
     items = keys["operations"].items() if "operations" in keys else []
@@ -311,6 +313,8 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["fill"] = edit.fill
     if edit.relight != "occlusion":
         content["relight"] = edit.relight
+    if edit.feather != FEATHER:
+        content["feather"] = edit.feather
     if edit.lattice is not None:
         content["lattice"] = edit.lattice
     if not edit.enabled:

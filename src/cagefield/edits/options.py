@@ -25,6 +25,13 @@ Relight: TypeAlias = Literal["occlusion", "none"]
 FILLS: tuple[str, ...] = ("surroundings", "none")
 RELIGHTS: tuple[str, ...] = ("occlusion", "none")
 
+FEATHER, MOST_FEATHER = 1.0, 8.0
+"""Voxels of a seam that blend, where nothing else is said, and at most.
+
+Of six moves and copies in three scenes, widths of 1, 2 and 3 lose .03 and .01 dB less and .01 more in the mean,
+on the pixels that they change, than a hard edge.
+"""
+
 LATTICE_RANGE = (2, 512)
 MOST_NODES = 512**3
 """Lattice nodes of all edits together, of 32 bytes each: one lattice of 512, or eight of 256."""
@@ -51,20 +58,22 @@ def problem_of_options(
     deleted: bool,
     fading: tuple[str, float],
     lattice: int | None,
-    surroundings: tuple[str | Clone, str],
+    surroundings: tuple[str | Clone, str, float],
 ) -> str | None:
     """What is wrong with an edit's options, and the cure; None where they go together.
 
-    `fading` is (falloff, width), `surroundings` (fill, relight). See
+    `fading` is (falloff, width), `surroundings` (fill, relight, feather). See
     `cagefield.edits.edit.Edit` for what each of them means.
     """
     if adjustment not in ("continuous", "discrete"):
         return f'adjustment must be "continuous" or "discrete", got "{adjustment}"'
     if shell not in SHELLS:
         return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
-    for name, value, known in zip(("fill", "relight"), surroundings, (FILLS, RELIGHTS), strict=True):
+    for name, value, known in zip(("fill", "relight"), surroundings[:2], (FILLS, RELIGHTS), strict=True):
         if value not in known and not (name == "fill" and isinstance(value, Clone)):
             return f'{name} must be one of {", ".join(known)}, got "{value}"'
+    if not 0.0 <= surroundings[2] <= MOST_FEATHER:
+        return f"feather must be 0 (a hard edge) to {MOST_FEATHER:g} voxels, got {surroundings[2]!r}"
     if adjustment == "continuous":
         if not has_outer:
             return (

@@ -15,13 +15,13 @@ def patch_box(edit: Edit, voxel: float, reach: float, *, settled: bool = True) -
     """The box [2,3] (min, max) that a discrete edit's patch is made from; the patch lies in it. World units.
 
     `voxel` is the largest edge of a voxel. `reach` is that of the light (`Ambience.reach`), 0 where the light
-    stays. Unless it is `settled`, the light at the part's new place stays.
+    stays. Unless it is `settled`, the light at the part's new place stays, and its seam.
     """
     box = edit.inner.aabb
     margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if reach > 0.0:
         margin = max(margin, 1.5 * reach + RIM * voxel)
-        if settled:
-            moved = edit.deformed.aabb
-            box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
+    if settled and (reach > 0.0 or edit.feather > 0.0):
+        moved = edit.deformed.aabb
+        box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
     return np.asarray(box + margin * np.array([[-1.0], [1.0]]))

@@ -17,6 +17,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block, block_of
 from cagefield.patches.cloning import cloned
 from cagefield.patches.extent import RIM, patch_box
+from cagefield.patches.feathering import feathered
 from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Mask
@@ -94,7 +95,7 @@ def patch_of(
     made = made_of(field, below, edit, ambience, settled=settled)
     changed = made.under.differs(made.before) | made.inside
     region, under = made.under.around(changed, made.work.region)
-    part = None if made.part_light is None else made.work.relit_part(made.part_light)
+    part = made.work.shown_part(made.part_light, made.under)
     return Patch(region, under.layer(), None if part is None else part.layer())
 
 
@@ -193,9 +194,15 @@ class _Work:
         log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
         return Lighting(where, log).smoothed(block)
 
-    def relit_part(self, light: Lighting) -> Block:
-        """The content of V^c in the light of its new place; no more than that has colours."""
+    def shown_part(self, light: Lighting | None, there: Block) -> Block | None:
+        """The content of V^c as it is put into `there`; no more has colours. None where it stays."""
+        feather = self.edit.feather if self.settled else 0.0
+        if light is None and feather == 0.0:
+            return None
         block = _lit(self.before, light)
+        if feather > 0.0:
+            edit = self.edit
+            block = feathered(block, there, edit.inner, edit.deformed, self.inside, feather)
         kept = ndimage.binary_dilation(self.inside, iterations=2)
         at = np.argwhere(kept)
         part = replace(block, slot=np.where(kept, block.slot, -1))

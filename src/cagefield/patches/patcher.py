@@ -88,8 +88,9 @@ class Patcher:
         # A drag does not wait for the light to be found out about.
         known = not moving or "ambience" in self.__dict__
         relit = edit.relight == "occlusion" and known and self.ambience.shows
-        what: Key = (*stack.active, edit.inner, edit.deleted, edit.keep_source, edit.fill, relit)
-        settled: Key = (*what, edit.deformed if relit else None)
+        kind = edit.deleted, edit.keep_source, edit.fill, edit.feather
+        what: Key = (*stack.active, edit.inner, *kind, relit)
+        settled: Key = (*what, edit.deformed if relit or edit.feather > 0.0 else None)
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -133,8 +134,8 @@ def wants_patch(edit: Edit, moving: bool = False) -> bool:
     if edit.adjustment != "discrete" or not (edit.enabled and edit.changes_anything):
         return False
     if edit.keep_source:
-        return edit.relight != "none" and not moving
-    return edit.fill != "none" or edit.relight != "none"
+        return not moving and (edit.relight != "none" or edit.feather > 0.0)
+    return edit.fill != "none" or edit.relight != "none" or (edit.feather > 0.0 and not edit.deleted)
 
 
 def wants_light(edit: Edit) -> bool:

@@ -74,6 +74,8 @@ def splat_patch_of(
     field: SplatField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
 ) -> SplatPatch:
     """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
+    # Splats overlap: their seams are soft.
+    edit = edit.replace(feather=0.0)
     reach = ambience.reach if ambience is not None and ambience.shows else 0.0
     place = settled and not edit.deleted
     moved = _around(field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, reach)))

@@ -1,0 +1,63 @@
+"""The rim of a part blends into what it is put into: no seam where cuts go through matter.
+
+In a rim along the faces of V^c, so many voxels wide, the part's density and colour fade into those of the
+place where it is put down: w of its own and 1 - w of that place's, w rising from 0 at the faces to 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+
+from cagefield.cages import Cage
+from cagefield.patches.block import Block, interpolated
+from cagefield.sh_rotation import rotated_sh
+from cagefield.typing import Mask
+from cagefield.warps.inner_map import HexahedronMap
+
+BESIDE = 2
+"""Vertices beyond the faces that are read between vertices within, and two more."""
+
+
+def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Mask, width: float) -> Block:
+    """A part's block, whose vertices `inside` [X,Y,Z] lie in V^c, with its rim fading into another block.
+
+    `there` is what is in deformed space without the part; the rim is `width` voxels wide. Vertices whose
+    place is outside of that block stay.
+    """
+    deep = ndimage.distance_transform_edt(inside)
+    own = np.clip((deep - 0.5) / width, 0.0, 1.0)
+    rim = ndimage.binary_dilation(inside, iterations=BESIDE) & (own < 1.0)
+    affine = HexahedronMap(deformed, inner).affine
+    if affine is None:
+        rim &= inside
+    points = part.positions(rim)
+    if affine is None:
+        within, moved, jacobian = HexahedronMap(deformed, inner)(points)
+        rim[tuple(np.argwhere(rim)[~within].T)] = False
+    else:
+        A, b = affine
+        moved, jacobian = points @ A.T + b, np.broadcast_to(A, (len(points), 3, 3))
+    g = there.field.grid_coordinates(moved) - there.low
+    known = ((g >= 0.0) & (g <= np.array(there.shape) - 1.0)).all(axis=1)
+    rim[tuple(np.argwhere(rim)[~known].T)] = False
+    jacobian = jacobian[known]
+    density, sh = interpolated(there.layer(), moved[known])
+    # Optical depth is kept: the part's density is multiplied by how much it is stretched.
+    density = np.maximum(density, 0.0) * np.cbrt(np.abs(np.linalg.det(jacobian)))
+    u, _, v = np.linalg.svd(jacobian)
+    sh = rotated_sh(sh, np.asarray(np.swapaxes(u @ v, 1, 2)))
+    share = own[rim]
+    before = np.maximum(part.density[rim], 0.0) * share
+    new = (1.0 - share) * density
+    mixed = part.with_density(rim, (before + new).astype(np.float32), slots=True)
+    rows, had = mixed.slot[rim], part.slot[rim] >= 0
+    weight = np.where(had, np.maximum(before, 1e-6 * share), 0.0)
+    other = np.maximum(new, 1e-6 * (1.0 - share))
+    coefficients = mixed.sh.copy()
+    total = np.maximum(weight + other, 1e-12)
+    mean = weight[:, None, None] * coefficients[rows] + other[:, None, None] * sh
+    coefficients[rows] = mean / total[:, None, None]
+    return replace(mixed, sh=coefficients)
