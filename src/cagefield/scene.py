@@ -9,6 +9,9 @@
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
                           "preserve_opacity": false if edits leave density as it is}
 
+Edits may paste from other scenes (`Edit.source`), whose folders stay where they are: relative paths of
+sources are relative to SCENE.
+
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
 """
@@ -30,6 +33,7 @@ from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.cameras import Camera
 from cagefield.edits import EditStack, LatticeError
 from cagefield.edits.files import dump_edits, load_edits
+from cagefield.edits.sources import rebased
 from cagefield.errors import SceneError
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf import NerfField
@@ -53,6 +57,7 @@ from cagefield.scene_files import (
     recover,
     write_json,
 )
+from cagefield.scene_sources import SceneSources
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -77,7 +82,8 @@ class Scene:
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
     the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
     the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
-    `preserve_opacity` multiplies density by |J d| where an edit moved it.
+    `preserve_opacity` multiplies density by |J d| where an edit moved it. `folder` is the one that it was
+    opened from: sources of pastes are relative to that, or to the working directory where it is None.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -92,6 +98,7 @@ class Scene:
     gains: tuple[tuple[float, float, float], ...] = ()
     original: NerfField | None = None
     preserve_opacity: bool = True
+    folder: Path | None = None
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -191,6 +198,7 @@ class Scene:
                 gains=gains,
                 original=original,
                 preserve_opacity=preserve_opacity,
+                folder=folder.absolute(),
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -199,7 +207,7 @@ class Scene:
         """Writes the scene folder `path`, complete or not at all.
 
         With `overwrite` a scene that is there is replaced once the new one is complete; other files in its
-        folder are kept.
+        folder are kept. Relative sources of pastes are written as that folder sees them.
 
         Raises:
             SceneError: something else is there, or a scene and no `overwrite`.
@@ -209,7 +217,8 @@ class Scene:
             self.field.save(draft / FIELD)
             if self.original is not None:
                 save_nerf(self.original, draft / ORIGINAL)
-            (draft / EDITS).write_text(dump_edits(self.edits), encoding="utf-8")
+            edits = EditStack(rebased(self.edits, self.folder, target))
+            (draft / EDITS).write_text(dump_edits(edits), encoding="utf-8")
             write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
                 draft / CAMERAS,
@@ -240,8 +249,9 @@ class Scene:
             raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
-        if "patcher" in self.__dict__:
-            scene.__dict__["patcher"] = self.patcher
+        for shared in ("patcher", "_pasting"):
+            if shared in self.__dict__:
+                scene.__dict__[shared] = self.__dict__[shared]
         return scene
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
@@ -334,6 +344,7 @@ class Scene:
     @cached_property
     def patcher(self) -> Patcher:
         """What fills the places that edits uncover, and takes light along; shared by `with_edits`."""
+        from cagefield.patches.pastes import Pastes
         from cagefield.patches.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of
 
@@ -342,12 +353,17 @@ class Scene:
         def render(camera: Camera) -> RenderResult:
             return cast(RenderResult, plain().render(camera, background="black", normals=True))
 
-        return Patcher(self.field, self.cameras.get("train", ()), render)
+        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self._sources))
 
     @property
     def patched_edits(self) -> EditStack:
-        """The edits with the patches that they ask for."""
-        return self.patcher.patched(self.edits.edits)
+        """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
+        return self.patcher.patched(self.edits.edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def _sources(self) -> SceneSources:
+        """The scenes that edits paste from."""
+        return SceneSources(self.folder, _open_pasted, self.__dict__.get("_pasting", ()))
 
     @cached_property
     def _exact_splats(self) -> AnyRenderer:
@@ -356,6 +372,13 @@ class Scene:
     @property
     def _exact_edits(self) -> EditStack:
         return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
+
+
+def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:
+    """The scene of a folder, which is being pasted into the scenes of other ones."""
+    scene = Scene.open(folder)
+    scene.__dict__["_pasting"] = pasting
+    return scene
 
 
 def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from cagefield.edits.operations import Operation
 from cagefield.edits.options import Adjustment, Fill, Relight, problem_of_options
 from cagefield.edits.patch import Patch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
+from cagefield.edits.sources import problem_of_source
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.fields.voxel import VoxelField
 from cagefield.typing import Array
@@ -66,8 +68,11 @@ class Edit:
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
       leaves it as it was trained, a `Clone` copies a cage.
     - relight: "occlusion" takes contact shadows along, of a discrete edit; "none" leaves them.
-    - patch: of a discrete edit, what the field that it was made for shows where something was taken away
-      (`cagefield.patches.patched`); no part of edit files.
+    - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
+      then a cage in that scene's space, which the operations take to where it stands in this one. Relative
+      to the folder of this scene, or absolute. See `Edit.paste`.
+    - patch: of a discrete edit, what the field that it was made for shows where something was taken away or
+      pasted (`cagefield.patches`); no part of edit files.
 
     Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
     shells are reported by `check`, which every evaluation calls.
@@ -88,6 +93,7 @@ class Edit:
     width: float = 1.0
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
+    source: str | None = None
     patch: Patch | None = None
 
     def __post_init__(self) -> None:
@@ -105,6 +111,8 @@ class Edit:
             fading=(self.falloff, self.width),
             lattice=self.lattice,
             surroundings=(self.fill, self.relight),
+        ) or problem_of_source(
+            self.source, is_copy=self.adjustment == "discrete" and self.keep_source and not self.deleted
         )
         if problem is not None:
             raise self._error(problem)
@@ -114,6 +122,14 @@ class Edit:
     def delete(cls, cage: Cage, *, name: str = "") -> Edit:
         """The edit that empties a cage."""
         return cls(cage, adjustment="discrete", deleted=True, name=name)
+
+    @classmethod
+    def paste(cls, source: str | os.PathLike[str], cage: Cage, *, name: str = "") -> Edit:
+        """The edit that copies what a cage holds in another scene: a scene folder, or a file of splats.
+
+        `Scene.paste` makes one of the whole scene, of a size and at a place that suit.
+        """
+        return cls(cage, adjustment="discrete", keep_source=True, source=os.fspath(source), name=name)
 
     @cached_property
     def deformed(self) -> Cage:
@@ -164,13 +180,25 @@ class Edit:
 
     @cached_property
     def changes_anything(self) -> bool:
-        """False when the inner cage is where it was (and not deleted): the map is the identity."""
-        return self.deleted or not np.array_equal(self.inner.corners, self.deformed.corners)
+        """False when the inner cage is where it was (and not deleted or pasted): the map is the identity."""
+        if self.deleted or self.source is not None:
+            return True
+        return not np.array_equal(self.inner.corners, self.deformed.corners)
 
     @property
     def layers(self) -> tuple[VoxelField, ...]:
         """The layers of its patch, if it has one."""
         return () if self.patch is None else self.patch.layers
+
+    @property
+    def under(self) -> VoxelField | None:
+        """What its region shows instead of nothing, if that is a layer."""
+        return None if self.patch is None else self.patch.under
+
+    @property
+    def part(self) -> VoxelField | None:
+        """What V shows instead of the field, if that is a layer."""
+        return None if self.patch is None else self.patch.part
 
     @property
     def boxes(self) -> Array:
@@ -181,7 +209,7 @@ class Edit:
                 cages = [self.outer]
             else:
                 cages = [] if self.deleted else [self.deformed]
-                if self.patch is not None:
+                if self.patch is not None and self.patch.region is not None:
                     cages.append(self.patch.region)
                 elif not self.keep_source:
                     cages.append(self.inner)
@@ -196,10 +224,12 @@ class Edit:
     def exact_warp(self) -> Warp:
         """The map of this edit without its lattice. Raises `EditError` as `check` does."""
         self.check()
-        inner = HexahedronMap(self.inner, self.deformed)
+        place = None if self.patch is None else self.patch.place
+        inner = HexahedronMap(place or self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
             region = None if self.patch is None else self.patch.region
-            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region)
+            pasted = self.source is not None
+            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region, pasted)
         return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property
@@ -354,6 +384,14 @@ class Edit:
             raise self._error("a shell needs an outer cage")
         falloff = Falloff(self.falloff, self.width)
         return SHELLS[self.shell](self.inner, self.deformed, self.outer, falloff)
+
+    def unread(self) -> EditError:
+        """The error of a paste without what it pastes."""
+        return self.cannot_paste("nobody has read it; render the edit as part of a Scene")
+
+    def cannot_paste(self, why: str) -> EditError:
+        """The error of a paste that cannot be shown."""
+        return self._error(f"pastes from {self.source}: {why}")
 
     def _error(self, message: str) -> EditError:
         return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")

@@ -55,7 +55,7 @@ def baked(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
     if not isinstance(scene.field, SplatField):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
-    return baked_splats(scene.field, scene.edits, preserve_opacity=scene.preserve_opacity)
+    return baked_splats(scene.field, scene.patched_edits, preserve_opacity=scene.preserve_opacity)
 
 
 def fitted_splats(

@@ -31,6 +31,7 @@ from cagefield.formats.page_splat_edits import encode_page_splat_edits
 from cagefield.formats.page_splats import encode_page_splats
 from cagefield.keyframes import Keyframe, stills
 from cagefield.rendering.deformed_splats import changed_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.renderer import Renderer
 from cagefield.rendering.splat_splitting import split_of
 from cagefield.scene import Scene
@@ -164,14 +165,15 @@ def _splat_files(
             "the scene's splats are discs (2DGS), which pages do not draw; "
             "export them as .ply, or render a video"
         )
+    preserve_opacity, edits = scene.preserve_opacity, scene.patched_edits
+    field = with_pasted(field, edits)
     found = {"field": encode_page_splats(field, background=scene.background)}
-    preserve_opacity = scene.preserve_opacity
-    if scene.edits.active:
-        split = split_of(field, scene.edits)
-        changed = changed_splats(field, scene.edits, preserve_opacity=preserve_opacity, split=split)
+    if edits.active:
+        split = split_of(field, edits)
+        changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
         found["edits"] = encode_page_splat_edits(field, changed)
     along = splat_path_edits(
-        field, scene.edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
+        field, edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
     )
     return found, along
 

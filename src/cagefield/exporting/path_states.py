@@ -79,8 +79,9 @@ def path_edits(
     times = state_times(line, edits, MOST_STATES)
     if times is None:
         return None
-    on_way = for_pages(patcher.patched(edits.edits, moving=True))
-    edits = for_pages(patcher.patched(edits.edits))
+    kept = renderer.preserve_opacity
+    on_way = for_pages(patcher.patched(edits.edits, moving=True, preserve_opacity=kept))
+    edits = for_pages(patcher.patched(edits.edits, preserve_opacity=kept))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
@@ -187,13 +188,13 @@ def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Pa
     edit, part = edits[number], parts[number]
     if part < 1.0 and not edit.deleted:
         edit = on_way[number]
-    if edit.patch is None or part <= 0.0:
-        return None
+    if edit.patch is None or part <= 0.0 or edit.patch.region is None:
+        return edit.patch if part > 0.0 else None
     low, high = edit.patch.region.aabb
     for before, there in zip(edits.edits[:number], parts, strict=False):
         meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
         if there < 1.0 and before.enabled and meets.all(axis=1).any():
-            return None
+            return edit.patch.alone
     return edit.patch
 
 

@@ -13,6 +13,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.formats.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.rendering.deformed_splats import changed_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_splitting import Split, split_of
 
 BUDGET = 16 << 20
@@ -35,6 +36,8 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
+    # With all that is pasted, also in states without it.
+    field = with_pasted(field, edits)
     # Split for the whole edits, once, so that the same splats are on their way in all states.
     split: Split | None = split_of(field, edits)
 

@@ -17,7 +17,7 @@ def patch_box(edit: Edit, voxel: float, reach: float, *, settled: bool = True) -
     `voxel` is the largest edge of a voxel. `reach` is that of the light (`Ambience.reach`), 0 where the light
     stays. Unless it is `settled`, the light at the part's new place stays.
     """
-    box = edit.inner.aabb
+    box = edit.inner.aabb if edit.source is None else edit.deformed.aabb
     margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if reach > 0.0:
         margin = max(margin, 1.5 * reach + RIM * voxel)

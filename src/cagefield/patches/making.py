@@ -30,21 +30,27 @@ UNSURE = 0.2
 
 
 def patch_of(
-    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    preserve_opacity: bool = True,
 ) -> Patch:
     """The patch of a discrete edit of a field under the edits below it; `ambience` None leaves the light.
 
     A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
-    is moved to, and keeps the light that it had.
+    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away.
     """
-    work = _Work.of(field, below, edit, ambience, settled)
+    work = _Work.of(field, below, edit, ambience, settled, preserve_opacity)
     under, part = work.emptied, None
     lighting = None
     support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
         under = under.relit(lighting.where, np.exp(lighting.log_ratio))
-        part = work.relit_part(ambience) if work.settled else None
+        part = work.relit_part(ambience) if work.settled and edit.source is None else None
     if support is not None:
         hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
         if lighting is not None:
@@ -53,7 +59,9 @@ def patch_of(
         if footprint is not None:
             under = rebuilt(under, footprint, work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
-        under = cloned(under, below, edit.inner, edit.fill.source, work.inside, work.surface)
+        under = cloned(
+            under, below, (edit.inner, edit.fill.source), work.inside, work.surface, preserve_opacity
+        )
     region, under = work.around(under)
     return Patch(region, under.layer(), None if part is None else part.layer())
 
@@ -62,7 +70,8 @@ def patch_of(
 class _Work:
     """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
 
-    settled: the part is shown at its new place, and casts its shadow there.
+    settled: the part is shown at its new place, and casts its shadow there; what that is of a paste, is
+    `shown`, [X,Y,Z] too.
     """
 
     edit: Edit
@@ -72,21 +81,32 @@ class _Work:
     inside: Mask
     part: Mask
     settled: bool
+    shown: Mask | None = None
 
     @classmethod
     def of(
-        cls, field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, settled: bool
+        cls,
+        field: VoxelField,
+        below: EditStack,
+        edit: Edit,
+        ambience: Ambience | None,
+        settled: bool,
+        preserve_opacity: bool,
     ) -> _Work:
         settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
         reach = ambience.reach if ambience is not None and ambience.shows else 0.0
         box = patch_box(edit, voxel, reach, settled=settled)
-        before = block_of(field, below, box)
+        before = block_of(field, below, box, preserve_opacity=preserve_opacity)
+        region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
+        if edit.source is not None:
+            pasted = block_of(field, below.append(edit), box, preserve_opacity=preserve_opacity).solid
+            none = np.zeros(before.shape, bool)
+            return cls(edit, region, before, before, none, none, settled, pasted)
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
         emptied = before
         if not edit.keep_source:
             emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
-        region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
 
     def around(self, under: Block) -> tuple[Cage, Block]:
@@ -130,6 +150,8 @@ class _Work:
         solid = self.emptied.solid.copy()
         if not self.settled:
             return solid
+        if self.shown is not None:
+            return self.shown
         phi = HexahedronMap(self.edit.inner, self.edit.deformed)
         inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))
         solid.reshape(-1)[inside] = self.before.lookup(self.before.depth, canonical) > SOLID

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 from cagefield.cameras import Camera
@@ -13,6 +14,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
+from cagefield.patches.pastes import Pastes
 from cagefield.patches.seen import seen_pairs
 from cagefield.rendering.render_result import RenderResult
 
@@ -26,7 +28,8 @@ class Patcher:
     """Gives discrete edits the patches that their `fill` and `relight` ask for.
 
     `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
-    from there by `render`, which draws the field without edits, with normals. Splats have no patches yet.
+    from there by `render`, which draws the field without edits, with normals. Pastes show what `pastes`
+    reads; of splats, these alone have patches yet.
     """
 
     def __init__(
@@ -34,25 +37,35 @@ class Patcher:
         field: VoxelField | SplatField,
         cameras: Sequence[Camera],
         render: Callable[[Camera], RenderResult],
+        pastes: Pastes | None = None,
     ) -> None:
-        self._field, self._cameras, self._render = field, cameras, render
+        self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._kept: OrderedDict[Key, Patch] = OrderedDict()
 
     def patched(
-        self, edits: Sequence[Edit], *, moving: bool = False, proceed: Callable[[], None] | None = None
+        self,
+        edits: Sequence[Edit],
+        *,
+        moving: bool = False,
+        preserve_opacity: bool = True,
+        proceed: Callable[[], None] | None = None,
     ) -> EditStack:
         """The stack of the edits, in order, with their patches.
 
         While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
         place: this does not depend on where that is. Edits that stay meanwhile keep the patches they have.
         `proceed` is called between patches, and may raise.
+
+        Raises `EditError` for a paste of a scene that is not there, or that cannot be pasted.
         """
         made: list[Edit] = []
+        if self._pastes is not None:
+            edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
         for edit in edits:
             if isinstance(self._field, VoxelField) and wants_patch(edit):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(self._field, tuple(made), edit, moving)
+                patch = self._patch(self._field, tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
         return EditStack(made)
@@ -64,13 +77,18 @@ class Patcher:
             return Ambience((), ())
         return ambience_of(self._field, seen_pairs(self._render, self._cameras, self._field.bounds))
 
-    def _patch(self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | None:
+    def _patch(
+        self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+    ) -> Patch | None:
         """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
         # A drag does not wait for the light to be found out about.
         known = not moving or "ambience" in self.__dict__
         relit = edit.relight == "occlusion" and known and self.ambience.shows
-        what: Key = (*stack.active, edit.inner, edit.deleted, edit.keep_source, edit.fill, relit)
+        if edit.source is not None and not relit:
+            return None
+        kind = (edit.deleted, edit.keep_source, edit.fill, edit.patch, preserve_opacity)
+        what: Key = (*stack.active, edit.inner, *kind, relit)
         settled: Key = (*what, edit.deformed if relit else None)
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
@@ -78,7 +96,10 @@ class Patcher:
             return self._kept[key]
         if not wants_patch(edit, moving):
             return None
-        patch = patch_of(field, stack, edit, self.ambience if relit else None, settled=not moving)
+        light = self.ambience if relit else None
+        patch = patch_of(field, stack, edit, light, settled=not moving, preserve_opacity=preserve_opacity)
+        if edit.patch is not None:
+            patch = replace(patch, part=edit.patch.part, place=edit.patch.place)
         self._kept[key] = patch
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

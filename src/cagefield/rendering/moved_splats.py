@@ -5,6 +5,7 @@ an edit) as a whole. With V^c the canonical and V the deformed inner cage of a d
 
 - in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
 - in V but not in V^c: hidden, for V shows what was in V^c.
+- pasted: it goes to V; all others in V are hidden.
 
 Of a stack, each edit takes what the ones before it made: originals and copies alike.
 """
@@ -20,9 +21,11 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
+from cagefield.rendering.pasted_splats import at_rest, pasted_rows
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
+from cagefield.warps.inner_map import HexahedronMap
 
 KEPT_STACKS = 6
 """Stacks of edits of one field whose splats are kept, so that a longer stack begins where they end."""
@@ -48,10 +51,10 @@ class MovedSplats:
     jacobian: Array
 
     @classmethod
-    def at_rest(cls, count: int) -> MovedSplats:
-        """N splats, all in their places."""
+    def at_rest(cls, field: SplatField) -> MovedSplats:
+        """A field's splats, all in their places; those that edits are to paste are shown nowhere."""
         none = np.zeros((0, 3))
-        return cls(np.zeros(count, bool), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
+        return cls(at_rest(field), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
 
     @property
     def is_at_rest(self) -> bool:
@@ -71,12 +74,12 @@ class MovedSplats:
         return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept])
 
     def then(
-        self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
+        self, edit: Edit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
         """What one more edit makes of these. Raises `EditError` where it cannot be evaluated."""
         from cagefield.rendering.kernels.splat_deforming import changes, in_boxes, times
 
-        warp = edit.exact_warp
+        warp, means, rows = edit.exact_warp, field.means, pasted_rows(field, edit)
         cages = [edit.inner.aabb] if edit.outer is None else [edit.inner.aabb, edit.outer.aabb]
         reach = np.concatenate([edit.boxes, np.stack(cages)])
         at_rest, elsewhere = np.empty(len(means), bool), np.empty(len(self.source), bool)
@@ -101,11 +104,13 @@ class MovedSplats:
             composed = np.ascontiguousarray(jacobian[again])
             times(composed, self.jacobian[near[come[again] - len(still)]])
             jacobian[again] = composed
+        pasted = HexahedronMap(edit.deformed, edit.inner)(means[rows].astype(np.float64))
+        fresh = rows.start + np.flatnonzero(pasted[0])
         return MovedSplats(
             left,
-            np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come]]),
-            np.concatenate([self.points[stays], mapped.points[come]]),
-            np.concatenate([self.jacobian[stays], jacobian]),
+            np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come], fresh]),
+            np.concatenate([self.points[stays], mapped.points[come], pasted[1]]),
+            np.concatenate([self.jacobian[stays], jacobian, pasted[2]]),
         )
 
 
@@ -128,7 +133,9 @@ def moved_splats(
     coarse: bool = False,
     proceed: Callable[[], None] | None = None,
 ) -> MovedSplats:
-    """A field's splats under edits. Raises `EditError` where an edit cannot be evaluated.
+    """A field's splats under edits, with those that they paste behind them (`pasted_splats.with_pasted`).
+
+    Raises `EditError` where an edit cannot be evaluated.
 
     What the first of the edits made is kept between calls. `coarse` and `proceed` as for `to_deformed`.
     """
@@ -136,10 +143,10 @@ def moved_splats(
     known = known_stacks.setdefault(field, [])
     usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
     start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)
-    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(len(field)), 0)
+    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(field), 0)
     found = [start] if start else []
     for number, edit in enumerate(active[count:], start=count + 1):
-        moved = moved.then(edit, field.means, coarse, proceed)
+        moved = moved.then(edit, field, coarse, proceed)
         found.append(_KnownStack(active[:number], coarse, moved))
     kept = [*reversed(found), *(k for k in known if k is not start)][:KEPT_STACKS]
     sizes = np.cumsum([len(k.moved.source) for k in kept])

@@ -48,6 +48,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_profile import ENDS, LEAST_OPAQUE, MOST_OPAQUE, mass_across, part_between
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
@@ -103,7 +104,7 @@ def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
 
     The field itself where none is; children come last. Raises as `split_of`.
     """
-    split = split_of(field, edits)
+    split, field = split_of(field, edits), with_pasted(field, edits)
     return field if split is None else _joined([field.take(~split.parents), split.children])
 
 
@@ -111,6 +112,8 @@ def split_of(
     field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
 ) -> Split | None:
     """Which splats of a field one Gaussian each does not show under the edits, and their children, or None.
+
+    Those that the edits paste are counted behind the field's (`pasted_splats.with_pasted`).
 
     Known of a field while it lives, for the edits asked for last.
 
@@ -120,6 +123,7 @@ def split_of(
     active = edits.active
     if not active:
         return None
+    field = with_pasted(field, edits)
     known = known_splits.get(field)
     if known is not None and known[0] == active:
         return known[1]
@@ -313,7 +317,8 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
     """The splats that faces go through, in two parts each; of a splat that several cut, the deepest cut."""
     best = np.full(len(rows), np.inf)
     t, direction = np.zeros(len(rows)), np.zeros((len(rows), 3))
-    cuts: list[tuple[Cage, Mask]] = [(edit.inner, np.ones(len(rows), bool))]
+    # The cage of a paste is in another scene, where what is pasted was cut already.
+    cuts: list[tuple[Cage, Mask]] = [(edit.inner, np.full(len(rows), edit.source is None))]
     if not edit.deleted:
         # What lands in the deformed cage hides what stays there, but not what leaves.
         cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))

@@ -137,7 +137,8 @@ class TaskHandlers:
         from cagefield.rendering.edited_field import EditedField
 
         points = probes(task.cage).astype(np.float32)
-        edits = self._renderers.scene.patcher.patched(self._renderers.edits(task.shown.edits), moving=True)
+        below = self._renderers.edits(task.shown.edits)
+        edits = self._renderers.scene.patcher.patched(below, moving=True, preserve_opacity=False)
         edited = EditedField(field, edits, field.bounds, preserve_opacity=False)
         sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
         return (sigma * field.sample_spacing > DENSE).tolist()
