@@ -8,7 +8,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.pasted_splats import own_count, pasted_rows, with_pasted
+from cagefield.rendering.pasted_splats import at_rest, pasted_rows, with_pasted
 
 
 def deformed_splats_reference(
@@ -19,14 +19,14 @@ def deformed_splats_reference(
     Each edit alone is `EditStack.to_deformed` of a stack of one; a copy leaves the original besides.
     """
     field = with_pasted(field, edits)
-    source = np.arange(own_count(field))
+    source = np.flatnonzero(~at_rest(field))
     p, J = field.means[source].astype(np.float64), np.tile(np.eye(3), (len(source), 1, 1))
     for edit in edits.active:
         mapped = EditStack([edit]).to_deformed(p)
         shown = ~mapped.hidden
         parts = [(source[shown], mapped.points[shown], (mapped.jacobian @ J)[shown])]
         if edit.source is not None:
-            rows = np.arange(len(field))[pasted_rows(field, edit)]
+            rows = pasted_rows(field, edit)
             there = EditStack([Edit(edit.inner, adjustment="discrete", operations=edit.operations)])
             moved = there.to_deformed(field.means[rows])
             inside = edit.inner.contains(field.means[rows].astype(np.float64))

@@ -105,7 +105,7 @@ class MovedSplats:
             times(composed, self.jacobian[near[come[again] - len(still)]])
             jacobian[again] = composed
         pasted = HexahedronMap(edit.deformed, edit.inner)(means[rows].astype(np.float64))
-        fresh = rows.start + np.flatnonzero(pasted[0])
+        fresh = rows[pasted[0]]
         return MovedSplats(
             left,
             np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come], fresh]),

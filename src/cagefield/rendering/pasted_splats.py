@@ -6,7 +6,9 @@ each paste, in the other scene's space. These are not shown where they are, but 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,9 +23,17 @@ KEPT = 3
 
 Pasted = tuple[SplatField, ...]
 
+
+@dataclass(frozen=True, eq=False)
+class _Origins:
+    """Where the splats of a field come from: number [N] of what is `pasted`, -1 for the scene's own."""
+
+    number: NDArray[np.int32]
+    pasted: Pasted
+
+
 _joined: WeakKeyDictionary[SplatField, list[tuple[Pasted, SplatField]]] = WeakKeyDictionary()
-_parts: WeakKeyDictionary[SplatField, tuple[int, Pasted]] = WeakKeyDictionary()
-"""Of a joined field, how many splats are the scene's own, and what comes behind them."""
+_origins: WeakKeyDictionary[SplatField, _Origins] = WeakKeyDictionary()
 
 
 def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
@@ -31,7 +41,7 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
 
     The same field for the same pastes, while it lives. Harmonics get the higher degree of both.
     """
-    if field in _parts:
+    if field in _origins:
         return field
     pasted = tuple(dict.fromkeys(edit.patch.splats for edit in edits.active if _pastes(edit) and edit.patch))
     splats = tuple(part for part in pasted if part is not None)
@@ -41,36 +51,46 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
     found = next((joined for parts, joined in known if parts == splats), None)
     if found is None:
         found = _behind(field, splats)
-        _parts[found] = (len(field), splats)
+        counts = [len(field), *(len(part) for part in splats)]
+        _origins[found] = _Origins(np.repeat(np.arange(-1, len(splats), dtype=np.int32), counts), splats)
     known[:] = [(splats, found), *(each for each in known if each[1] is not found)][:KEPT]
     return found
 
 
-def own_count(field: SplatField) -> int:
-    """How many splats of a joined field, or of any other, are shown where they are."""
-    return _parts[field][0] if field in _parts else len(field)
-
-
-def pasted_rows(field: SplatField, edit: Edit) -> slice:
+def pasted_rows(field: SplatField, edit: Edit) -> NDArray[np.int64]:
     """The rows of a joined field that an edit pastes; none for an edit that does not.
 
     Raises EditError for a paste without what it pastes.
     """
     if not _pastes(edit):
-        return slice(0, 0)
-    first, parts = _parts.get(field, (len(field), ()))
-    for part in parts:
-        if edit.patch is not None and part is edit.patch.splats:
-            return slice(first, first + len(part))
-        first += len(part)
+        return np.zeros(0, np.int64)
+    origins = _origins.get(field)
+    for number, part in enumerate(() if origins is None else origins.pasted):
+        if origins is not None and edit.patch is not None and part is edit.patch.splats:
+            return np.flatnonzero(origins.number == number)
     raise edit.unread()
 
 
 def at_rest(field: SplatField) -> Mask:
     """[N], True where a splat is pasted: it is not shown at its own place."""
-    hidden = np.ones(len(field), bool)
-    hidden[: own_count(field)] = False
-    return hidden
+    origins = _origins.get(field)
+    return np.zeros(len(field), bool) if origins is None else origins.number >= 0
+
+
+def descend(field: SplatField, ancestor: SplatField, rows: NDArray[Any]) -> SplatField:
+    """The field, whose splats are known to stand for rows (or those True in a mask) of another one."""
+    origins = _origins.get(ancestor)
+    if origins is not None:
+        _origins[field] = _Origins(origins.number[rows], origins.pasted)
+    return field
+
+
+def descend_from_all(field: SplatField, ancestors: Sequence[SplatField]) -> SplatField:
+    """The same for splats that stand for those of several fields, one after the other."""
+    known = [_origins[each] for each in ancestors if each in _origins]
+    if known:
+        _origins[field] = _Origins(np.concatenate([each.number for each in known]), known[0].pasted)
+    return field
 
 
 def _pastes(edit: Edit) -> bool:

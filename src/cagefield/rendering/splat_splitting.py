@@ -48,7 +48,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
-from cagefield.rendering.pasted_splats import with_pasted
+from cagefield.rendering.pasted_splats import descend, descend_from_all, with_pasted
 from cagefield.rendering.splat_profile import ENDS, LEAST_OPAQUE, MOST_OPAQUE, mass_across, part_between
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
@@ -105,7 +105,7 @@ def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
     The field itself where none is; children come last. Raises as `split_of`.
     """
     split, field = split_of(field, edits), with_pasted(field, edits)
-    return field if split is None else _joined([field.take(~split.parents), split.children])
+    return field if split is None else _joined([_taken(field, ~split.parents), split.children])
 
 
 def split_of(
@@ -136,7 +136,10 @@ def split_of(
         parts: list[_Part] = []
         if children is not None:
             stay, others = _settled(children, before, edit, None, most - len(children), proceed)
-            parts = [(children.take(stay), sources[stay]), *((part, sources[rows]) for part, rows in others)]
+            parts = [
+                (_taken(children, stay), sources[stay]),
+                *((part, sources[rows]) for part, rows in others),
+            ]
         stay, others = _settled(
             field, before, edit, parents, most - sum(len(part) for part, _ in parts), proceed
         )
@@ -175,7 +178,7 @@ def _settled(
         if turn == 0:
             stay = split[0]
         else:
-            done.append((found.take(split[0]), sources[split[0]]))
+            done.append((_taken(found, split[0]), sources[split[0]]))
         found, sources = split[1], sources[split[2]]
         room -= len(found)
     return stay, done if found is field else [*done, (found, sources)]
@@ -401,7 +404,11 @@ def _parted(
         bounds=field.bounds,
         unbounded=field.unbounded,
     )
-    return stay, parted, n
+    return stay, descend(parted, field, n), n
+
+
+def _taken(field: SplatField, rows: Mask) -> SplatField:
+    return descend(field.take(rows), field, rows)
 
 
 def _joined(parts: list[SplatField]) -> SplatField:
@@ -409,6 +416,7 @@ def _joined(parts: list[SplatField]) -> SplatField:
     means, log_scales, quaternions, opacities, sh = (
         np.concatenate([getattr(part, name) for part in parts]) for name in names
     )
-    return dataclasses.replace(
+    joined = dataclasses.replace(
         parts[0], means=means, log_scales=log_scales, quaternions=quaternions, opacities=opacities, sh=sh
     )
+    return descend_from_all(joined, parts)
