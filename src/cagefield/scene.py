@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable, Mapping
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -27,12 +28,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.atomic_files import replaced_file, replaced_folder
+from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
-from cagefield.edits import EditStack, LatticeError
+from cagefield.edits import Edit, EditStack, LatticeError
 from cagefield.edits.files import dump_edits, load_edits
+from cagefield.edits.placing import placed_paste
 from cagefield.edits.sources import rebased
 from cagefield.errors import SceneError
 from cagefield.fields.frusta import in_frusta
@@ -40,6 +43,7 @@ from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.patches.pasting import content_box
 from cagefield.rendering.render_result import Background, RenderResult, background_rgb
 from cagefield.scene_files import (
     CAMERAS,
@@ -58,6 +62,7 @@ from cagefield.scene_files import (
     write_json,
 )
 from cagefield.scene_sources import SceneSources
+from cagefield.typing import Array
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -254,6 +259,32 @@ class Scene:
                 scene.__dict__[shared] = self.__dict__[shared]
         return scene
 
+    def paste(
+        self,
+        source: Path | str,
+        *,
+        at: ArrayLike | None = None,
+        size: float | None = None,
+        name: str | None = None,
+    ) -> Edit:
+        """The edit that pastes all of another scene, a scene folder or a file of splats, upright.
+
+        Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
+        and scale it as any other edit. `at` [3] is where the middle of its base stands, beside what this
+        scene holds where it is left out; `size` is its longest edge, in this scene's units, as large as it is
+        there where it is left out. A relative path is relative to the scene's folder.
+
+        Raises:
+            CagefieldError: there is no such scene, or its field is of another kind than this one's.
+        """
+        look = self.sources.look(os.fspath(source), self.field)
+        up = self.up
+        if at is None:
+            grown = 1.0 if size is None else size / float((look.box[1] - look.box[0]).max())
+            at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
+        found = Path(source).resolve().stem if name is None else name
+        return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
+
     def lattice_errors(self) -> tuple[LatticeError, ...]:
         """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.
 
@@ -353,7 +384,7 @@ class Scene:
         def render(camera: Camera) -> RenderResult:
             return cast(RenderResult, plain().render(camera, background="black", normals=True))
 
-        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self._sources))
+        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self.sources))
 
     @property
     def patched_edits(self) -> EditStack:
@@ -361,7 +392,13 @@ class Scene:
         return self.patcher.patched(self.edits.edits, preserve_opacity=self.preserve_opacity)
 
     @cached_property
-    def _sources(self) -> SceneSources:
+    def up(self) -> Array:
+        """The unit direction [3] that is up for the scene's cameras; z where it has none."""
+        poses = [camera.c2w for group in self.cameras.values() for camera in group]
+        return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+    @cached_property
+    def sources(self) -> SceneSources:
         """The scenes that edits paste from."""
         return SceneSources(self.folder, _open_pasted, self.__dict__.get("_pasting", ()))
 
@@ -372,6 +409,16 @@ class Scene:
     @property
     def _exact_edits(self) -> EditStack:
         return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
+
+
+def _beside(box: Array, up: Array, size: Array) -> Array:
+    """A point [3] at the foot of a box [2,3], beside it: with room for a box of a size [3], turned anyhow."""
+    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
+    aside = np.eye(3)[int(np.argmin(np.abs(up)))]
+    aside = aside - (aside @ up) * up
+    aside /= np.linalg.norm(aside)
+    reach = half @ np.abs(aside) + 0.5 * float(np.linalg.norm(size))
+    return np.asarray(middle + reach * aside - half @ np.abs(up) * up)
 
 
 def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:

@@ -6,26 +6,44 @@ must not paste each other in a circle, and none itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
+from cagefield.camera_paths import shared_up
 from cagefield.edits import EditStack
 from cagefield.edits.sources import resolved
 from cagefield.errors import EditError
-from cagefield.patches.pasting import SourceContent
+from cagefield.patches.pasting import SourceContent, check_kinds, content_box
 from cagefield.scene_files import EDITS, FIELD, MANIFEST, is_scene
+from cagefield.typing import Array
 
 if TYPE_CHECKING:
+    from cagefield.cameras import Camera
     from cagefield.fields.splat import SplatField
     from cagefield.fields.voxel import VoxelField
+    from cagefield.formats.splat_import import ImportedSplats
 
 META = "meta.json"
 """The file that a folder of splats, an unpacked .sog, is known by."""
 
 
+@dataclass(frozen=True)
+class SourceLook:
+    """What a source holds before it is edited: its box [2,3] and the unit direction [3] that is up."""
+
+    box: Array
+    up: Array
+
+
 class OpenedScene(Protocol):
     """What is asked of a scene."""
+
+    @property
+    def cameras(self) -> Mapping[str, tuple[Camera, ...]]: ...
 
     @property
     def field(self) -> VoxelField | SplatField: ...
@@ -74,9 +92,27 @@ class SceneSources:
             scene = self._open(path, self._pasting)
             content = SourceContent(scene.field, scene.patched_edits, scene.preserve_opacity)
         else:
-            content = SourceContent(splats_of(path), EditStack([]))
+            content = SourceContent(imported_splats(path).field, EditStack([]))
         self._last = (state, content)
         return content
+
+    def look(self, source: str, field: VoxelField | SplatField) -> SourceLook:
+        """The box and the up direction of a source, to be pasted whole into a field.
+
+        Raises CagefieldError where it cannot be.
+        """
+        self.state(source)
+        path = self._path(source)
+        if is_scene(path):
+            scene = self._open(path, self._pasting)
+            other, cameras = scene.field, scene.cameras
+        else:
+            imported = imported_splats(path)
+            other, cameras = imported.field, imported.cameras
+        check_kinds(other, field)
+        poses = [camera.c2w for group in cameras.values() for camera in group]
+        up = shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+        return SourceLook(content_box(other), up)
 
     def _path(self, source: str) -> Path:
         path = resolved(source, self._folder).resolve()
@@ -96,9 +132,9 @@ class SceneSources:
 _CURE = "put it back, give another source, or switch the edit off (enabled: false)"
 
 
-def splats_of(path: Path) -> SplatField:
+def imported_splats(path: Path) -> ImportedSplats:
     """The splats of a file, or of the folder of a .sog, in the file's coordinates."""
     from cagefield.formats.splat_files import read_splats
     from cagefield.formats.splat_import import import_splats
 
-    return import_splats(read_splats(path)).field
+    return import_splats(read_splats(path))

@@ -20,7 +20,7 @@ from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.exporting import FOV_X, scene_up
+from cagefield.exporting import FOV_X
 from cagefield.exporting.path_states import PathEdits, path_edits
 from cagefield.exporting.splat_path_states import splat_path_edits
 from cagefield.fields.splat import SplatField
@@ -97,7 +97,7 @@ class ScenePage:
             found["path"] = along.data
         header = {
             "start": _view(_start(scene)),
-            "up": scene_up(scene).tolist(),
+            "up": scene.up.tolist(),
             "centre": field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
@@ -200,7 +200,7 @@ def _start(scene: Scene) -> Camera:
     bounds = scene.field.bounds
     radius = 0.6 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
     return turntable(
-        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene_up(scene), width=400, height=400, fov_x=FOV_X
+        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene.up, width=400, height=400, fov_x=FOV_X
     )[0]
 
 

@@ -10,6 +10,7 @@ density is divided by s, which |J| of the map has in it; else it stays.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,18 +50,31 @@ def pasted(
 
     Raises EditError where one of them has voxels and the other one splats, and where the cage holds nothing.
     """
-    if isinstance(field, VoxelField) and isinstance(content.field, VoxelField):
-        return _pasted_voxels(content.field, content, cage, field, preserve_opacity)
+    check_kinds(content.field, field)
     if isinstance(field, SplatField) and isinstance(content.field, SplatField):
         return Patch(splats=_pasted_splats(content.field, content, cage, field))
+    source = cast(VoxelField, content.field)
+    return _pasted_voxels(source, content, cage, cast(VoxelField, field), preserve_opacity)
+
+
+def check_kinds(source: VoxelField | SplatField, field: VoxelField | SplatField) -> None:
+    """Raises EditError where what one field holds cannot be pasted into another one."""
     if isinstance(field, SplatField):
+        if not isinstance(source, SplatField):
+            raise EditError(
+                "it holds voxels and this scene splats; export it as splats"
+                " (cagefield export SCENE THING.ply) and paste that file"
+            )
+        if field.discs and not source.discs:
+            raise EditError(
+                "it holds splats of three axes and this scene the discs of 2DGS; paste discs, or paste both"
+                " into a scene of splats"
+            )
+    elif isinstance(source, SplatField):
         raise EditError(
-            "it holds voxels and this scene splats; export it as splats (cagefield export SCENE THING.ply)"
-            " and paste that file"
+            "it holds splats and this scene voxels; bake it (cagefield bake SCENE -o VOXELS) and paste that"
+            " scene"
         )
-    raise EditError(
-        "it holds splats and this scene voxels; bake it (cagefield bake SCENE -o VOXELS) and paste that scene"
-    )
 
 
 def content_box(field: VoxelField | SplatField) -> Array:
@@ -195,11 +209,6 @@ def _uniform(field: VoxelField, vertex: NDArray[np.int64]) -> Array:
 
 def _pasted_splats(source: SplatField, content: SourceContent, cage: Cage, field: SplatField) -> SplatField:
     """The splats in a cage of another scene, those that its faces cut in parts."""
-    if field.discs and not source.discs:
-        raise EditError(
-            "it holds splats of three axes and this scene the discs of 2DGS; paste discs, or paste both into"
-            " a scene of splats"
-        )
     edited = baked_splats(source, content.edits, preserve_opacity=content.preserve_opacity)
     edited = split_for_edits(edited, EditStack([Edit.delete(cage)]))
     inside = cage.contains(edited.means.astype(np.float64))
