@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 EDITS = """\
 version: 1
@@ -51,3 +52,12 @@ def moved(before: Any, after: Any) -> NDArray[np.float64]:
 def difference(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Largest difference of two pictures."""
     return float(np.abs(a - b).max())
+
+
+def enlarged(picture: NDArray[np.float64], width: int, height: int) -> NDArray[np.float64]:
+    """A picture [H,W,3] in [0,1] as one of fewer pixels shows it, through whose middles its rays go."""
+    down, across = picture.shape[:2]
+    rows = ((np.arange(height) + 0.5) * down / height).astype(int)
+    columns = ((np.arange(width) + 0.5) * across / width).astype(int)
+    small = Image.fromarray(np.uint8(np.rint(255.0 * picture[rows][:, columns])))
+    return np.asarray(small.resize((across, down), Image.Resampling.BILINEAR), dtype=np.float64) / 255.0

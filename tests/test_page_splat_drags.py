@@ -65,8 +65,8 @@ def test_a_drag_of_splats_is_drawn_by_the_page_and_ends_as_the_server_draws_it(
         own.until(f"cagefield.latency.presented.filter(p => p.drag > 0).length > {pictures}")
         own.until("cagefield.latency.moves.at(-1).presented !== null")
         uploaded = own.page.evaluate("cagefield.page.uploaded.last")
-        # 48 bytes of each splat that moved: some of the ball's 600, not split.
-        assert uploaded % 48 == 0 and 20 * 48 < uploaded < 400 * 48
+        # 64 bytes of each splat that moved: some of the ball's 600, not split.
+        assert uploaded % 64 == 0 and 20 * 64 < uploaded < 400 * 64
         assert own.page.evaluate("cagefield.picture.picture") == 0, "no picture of the server's"
         assert "drawn here" in own.page.inner_text(".status .figures")
     own.until("cagefield.drag === null")

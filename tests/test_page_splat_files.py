@@ -76,8 +76,10 @@ def test_what_covers_most_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
 CAGE = Cage.box((0.0, 0.0, 0.0), 1.0)
 
 
-@pytest.mark.parametrize("preserve_opacity", [True, False])
-def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(preserve_opacity: bool) -> None:
+@pytest.mark.parametrize(("preserve_opacity", "packed"), [(True, False), (False, False), (True, True)])
+def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(
+    preserve_opacity: bool, packed: bool
+) -> None:
     field = random_splats(300, 1)
     field = dataclasses.replace(field, log_scales=field.log_scales - 1.5)
     twisted = Edit(CAGE, CAGE.grown(0.4)).rotate((0.3, 0.0, 0.9)).scale(0.9)
@@ -88,7 +90,7 @@ def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(preserve_opaci
     np.testing.assert_array_equal(split.children.sh, field.sh[split.sources])
     wanted = deformed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
     changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
-    found = decode_page_splat_edits(encode_page_splat_edits(field, changed))
+    found = decode_page_splat_edits(encode_page_splat_edits(field, changed, packed=packed))
     base, order = deformed_splats(field, EditStack()), page_order(field)
     kept = order[~found.hidden]
     assert 0 < len(kept) < len(field) and len(kept) + len(found.means) == len(wanted)
@@ -111,7 +113,8 @@ def test_splats_less_what_goes_and_what_comes_are_the_edited_ones(preserve_opaci
     )  # fmt: skip
     all_got = np.concatenate(list(got.values()), axis=1)
     distance, rows = cKDTree(all_got).query(all_wanted)
-    assert len(np.unique(rows)) == len(rows) and distance.max() < 1e-3
+    # Scales of 12 bits are off by half a percent, of sizes up to about .2.
+    assert len(np.unique(rows)) == len(rows) and distance.max() < (3e-3 if packed else 1e-3)
 
 
 def test_no_edits_change_nothing() -> None:
@@ -128,11 +131,12 @@ def test_discs_and_empty_fields_are_refused() -> None:
         encode_page_splats(field.take(np.zeros(5, bool)))
 
 
-@pytest.mark.parametrize("edits", [False, True])
-def test_cut_and_garbled_files_are_refused_in_a_line(edits: bool) -> None:
+@pytest.mark.parametrize(("edits", "packed"), [(False, False), (True, False), (True, True)])
+def test_cut_and_garbled_files_are_refused_in_a_line(edits: bool, packed: bool) -> None:
     field = random_splats(30, 1)
-    changed = changed_splats(field, EditStack([Edit.delete(CAGE)]))
-    whole = encode_page_splat_edits(field, changed) if edits else encode_page_splats(field)
+    edit = Edit(CAGE, adjustment="discrete").translate((1.0, 0.0, 0.0)) if packed else Edit.delete(CAGE)
+    changed = changed_splats(field, EditStack([edit]))
+    whole = encode_page_splat_edits(field, changed, packed=packed) if edits else encode_page_splats(field)
     decode = decode_page_splat_edits if edits else decode_page_splats
     for cut in range(0, len(whole), 11):
         with pytest.raises(FieldError) as caught:

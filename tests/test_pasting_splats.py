@@ -19,6 +19,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.formats.page_splat_edits import decode_page_splat_edits
 from cagefield.formats.page_splats import decode_page_splats, page_order
 from cagefield.formats.splat_files import write_splats
+from cagefield.patches.splats import splat_patch_of
 from cagefield.rendering.baked_splats import baked_splats
 from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
 from cagefield.rendering.deformed_splats_reference import deformed_splats_reference
@@ -26,7 +27,9 @@ from cagefield.rendering.metrics import psnr
 from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.scene import Scene
+from splat_rooms import LIGHT, cage, room
 from splat_scenes import random_splats, splat_scene
+from test_splat_patches import seen
 
 BY = (3.2, 0.4, -0.2)
 CAMERA = Camera.look_at((1.6, -8.0, 2.0), (1.6, 0.0, 0.0), width=96, height=64, fov_x=0.8)
@@ -44,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def pasted(source: str = "../heap", size: float = 4.0) -> Edit:
-    edit = Edit.paste(source, Cage.box((0.0, 0.0, 0.0), size), name="heap")
+    edit = Edit.paste(source, Cage.box((0.0, 0.0, 0.0), size), name="heap").replace(relight="none")
     return edit.scale(0.6).then(Rotate((30.0, 0.0, 50.0))).translate(BY)
 
 
@@ -129,7 +132,33 @@ def test_a_page_has_what_is_pasted(folder: Path) -> None:
     assert edits.hidden[ours].all() and not edits.hidden[~ours].any()
     changed = changed_splats(field, scene.patched_edits)
     assert len(edits.sources) == 60 and (np.sort(order[edits.sources]) == np.arange(600, 660)).all()
-    np.testing.assert_allclose(edits.means + field.center, changed.splats.means, atol=1e-5)
+    place = np.argsort(order)[changed.sources]
+    means = changed.splats.means[np.argsort(place, kind="stable")]
+    np.testing.assert_allclose(edits.means + field.center, means, atol=1e-3)
+
+
+def test_surroundings_get_a_shadow(tmp_path: Path) -> None:
+    """A box pasted onto a bare floor shades it, nearly as one that was there."""
+    Scene(room(True)).save(tmp_path / "box")
+    bare = Scene(room(False), folder=tmp_path / "floor")
+    edit = Edit.paste("../box", cage()).translate((-0.5, 0.25, 0.0))
+    (ready,) = bare.with_edits(EditStack([edit.replace(relight="none")])).patched_edits
+    truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
+    shaded = ready.replace(patch=splat_patch_of(bare.field, EditStack(), ready, LIGHT))  # type: ignore[arg-type]
+    plain, both = (psnr(seen(bare.field, EditStack([e])), truth) for e in (ready, shaded))  # type: ignore[arg-type]
+    assert both > plain + 3.0
+
+
+def test_what_an_earlier_edit_was_filled_with_stays_beside_a_paste(tmp_path: Path) -> None:
+    """Fills are copies of the scene's own splats, which have the same rows with pasted ones behind them."""
+    Scene(room(True)).save(tmp_path / "box")
+    scene = Scene(room(True), folder=tmp_path / "floor")
+    gone = Edit.delete(cage())
+    gone = gone.replace(patch=splat_patch_of(scene.field, EditStack(), gone, LIGHT))  # type: ignore[arg-type]
+    far = Edit.paste("../box", cage()).replace(relight="none").translate((9.0, 0.0, 0.0))
+    (far,) = scene.with_edits(EditStack([far])).patched_edits
+    alone, both = (seen(scene.field, EditStack(edits)) for edits in ([gone], [gone, far]))  # type: ignore[arg-type]
+    assert psnr(both, alone) > 60.0 > psnr(seen(scene.field, EditStack([far])), alone) + 20.0  # type: ignore[arg-type]
 
 
 def test_kinds_that_do_not_go_together(folder: Path, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import block_of, interpolated
 from cagefield.patches.light import Ambience
 from cagefield.patches.making import patch_of
-from cagefield.patches.patcher import Patcher, wants_patch
+from cagefield.patches.patcher import wants_patch
 from cagefield.patches.support import membrane
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
@@ -319,14 +319,6 @@ def test_openness_needs_weights() -> None:
     assert not Ambience((), ()).shows and Ambience((), ()).reach == 0.0
     both = Ambience((0.1, 0.2), (0.5, 0.5))
     np.testing.assert_allclose(np.exp(both.log_openness(np.array([[0.0, 0.0], [1.0, 0.0]]))), [1.0, 0.5])
-
-
-def test_patchers_leave_other_fields_alone() -> None:
-    from splat_scenes import splat_scene
-
-    scene = splat_scene()
-    edits = Patcher(scene.field, (), lambda camera: scene.render(camera)).patched([Edit.delete(cage())])
-    assert edits[0].patch is None
 
 
 def test_a_clone_fills_with_what_another_cage_holds(scenes: tuple[Scene, Scene]) -> None:

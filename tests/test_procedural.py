@@ -335,6 +335,17 @@ def test_occlusion_is_open_on_a_ball_and_darker_in_a_corner():
     assert corner.remove("wall").occlusion is corner.occlusion
 
 
+def test_a_flattened_ball_darkens_what_is_as_near_as_it_is_and_no_box_around_it():
+    plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
+    disc = place((0, 0, 0.05), scale=(0.1, 0.1, 0.01))
+    still = ProceduralScene("still", (plate, Part("disc", (Primitive(Sphere(), PLAIN, disc[None]),))))
+    # the disc's edge is as far away as its height in the first, and further than every tap in the others
+    points = np.array([[0.15, 0, 0], [0.42, 0, 0], [0.3, 0.3, 0]], np.float32).T
+    up = np.tile(np.float32([[0], [0], [1]]), 3)
+    near, far, corner = still.occlusion(points, up)
+    assert near < 0.85 and min(far, corner) > 0.97
+
+
 def test_occlusion_anew_is_of_the_parts_where_they_stand():
     plate = Part("plate", (Primitive(Box((0.9, 0.9, 0.1)), PLAIN, place((0, 0, -0.1))[None]),))
     box = Part("box", (Primitive(Box((0.1, 0.1, 0.1)), PLAIN, place((-0.4, 0.013, 0.11))[None]),))

@@ -364,9 +364,9 @@ def test_nothing_else_is_done_between_the_pictures_of_a_drag() -> None:
     assert not b.scheduler.idle()
 
 
-def drawing(here: DrawnHere) -> Bench:
+def drawing(here: DrawnHere, differing: Differing = everywhere) -> Bench:
     """A page that shows the whole picture, and from then on draws some of its pictures itself."""
-    b = Bench()
+    b = Bench(differing=differing)
     b.open(1)
     b.step()
     b.settle()
@@ -430,3 +430,51 @@ def test_edits_that_were_lost_are_made_again_and_refused_ones_are_not() -> None:
     assert again is not None and again.revision == request.revision
     b.scheduler.presented(1, again.number)
     assert b.scheduler.next(b.now) is None
+
+
+def nowhere(page: int, one: int, another: int) -> None:
+    """Revisions of the edits that all look the same."""
+
+
+@pytest.mark.parametrize("cancelled", [False, True])
+def test_a_drag_that_the_page_drew_leaves_the_whole_picture_to_be_drawn(cancelled: bool) -> None:
+    b = drawing("moving", nowhere)
+    shown(b)
+    b.scheduler.edits(2, True, b.now)
+    assert shown(b)
+    b.scheduler.edits(0 if cancelled else 2, False, b.now)
+    assert shown(b)
+    assert len(set(pixels(b.finish()))) == SIDE * SIDE
+
+
+def test_a_drag_of_cages_alone_needs_no_edits_and_no_pictures() -> None:
+    b = drawing("moving", nowhere)
+    shown(b)
+    b.finish()
+    b.scheduler.edits(0, True, b.now)
+    b.settle()
+    assert b.scheduler.next(b.now) is None
+    b.scheduler.edits(0, False, b.now)
+    b.settle()
+    # A few pixels, which say that this is the picture.
+    tiles = b.finish()
+    assert tiles[-1].final and len(pixels(tiles)) < 2000
+
+
+def test_a_view_that_was_another_for_a_moment_is_drawn_anew_where_the_page_drew_it() -> None:
+    b = drawing("moving")
+    shown(b)
+    b.finish()
+    for before in (True, False):
+        b.scheduler.display(1, Display(before=before), b.now)
+    b.settle()
+    assert len(set(pixels(b.finish()))) == SIDE * SIDE
+
+
+def shown(b: Bench) -> bool:
+    """Has the page show the edits that it is owed; whether there were any. The view then rests."""
+    request = b.edits()
+    if request is not None:
+        b.scheduler.presented(1, request.number)
+    b.settle()
+    return request is not None

@@ -109,3 +109,12 @@ def sh_basis(viewdirs: npt.ArrayLike, degree: int) -> npt.NDArray[np.floating[An
         values[:, 23] = C4[7] * x * z * (x * x - 3 * y * y)
         values[:, 24] = C4[8] * (x * x * (x * x - 3 * y * y) - y * y * (3 * x * x - y * y))
     return values
+
+
+def brightened(
+    coefficients: npt.NDArray[np.float32], gains: npt.NDArray[np.floating[Any]]
+) -> npt.NDArray[np.float32]:
+    """Coefficients [N,K,3] of colours multiplied by gains [N,3], the 0.5 that is added to them included."""
+    out = coefficients * gains[:, None].astype(np.float32)
+    out[:, 0] += (0.5 / C0 * (gains - 1.0)).astype(np.float32)
+    return out

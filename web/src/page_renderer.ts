@@ -9,8 +9,9 @@
  */
 import { Choice, memoryLimit } from "./field/choice";
 import { Pacing } from "./field/pacing";
-import { Still } from "./field/still";
+import { RESTS, SETTLES, Still } from "./field/still";
 import { PageScene } from "./page_scene";
+import type { TakenEdits } from "./page_scene";
 import { AnyRenderer } from "./splats/any_renderer";
 import type { App } from "./app";
 import type { EditsHeader, PictureHeader } from "./protocol";
@@ -183,11 +184,17 @@ export class PageRenderer {
     const { app } = this;
     const seen = this.sight();
     const moved = !seen.every((part, n) => part === this.seen[n]);
+    const waits = moved && this.isOnlyFiner(seen);
     this.seen = seen;
-    if (this.isServed()) return;
+    if (waits || this.isServed()) return;
     if (moved) this.drawMoved();
-    else if (this.told.here === "all") this.drawStill();
-    if (this.told.here === "all" && !this.still.whole) app.viewport.invalidate();
+    else if (this.drawsStills) this.drawStill();
+    if (this.drawsStills && !this.still.whole) app.viewport.invalidate();
+  }
+
+  /** Whether whole pictures are the page's own: all are, or a drag goes on, during which the server draws none for it. */
+  private get drawsStills(): boolean {
+    return this.told.here === "all" || this.scene.edits?.header.final === false;
   }
 
   /** Draws the view as large as its time allows. */
@@ -211,7 +218,8 @@ export class PageRenderer {
       return;
     }
     const most = this.drawer.inBands ? this.pacing.rows(width, height) : height;
-    const rows = still.next(performance.now(), height, most);
+    const settles = this.told.here === "all" || this.drawer.inBands ? SETTLES : RESTS;
+    const rows = still.next(performance.now(), height, most, settles);
     if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height)) this.present(width, height);
   }
 
@@ -221,6 +229,15 @@ export class PageRenderer {
     const { view, before, split } = store.now;
     const { width, height } = viewport.pixels;
     return [...viewport.viewProjection.elements, width, height, view, before, split, this.drawer.level, this.scene.edits];
+  }
+
+  /** Whether a drag has ended on a whole picture, which stays until the server's is there with the edits' own lattices. */
+  private isOnlyFiner(seen: Seen): boolean {
+    const last = seen.length - 1;
+    const before = this.seen[last] as TakenEdits | null | undefined;
+    const now = seen[last] as TakenEdits | null;
+    if (!before || !now || this.drawsStills || !this.still.whole || this.app.lastPicture?.picture !== 0) return false;
+    return before.header.revision === now.header.revision && seen.every((part, n) => n === last || part === this.seen[n]);
   }
 
   /** Whether the server's picture is there and shows it. */
@@ -287,11 +304,11 @@ export class PageRenderer {
   private header(width: number, height: number, renderMs: number): PictureHeader {
     const { app } = this;
     const { view, before, split } = app.store.now;
-    const { drag, seq, revision, final } = this.scene.edits?.header ?? { drag: 0, seq: 0, revision: 0, final: false };
+    const { drag, seq, revision } = this.scene.edits?.header ?? { drag: 0, seq: 0, revision: 0 };
     const whole = this.still.whole && width === app.viewport.pixels.width;
     return {
       type: "picture", picture: 0, camera: app.camera.seq, drag, seq, revision, view, before, split,
-      x: 0, y: 0, width, height, full_width: width, full_height: height, final: whole && final && this.told.here === "all",
+      x: 0, y: 0, width, height, full_width: width, full_height: height, final: whole && this.drawsStills,
       format: "rgb", picture_bytes: 0, depth_bytes: 0, depth_width: 0, depth_height: 0, depth_scale: 1, render_ms: renderMs, encode_ms: 0,
     }; // prettier-ignore
   }

@@ -19,7 +19,7 @@ from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import Adjustment, Fill, Relight, problem_of_options
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.sources import problem_of_source
 from cagefield.errors import CageError, DeviceError, EditError
@@ -71,8 +71,8 @@ class Edit:
     - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
       then a cage in that scene's space, which the operations take to where it stands in this one. Relative
       to the folder of this scene, or absolute. See `Edit.paste`.
-    - patch: of a discrete edit, what the field that it was made for shows where something was taken away or
-      pasted (`cagefield.patches`); no part of edit files.
+    - patch: of a discrete edit, what the field that it was made for shows where something was taken away
+      (`cagefield.patches`); no part of edit files, as `pasted`, what a paste shows there.
 
     Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
     shells are reported by `check`, which every evaluation calls.
@@ -94,7 +94,8 @@ class Edit:
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
     source: str | None = None
-    patch: Patch | None = None
+    patch: Patch | SplatPatch | None = None
+    pasted: Pasted | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -186,19 +187,21 @@ class Edit:
         return not np.array_equal(self.inner.corners, self.deformed.corners)
 
     @property
-    def layers(self) -> tuple[VoxelField, ...]:
-        """The layers of its patch, if it has one."""
-        return () if self.patch is None else self.patch.layers
-
-    @property
     def under(self) -> VoxelField | None:
         """What its region shows instead of nothing, if that is a layer."""
-        return None if self.patch is None else self.patch.under
+        return self.patch.under if isinstance(self.patch, Patch) else None
 
     @property
     def part(self) -> VoxelField | None:
         """What V shows instead of the field, if that is a layer."""
-        return None if self.patch is None else self.patch.part
+        if self.pasted is not None:
+            return self.pasted.part
+        return self.patch.part if isinstance(self.patch, Patch) else None
+
+    @property
+    def layers(self) -> tuple[VoxelField, ...]:
+        """`under` and `part`, those of them that there are."""
+        return tuple(layer for layer in (self.under, self.part) if layer is not None)
 
     @property
     def boxes(self) -> Array:
@@ -209,7 +212,7 @@ class Edit:
                 cages = [self.outer]
             else:
                 cages = [] if self.deleted else [self.deformed]
-                if self.patch is not None and self.patch.region is not None:
+                if self.patch is not None:
                     cages.append(self.patch.region)
                 elif not self.keep_source:
                     cages.append(self.inner)
@@ -224,12 +227,14 @@ class Edit:
     def exact_warp(self) -> Warp:
         """The map of this edit without its lattice. Raises `EditError` as `check` does."""
         self.check()
-        place = None if self.patch is None else self.patch.place
+        place = None if self.pasted is None else self.pasted.place
         inner = HexahedronMap(place or self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
-            region = None if self.patch is None else self.patch.region
-            pasted = self.source is not None
-            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region, pasted)
+            region = None if self.patch is None else self.patch.read_instead
+            foreign = self.source is not None
+            return DiscreteWarp(
+                self.inner, None if self.deleted else inner, self.keep_source, region, foreign
+            )
         return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property

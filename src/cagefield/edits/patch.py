@@ -8,9 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
 from cagefield.cages import Cage
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.typing import Array, Float32, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,26 +23,92 @@ class Patch:
     """Layers (`fields.layers`) of the field that an edit was made for.
 
     Attributes:
-        region: outside of V, samples in this cage read `under`; it holds V^c. None where there is no `under`.
+        region: outside of V, samples in this cage read `under`; it holds V^c.
         under: what the region shows with the content of V^c gone: filled, and in its new light.
         part: what V shows, at its place in V^c; None where it is the field itself.
-        place: of a paste (`Edit.source`), the cage in this field's grid where `part` has what V^c holds in
-            the other scene.
-        splats: of a paste into splats, those in V^c, in the other scene's space.
     """
 
-    region: Cage | None = None
-    under: VoxelField | None = None
+    region: Cage
+    under: VoxelField
+    part: VoxelField | None = None
+
+    @property
+    def read_instead(self) -> Cage | None:
+        """Where, outside of V, layers are read and not the field."""
+        return self.region
+
+
+@dataclass(frozen=True, eq=False)
+class NewLight:
+    """The log of what the light at points of a grid is multiplied by, values [X,Y,Z].
+
+    Vertex (0, 0, 0) lies at `origin` [3], the next ones `spacing` apart, world units; `known` [X,Y,Z] are
+    those with a value.
+    """
+
+    origin: Array
+    spacing: float
+    values: Float32
+    known: Float32
+
+    def at(self, points: Array) -> Array:
+        """The log of the ratio [N] at points [N,3]: that of the known vertices around, 0 where none is."""
+        g = ((points - self.origin) / self.spacing).T
+        total = ndimage.map_coordinates(self.known, g, np.float64, order=1)
+        values = ndimage.map_coordinates(self.values * self.known, g, np.float64, order=1)
+        return np.asarray(np.where(total > 1e-3, values / np.maximum(total, 1e-3), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class SplatPatch:
+    """What a discrete edit of splats shows beside what it moves: fill, and new light.
+
+    Attributes:
+        field: the field whose splats the new ones are copies of.
+        region: outside of this cage and of V nothing changes.
+        gone: [X,Y,Z], vertices of `light`'s grid around which splats outside of V^c are taken away.
+        light: that of splats outside of V^c.
+        part: that of the content of V^c, None where it stays.
+        sources: [A] int64, rows of the field of the new splats; points: [A,3] where they are; jacobian:
+            [A,3,3], what their shapes were multiplied by, d(deformed)/d(canonical); gains: [A,3], what their
+            red, green and blue are multiplied by.
+    """
+
+    field: SplatField
+    region: Cage
+    gone: Mask
+    light: NewLight
+    part: NewLight | None
+    sources: NDArray[np.int64]
+    points: Array
+    jacobian: Array
+    gains: Array
+
+    @property
+    def read_instead(self) -> Cage | None:
+        """None: splats have no layers."""
+        return None
+
+    def takes_away(self, points: Array) -> Mask:
+        """[N], True for points [N,3] whose splats go."""
+        if not self.gone.any():
+            return np.zeros(len(points), bool)
+        g = np.round((points - self.light.origin) / self.light.spacing).astype(np.int64)
+        inside = ((g >= 0) & (g < self.gone.shape)).all(axis=1)
+        g[~inside] = 0
+        return np.asarray(self.gone[tuple(g.T)] & inside)
+
+
+@dataclass(frozen=True, eq=False)
+class Pasted:
+    """What a paste (`Edit.source`) shows in the field that it was made for.
+
+    Attributes:
+        part: of voxels, a layer, which has in `place` what V^c holds in the other scene; place: a cage in the
+            field's grid.
+        splats: of splats, those in V^c, in the other scene's space.
+    """
+
     part: VoxelField | None = None
     place: Cage | None = None
     splats: SplatField | None = None
-
-    @property
-    def alone(self) -> Patch | None:
-        """The patch without what it shows around V: that of a paste, or None."""
-        return None if self.place is None else Patch(part=self.part, place=self.place)
-
-    @property
-    def layers(self) -> tuple[VoxelField, ...]:
-        """`under` and `part`, those of them that there are."""
-        return tuple(layer for layer in (self.under, self.part) if layer is not None)

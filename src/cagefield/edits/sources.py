@@ -7,16 +7,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from cagefield.edits.names import problem_of_text
 
-if TYPE_CHECKING:
-    from cagefield.edits.edit import Edit
 
-    AnyEdit = TypeVar("AnyEdit", bound=Edit)
+class Sourced(Protocol):
+    """What is asked of an edit."""
+
+    @property
+    def source(self) -> str | None: ...
+
+    def replace(self, **changes: Any) -> Any: ...
+
+
+AnyEdit = TypeVar("AnyEdit", bound=Sourced)
 
 MOST_CHARACTERS = 4096
 """Length of a path; as Linux has it."""
@@ -53,7 +59,7 @@ def rebased(edits: Iterable[AnyEdit], before: Path | None, after: Path) -> list[
     return [
         edit
         if edit.source is None or Path(edit.source).is_absolute()
-        else replace(edit, source=relative(resolved(edit.source, before), after))
+        else edit.replace(source=relative(resolved(edit.source, before), after))
         for edit in edits
     ]
 

@@ -171,9 +171,15 @@ def _splat_files(
     if edits.active:
         split = split_of(field, edits)
         changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
-        found["edits"] = encode_page_splat_edits(field, changed)
+        found["edits"] = encode_page_splat_edits(field, changed, packed=True)
     along = splat_path_edits(
-        field, edits, keys, loop, preserve_opacity=preserve_opacity, on_progress=on_progress
+        field,
+        scene.edits,
+        keys,
+        loop,
+        scene.patcher,
+        preserve_opacity=preserve_opacity,
+        on_progress=on_progress,
     )
     return found, along
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.partial import partial_edit
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.errors import EditError
 from cagefield.formats.page_edits import LATTICE, for_pages
 from cagefield.formats.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
@@ -179,7 +179,7 @@ def stack_at(
     return EditStack(found)
 
 
-def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | None:
+def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | SplatPatch | None:
     """The patch that an edit has at these parts.
 
     Patches show what the whole edits before them make: there is none while one of these, that reaches into
@@ -188,13 +188,13 @@ def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Pa
     edit, part = edits[number], parts[number]
     if part < 1.0 and not edit.deleted:
         edit = on_way[number]
-    if edit.patch is None or part <= 0.0 or edit.patch.region is None:
-        return edit.patch if part > 0.0 else None
+    if edit.patch is None or part <= 0.0:
+        return None
     low, high = edit.patch.region.aabb
     for before, there in zip(edits.edits[:number], parts, strict=False):
         meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
         if there < 1.0 and before.enabled and meets.all(axis=1).any():
-            return edit.patch.alone
+            return None
     return edit.patch
 
 

@@ -12,13 +12,14 @@ from cagefield.exporting.path_states import MOST_STATES, PathEdits, parts_at, st
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_splat_path import SPLAT_BYTES, SplatPathState, encode_page_splat_path
 from cagefield.keyframes import Keyframe, Timeline
+from cagefield.patches.patcher import Patcher
 from cagefield.rendering.deformed_splats import changed_splats
 from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_splitting import Split, split_of
 
-BUDGET = 16 << 20
-"""Bytes of splats that move, before they are deflated. Where all states would take more, splats that the
-edits bend or cut are not split; where that is too much too, there are fewer states."""
+BUDGET = 48 << 20
+"""Bytes of splats that move, before they are deflated to about a sixth. Where all states would take more,
+splats that the edits bend or cut are not split; where that is too much too, there are fewer states."""
 
 LEAST_STATES = 8
 
@@ -28,6 +29,7 @@ def splat_path_edits(
     edits: EditStack,
     keys: Sequence[Keyframe],
     loop: bool,
+    patcher: Patcher,
     *,
     preserve_opacity: bool = True,
     on_progress: Callable[[float], None] = lambda done: None,
@@ -36,14 +38,16 @@ def splat_path_edits(
     if len(keys) < 2:
         return None
 
+    on_way, edits = patcher.patched(edits.edits, moving=True), patcher.patched(edits.edits)
     # With all that is pasted, also in states without it.
     field = with_pasted(field, edits)
+
     # Split for the whole edits, once, so that the same splats are on their way in all states.
     split: Split | None = split_of(field, edits)
 
     def state(stack: EditStack) -> SplatPathState:
         changed = changed_splats(field, stack, preserve_opacity=preserve_opacity, split=split)
-        return SplatPathState.of(field, changed)
+        return SplatPathState.of(field, changed, split)
 
     line = Timeline(keys, loop=loop)
     wanted = state_times(line, edits, MOST_STATES)
@@ -60,12 +64,13 @@ def splat_path_edits(
     middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
     total, states = len(unique) + len(middles), {}
     for parts in unique:
-        states[parts] = state(stack_at(edits, parts))
+        states[parts] = state(stack_at(edits, parts, on_way=on_way))
         on_progress(len(states) / total)
     errors: list[NDArray[np.float64]] = []
     for done, k in enumerate(middles, start=len(unique) + 1):
         one, other = states[knots[k]], states[knots[k + 1]]
-        middle = state(stack_at(edits, parts_at(line, edits, 0.5 * (times[k] + times[k + 1]))))
+        there = parts_at(line, edits, 0.5 * (times[k] + times[k + 1]))
+        middle = state(stack_at(edits, there, on_way=on_way))
         errors.append(_off(middle, one, other))
         on_progress(done / total)
     whole = next((n for n, parts in enumerate(unique) if all(part == 1.0 for part in parts)), None)

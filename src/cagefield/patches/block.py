@@ -16,7 +16,7 @@ from scipy import ndimage
 from cagefield.edits import EditStack
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.voxel import VoxelField
-from cagefield.sh import C0
+from cagefield.sh import C0, brightened
 from cagefield.sh_rotation import rotated_sh
 from cagefield.typing import Array, Float32, Mask
 
@@ -108,8 +108,7 @@ class Block:
         """The block with the colours at the vertices of a mask multiplied by ratios [N]."""
         sh = self.sh.copy()
         rows = self.slot[where]
-        sh[rows] *= ratio[:, None, None].astype(np.float32)
-        sh[rows, 0] += (0.5 * (ratio[:, None] - 1.0) / C0).astype(np.float32)
+        sh[rows] = brightened(sh[rows], np.repeat(ratio[:, None], 3, axis=1))
         return replace(self, sh=sh)
 
     def colours(self, where: Mask) -> Array:

@@ -1,4 +1,4 @@
-"""The patch of one discrete edit: what it took away is filled, and light goes along."""
+"""What one discrete edit took away is filled, and light goes along: on a block of a voxel field's grid."""
 
 from __future__ import annotations
 
@@ -29,6 +29,73 @@ UNSURE = 0.2
 """Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
 
 
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What was worked out for a discrete edit.
+
+    before: the block as the edits below make it; under: with V^c emptied, filled and in its new light; inside
+    [X,Y,Z]: V^c; light: on all but the part, and part_light: on the part, None where these stay as they were;
+    support: what was filled, None where nothing was.
+    """
+
+    work: _Work
+    under: Block
+    light: Lighting | None
+    part_light: Lighting | None
+    support: Support | None
+
+    @property
+    def before(self) -> Block:
+        return self.work.before
+
+    @property
+    def inside(self) -> Mask:
+        return self.work.inside
+
+    @cached_property
+    def emptied(self) -> Block:
+        """The block with V^c emptied, in its new light, before it is filled."""
+        return _lit(self.work.emptied, self.light)
+
+
+def made_of(
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    preserve_opacity: bool = True,
+    after: VoxelField | None = None,
+) -> Made:
+    """What a discrete edit of a field makes of it, under the edits below; `ambience` None leaves the light.
+
+    A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
+    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away;
+    `after` is the field with it, where the edit does not say that.
+    """
+    work = _Work.of(field, below, edit, ambience, settled, preserve_opacity, after)
+    lighting = part_light = None
+    support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
+    if ambience is not None and ambience.shows:
+        lighting = work.light(ambience)
+        part_light = work.part_light(ambience) if work.settled and edit.source is None else None
+    under = _lit(work.emptied, lighting)
+    if support is not None:
+        hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
+        if lighting is not None:
+            hidden |= lighting.dense(under) > UNSURE
+        footprint = footprint_of(under, support, work.part, hidden)
+        if footprint is None:
+            support = None
+        else:
+            under = rebuilt(under, footprint, work.inside)
+    if isinstance(edit.fill, Clone) and not edit.keep_source:
+        cages = edit.inner, edit.fill.source
+        under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
+    return Made(work, under, lighting, part_light, support)
+
+
 def patch_of(
     field: VoxelField,
     below: EditStack,
@@ -38,40 +105,23 @@ def patch_of(
     settled: bool = True,
     preserve_opacity: bool = True,
 ) -> Patch:
-    """The patch of a discrete edit of a field under the edits below it; `ambience` None leaves the light.
-
-    A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
-    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away.
-    """
-    work = _Work.of(field, below, edit, ambience, settled, preserve_opacity)
-    under, part = work.emptied, None
-    lighting = None
-    support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
-    if ambience is not None and ambience.shows:
-        lighting = work.light(ambience)
-        under = under.relit(lighting.where, np.exp(lighting.log_ratio))
-        part = work.relit_part(ambience) if work.settled and edit.source is None else None
-    if support is not None:
-        hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
-        if lighting is not None:
-            hidden |= lighting.dense(under) > UNSURE
-        footprint = footprint_of(under, support, work.part, hidden)
-        if footprint is not None:
-            under = rebuilt(under, footprint, work.inside)
-    if isinstance(edit.fill, Clone) and not edit.keep_source:
-        under = cloned(
-            under, below, (edit.inner, edit.fill.source), work.inside, work.surface, preserve_opacity
-        )
-    region, under = work.around(under)
+    """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
+    made = made_of(field, below, edit, ambience, settled=settled, preserve_opacity=preserve_opacity)
+    region, under = made.work.around(made.under)
+    part = None if made.part_light is None else made.work.relit_part(made.part_light)
     return Patch(region, under.layer(), None if part is None else part.layer())
+
+
+def _lit(block: Block, light: Lighting | None) -> Block:
+    return block if light is None else block.relit(light.where, np.exp(light.log_ratio))
 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
     """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
 
-    settled: the part is shown at its new place, and casts its shadow there; what that is of a paste, is
-    `shown`, [X,Y,Z] too.
+    settled: the part is shown at its new place, and casts its shadow there. pasted [X,Y,Z]: what is solid
+    with a paste, None of another edit.
     """
 
     edit: Edit
@@ -81,7 +131,7 @@ class _Work:
     inside: Mask
     part: Mask
     settled: bool
-    shown: Mask | None = None
+    pasted: Mask | None = None
 
     @classmethod
     def of(
@@ -92,6 +142,7 @@ class _Work:
         ambience: Ambience | None,
         settled: bool,
         preserve_opacity: bool,
+        after: VoxelField | None,
     ) -> _Work:
         settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
@@ -100,7 +151,8 @@ class _Work:
         before = block_of(field, below, box, preserve_opacity=preserve_opacity)
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         if edit.source is not None:
-            pasted = block_of(field, below.append(edit), box, preserve_opacity=preserve_opacity).solid
+            shown, stack = (field, below.append(edit)) if after is None else (after, EditStack())
+            pasted = block_of(shown, stack, box, preserve_opacity=preserve_opacity).solid
             none = np.zeros(before.shape, bool)
             return cls(edit, region, before, before, none, none, settled, pasted)
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
@@ -150,8 +202,8 @@ class _Work:
         solid = self.emptied.solid.copy()
         if not self.settled:
             return solid
-        if self.shown is not None:
-            return self.shown
+        if self.pasted is not None:
+            return self.pasted
         phi = HexahedronMap(self.edit.inner, self.edit.deformed)
         inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))
         solid.reshape(-1)[inside] = self.before.lookup(self.before.depth, canonical) > SOLID
@@ -168,8 +220,8 @@ class _Work:
         ]
         return Lighting(where, logs[1] - logs[0]).smoothed(block)
 
-    def relit_part(self, ambience: Ambience) -> Block:
-        """The content of V^c in the light of its new place; no more than that has colours."""
+    def part_light(self, ambience: Ambience) -> Lighting:
+        """What the light on the content of V^c is multiplied by at its new place."""
         block = self.before
         where = lit_vertices(block) & self.inside
         points, normals = block.positions(where), block.normals[where]
@@ -181,8 +233,11 @@ class _Work:
         new = nearness(after, moved, turned, ambience.reaches)
         old = nearness(before, points[inside], normals[inside], ambience.reaches)
         log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
-        lighting = Lighting(where, log).smoothed(block)
-        block = block.relit(where, np.exp(lighting.log_ratio))
+        return Lighting(where, log).smoothed(block)
+
+    def relit_part(self, light: Lighting) -> Block:
+        """The content of V^c in the light of its new place; no more than that has colours."""
+        block = _lit(self.before, light)
         kept = ndimage.binary_dilation(self.inside, iterations=2)
         at = np.argwhere(kept)
         part = replace(block, slot=np.where(kept, block.slot, -1))

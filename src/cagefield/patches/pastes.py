@@ -6,7 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Protocol
 
 from cagefield.edits import Edit
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Pasted
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.layers import slices_of
 from cagefield.fields.splat import SplatField
@@ -31,11 +31,11 @@ class Library(Protocol):
 
 
 class Pastes:
-    """Gives pastes into one field the patches with what they show."""
+    """Gives pastes into one field what they show."""
 
     def __init__(self, library: Library) -> None:
         self._library = library
-        self._kept: dict[Hashable, Patch] = {}
+        self._kept: dict[Hashable, Pasted] = {}
 
     def read(
         self,
@@ -54,19 +54,19 @@ class Pastes:
             if edit.source is not None and edit.enabled:
                 if proceed is not None:
                     proceed()
-                key, patch = self._patch(edit, edit.source, field, preserve_opacity)
-                used[key] = patch
-                edit = edit.replace(patch=patch)
+                key, shown = self._shown(edit, edit.source, field, preserve_opacity)
+                used[key] = shown
+                edit = edit.replace(pasted=shown)
             found.append(edit)
         if used and isinstance(field, VoxelField):
             _check_size(used.values(), field)
-        others = [(key, patch) for key, patch in self._kept.items() if key not in used]
+        others = [(key, shown) for key, shown in self._kept.items() if key not in used]
         self._kept = dict(others[-KEPT:]) | used
         return found
 
-    def _patch(
+    def _shown(
         self, edit: Edit, source: str, field: VoxelField | SplatField, preserve_opacity: bool
-    ) -> tuple[Hashable, Patch]:
+    ) -> tuple[Hashable, Pasted]:
         try:
             key = (self._library.state(source), edit.inner, preserve_opacity)
             if key not in self._kept:
@@ -79,10 +79,10 @@ class Pastes:
         return key, self._kept[key]
 
 
-def _check_size(patches: Iterable[Patch], field: VoxelField) -> None:
+def _check_size(pastes: Iterable[Pasted], field: VoxelField) -> None:
     """Raises EditError where pastes take too much memory."""
     _, ny, nz = field.resolution
-    ends = [slices_of(patch.part) for patch in patches if patch.part is not None]
+    ends = [slices_of(each.part) for each in pastes if each.part is not None]
     vertices = sum(high - low for low, high in ends) * ny * nz
     if vertices > MOST_VERTICES:
         raise EditError(

@@ -18,7 +18,7 @@ from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Pasted
 from cagefield.errors import EditError
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
@@ -45,14 +45,14 @@ class SourceContent:
 
 def pasted(
     content: SourceContent, cage: Cage, field: VoxelField | SplatField, *, preserve_opacity: bool = True
-) -> Patch:
-    """The patch of a paste into a field: what a cage of another scene holds.
+) -> Pasted:
+    """What a paste shows in a field: what a cage of another scene holds.
 
     Raises EditError where one of them has voxels and the other one splats, and where the cage holds nothing.
     """
     check_kinds(content.field, field)
     if isinstance(field, SplatField) and isinstance(content.field, SplatField):
-        return Patch(splats=_pasted_splats(content.field, content, cage, field))
+        return Pasted(splats=_pasted_splats(content.field, content, cage, field))
     source = cast(VoxelField, content.field)
     return _pasted_voxels(source, content, cage, cast(VoxelField, field), preserve_opacity)
 
@@ -92,7 +92,7 @@ def content_box(field: VoxelField | SplatField) -> Array:
 
 def _pasted_voxels(
     source: VoxelField, content: SourceContent, cage: Cage, field: VoxelField, preserve_opacity: bool
-) -> Patch:
+) -> Pasted:
     fit = _Fit.of(source, cage, field)
     block = fit.copied(content) if fit.whole else fit.resampled(content)
     if not (block.density > 0.0).any():
@@ -100,7 +100,7 @@ def _pasted_voxels(
     density = block.density / np.float32(fit.scale if preserve_opacity else 1.0)
     sh = _with_terms(block.sh, field.sh.shape[1])
     layer = Block(field, block.low, density, block.slot, sh).layer()
-    return Patch(part=layer, place=Cage(fit.there(cage.corners), pivot=fit.there(cage.pivot)))
+    return Pasted(part=layer, place=Cage(fit.there(cage.corners), pivot=fit.there(cage.pivot)))
 
 
 @dataclass(frozen=True, eq=False)

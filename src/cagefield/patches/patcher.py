@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.patch import Patch
+from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
 from cagefield.patches.seen import seen_pairs
+from cagefield.patches.splats import splat_patch_of
+from cagefield.patches.voxelised import voxelised_whole
 from cagefield.rendering.render_result import RenderResult
 
 KEPT = 16
@@ -29,7 +30,7 @@ class Patcher:
 
     `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
     from there by `render`, which draws the field without edits, with normals. Pastes show what `pastes`
-    reads; of splats, these alone have patches yet.
+    reads.
     """
 
     def __init__(
@@ -40,7 +41,7 @@ class Patcher:
         pastes: Pastes | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
-        self._kept: OrderedDict[Key, Patch] = OrderedDict()
+        self._kept: OrderedDict[Key, Patch | SplatPatch] = OrderedDict()
 
     def patched(
         self,
@@ -62,10 +63,10 @@ class Patcher:
         if self._pastes is not None:
             edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
         for edit in edits:
-            if isinstance(self._field, VoxelField) and wants_patch(edit):
+            if wants_patch(edit):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(self._field, tuple(made), edit, moving, preserve_opacity)
+                patch = self._patch(tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
         return EditStack(made)
@@ -73,13 +74,14 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness."""
-        if not isinstance(self._field, VoxelField):
-            return Ambience((), ())
-        return ambience_of(self._field, seen_pairs(self._render, self._cameras, self._field.bounds))
+        pairs = seen_pairs(self._render, self._cameras, self._field.bounds)
+        if isinstance(self._field, VoxelField):
+            return ambience_of(self._field, pairs)
+        return ambience_of(voxelised_whole(self._field), pairs)
 
     def _patch(
-        self, field: VoxelField, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
-    ) -> Patch | None:
+        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+    ) -> Patch | SplatPatch | None:
         """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
         # A drag does not wait for the light to be found out about.
@@ -87,7 +89,7 @@ class Patcher:
         relit = edit.relight == "occlusion" and known and self.ambience.shows
         if edit.source is not None and not relit:
             return None
-        kind = (edit.deleted, edit.keep_source, edit.fill, edit.patch, preserve_opacity)
+        kind = (edit.deleted, edit.keep_source, edit.fill, edit.pasted, preserve_opacity)
         what: Key = (*stack.active, edit.inner, *kind, relit)
         settled: Key = (*what, edit.deformed if relit else None)
         key = (*what, None) if moving and settled not in self._kept else settled
@@ -96,10 +98,14 @@ class Patcher:
             return self._kept[key]
         if not wants_patch(edit, moving):
             return None
-        light = self.ambience if relit else None
-        patch = patch_of(field, stack, edit, light, settled=not moving, preserve_opacity=preserve_opacity)
-        if edit.patch is not None:
-            patch = replace(patch, part=edit.patch.part, place=edit.patch.place)
+        ambience = self.ambience if relit else None
+        patch: Patch | SplatPatch
+        if isinstance(self._field, VoxelField):
+            patch = patch_of(
+                self._field, stack, edit, ambience, settled=not moving, preserve_opacity=preserve_opacity
+            )
+        else:
+            patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving)
         self._kept[key] = patch
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)

@@ -59,6 +59,14 @@ def baked_splats(
     )
 
 
+def where_they_are(field: SplatField, moved: MovedSplats, preserve_opacity: bool = True) -> SplatField:
+    """A field's splats where they are: those in their own places first, then the rows of `moved`."""
+    means, log_scales, quaternions, opacities, sh = _baked(field, moved, preserve_opacity)
+    return dataclasses.replace(
+        field, means=means, log_scales=log_scales, quaternions=quaternions, opacities=opacities, sh=sh
+    )
+
+
 def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tuple[Float32, ...]:
     """Means, log scales, quaternions, opacities and harmonics of a field's splats where they are."""
     kept, source = ~moved.left, moved.source
@@ -66,6 +74,7 @@ def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tup
     axes = axes * np.exp(field.log_scales[source].astype(np.float64))[:, None]
     turned, scales, _ = np.linalg.svd(moved.jacobian @ axes)
     turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
+    sh = moved.sh(field.sh)
     opacities = field.opacities[source].astype(np.float64)
     if not preserve_opacity:
         growth = np.cbrt(np.abs(np.linalg.det(moved.jacobian)))
@@ -75,7 +84,7 @@ def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tup
         np.log(np.maximum(scales, 1e-30)),
         quaternions_of(turned),
         opacities,
-        rotated_sh(field.sh[source], _polar_rotations(moved.jacobian)),
+        rotated_sh(field.sh[source] if sh is None else sh, _polar_rotations(moved.jacobian)),
     )
     own = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
     return tuple(

@@ -29,7 +29,8 @@ from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
 from cagefield.rendering.pasted_splats import with_pasted
-from cagefield.typing import Float32, Mask
+from cagefield.sh import brightened
+from cagefield.typing import Array, Float32, Mask
 
 if TYPE_CHECKING:
     from cagefield.rendering.splat_splitting import Split
@@ -135,7 +136,7 @@ def _deformed(
         places.put(base.means, means, None if more is None else more.means),
         places.put(base.covariances, covariances, None if more is None else more.covariances),
         places.put(base.opacities, own, None if more is None else more.opacities),
-        places.put(base.sh, None, None if more is None else more.sh),
+        places.put(base.sh, moved.sh(field.sh), None if more is None else more.sh),
         every,
         field.antialiased,
         tangents,
@@ -168,12 +169,18 @@ class ChangedSplats:
     Attributes:
         hidden: [N], True where the field's splat is not shown as it is.
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
-        splats: the M new ones; their `sh` are those of their sources.
+        splats: the M new ones; their `sh` are those of their sources, times `gains`.
+        gains: [M,3], what the red, green and blue of their sources is multiplied by; None where that is 1.
+        rows: [M] int64, what they are made of: splats of the field, and, from N on, children of the split.
+        jacobian: [M,3,3], d(deformed)/d(canonical) at their means.
     """
 
     hidden: Mask
     sources: NDArray[np.int64]
     splats: DeformedSplats
+    rows: NDArray[np.int64]
+    jacobian: Array
+    gains: Float32 | None = None
 
 
 def changed_splats(
@@ -192,13 +199,14 @@ def changed_splats(
         moved = moved.without(split.parents)
     means, covariances, own, rotations = _carried(field, moved, preserve_opacity)
     opacities = field.opacities[moved.source] if own is None else own
-    sources = moved.source
+    sources, made_of, jacobian, gains = moved.source, moved.source, moved.jacobian, moved.gains
     if split is not None:
         others = moved_splats(split.children, edits, coarse=coarse, proceed=proceed)
         more = _deformed(split.children, others, preserve_opacity, None)
-        rows = np.concatenate([np.flatnonzero(~others.left), others.source])
-        if others.is_whole:
-            rows = np.arange(len(split.children))
+        resting = np.flatnonzero(~others.left)
+        rows = np.concatenate([resting, others.source])
+        in_order = np.argsort(rows) if others.is_whole else np.arange(len(rows))
+        rows = rows[in_order]
         turns = np.broadcast_to(_NO_TURN, (len(more), 3, 3)) if more.rotations is None else more.rotations
         means, covariances = (
             np.concatenate([means, more.means]),
@@ -206,8 +214,21 @@ def changed_splats(
         )
         opacities, rotations = np.concatenate([opacities, more.opacities]), np.concatenate([rotations, turns])
         sources = np.concatenate([sources, split.sources[rows]])
-    new = DeformedSplats(means, covariances, opacities, field.sh[sources], rotations, field.antialiased)
-    return ChangedSplats(moved.left, sources, new)
+        made_of = np.concatenate([made_of, len(field) + rows])
+        of_children = np.tile(np.eye(3), (len(more), 1, 1))
+        of_children[Places(others).moved] = others.jacobian
+        jacobian = np.concatenate([jacobian, of_children])
+        if gains is not None or others.gains is not None:
+            own_gains = np.concatenate([np.ones((len(resting), 3)), _gains_of(others)])[in_order]
+            gains = np.concatenate([_gains_of(moved), own_gains])
+    sh = field.sh[sources] if gains is None else brightened(field.sh[sources], gains)
+    new = DeformedSplats(means, covariances, opacities, sh, rotations, field.antialiased)
+    told = None if gains is None else gains.astype(np.float32)
+    return ChangedSplats(moved.left, sources, new, made_of, jacobian, told)
+
+
+def _gains_of(moved: MovedSplats) -> Array:
+    return np.ones((len(moved.source), 3)) if moved.gains is None else moved.gains
 
 
 _NO_TURN = np.eye(3, dtype=np.float32)

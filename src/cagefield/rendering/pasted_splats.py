@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,14 @@ Pasted = tuple[SplatField, ...]
 
 @dataclass(frozen=True, eq=False)
 class _Origins:
-    """Where the splats of a field come from: number [N] of what is `pasted`, -1 for the scene's own."""
+    """Where the splats of a field come from: number [N] of what is `pasted`, -1 for the scene's own.
+
+    `scene` is the scene's field, whose rows come first, None of splats that stand for others.
+    """
 
     number: NDArray[np.int32]
     pasted: Pasted
+    scene: ref[SplatField] | None = None
 
 
 _joined: WeakKeyDictionary[SplatField, list[tuple[Pasted, SplatField]]] = WeakKeyDictionary()
@@ -43,7 +47,7 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
     """
     if field in _origins:
         return field
-    pasted = tuple(dict.fromkeys(edit.patch.splats for edit in edits.active if _pastes(edit) and edit.patch))
+    pasted = tuple(dict.fromkeys(edit.pasted.splats for edit in edits.active if edit.pasted is not None))
     splats = tuple(part for part in pasted if part is not None)
     if not splats:
         return field
@@ -52,7 +56,8 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
     if found is None:
         found = _behind(field, splats)
         counts = [len(field), *(len(part) for part in splats)]
-        _origins[found] = _Origins(np.repeat(np.arange(-1, len(splats), dtype=np.int32), counts), splats)
+        numbers = np.repeat(np.arange(-1, len(splats), dtype=np.int32), counts)
+        _origins[found] = _Origins(numbers, splats, ref(field))
     known[:] = [(splats, found), *(each for each in known if each[1] is not found)][:KEPT]
     return found
 
@@ -62,11 +67,11 @@ def pasted_rows(field: SplatField, edit: Edit) -> NDArray[np.int64]:
 
     Raises EditError for a paste without what it pastes.
     """
-    if not _pastes(edit):
+    if edit.source is None:
         return np.zeros(0, np.int64)
     origins = _origins.get(field)
     for number, part in enumerate(() if origins is None else origins.pasted):
-        if origins is not None and edit.patch is not None and part is edit.patch.splats:
+        if origins is not None and edit.pasted is not None and part is edit.pasted.splats:
             return np.flatnonzero(origins.number == number)
     raise edit.unread()
 
@@ -75,6 +80,16 @@ def at_rest(field: SplatField) -> Mask:
     """[N], True where a splat is pasted: it is not shown at its own place."""
     origins = _origins.get(field)
     return np.zeros(len(field), bool) if origins is None else origins.number >= 0
+
+
+def of_same_scene(field: SplatField, other: SplatField) -> bool:
+    """True where rows of one field are rows of the other, whatever comes behind them."""
+    return _scene_of(field) is _scene_of(other)
+
+
+def _scene_of(field: SplatField) -> SplatField | None:
+    origins = _origins.get(field)
+    return origins.scene() if origins is not None and origins.scene is not None else field
 
 
 def descend(field: SplatField, ancestor: SplatField, rows: NDArray[Any]) -> SplatField:
@@ -91,10 +106,6 @@ def descend_from_all(field: SplatField, ancestors: Sequence[SplatField]) -> Spla
     if known:
         _origins[field] = _Origins(np.concatenate([each.number for each in known]), known[0].pasted)
     return field
-
-
-def _pastes(edit: Edit) -> bool:
-    return edit.source is not None
 
 
 def _behind(field: SplatField, pasted: Pasted) -> SplatField:

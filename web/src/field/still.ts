@@ -3,6 +3,9 @@
 /** Milliseconds after the last change until the picture counts as at rest. */
 export const SETTLES = 60;
 
+/** The same where the whole picture may take long and is drawn at once, in the middle of a drag. */
+export const RESTS = 400;
+
 export class Still {
   private changed = -Infinity;
   private row = 0;
@@ -20,9 +23,9 @@ export class Still {
     return this.done;
   }
 
-  /** The rows to draw now, at most so many; null where none are, or not yet. */
-  next(now: number, height: number, most: number): { first: number; count: number } | null {
-    if (this.done || now - this.changed < SETTLES) return null;
+  /** The rows to draw now, at most so many; null where none are, or nothing has changed for less than `settles` ms. */
+  next(now: number, height: number, most: number, settles = SETTLES): { first: number; count: number } | null {
+    if (this.done || now - this.changed < settles) return null;
     return { first: this.row, count: Math.min(most, height - this.row) };
   }
 

@@ -80,6 +80,7 @@ void main() {
   mat3 F;
   float o;
   vec4 turn = vec4(0.0, 0.0, 0.0, 1.0);
+  vec3 gain = vec3(1.0);
   if (splat < own) {
     uvec4 first = texel(records, 2u * splat), second = texel(records, 2u * splat + 1u);
     mean = uintBitsToFloat(first.xyz);
@@ -88,7 +89,7 @@ void main() {
     vec4 q = rotation(second.xy);
     F = mat3(s.x * rotated(q, vec3(1, 0, 0)), s.y * rotated(q, vec3(0, 1, 0)), s.z * rotated(q, vec3(0, 0, 1)));
   } else {
-    uint n = 3u * (splat - own);
+    uint n = 4u * (splat - own);
     uvec4 first = texel(changed, n), second = texel(changed, n + 1u), third = texel(changed, n + 2u);
     mean = uintBitsToFloat(first.xyz);
     source = first.w;
@@ -96,6 +97,8 @@ void main() {
     F = cholesky(C.x, C.y, C.z, C.w, uintBitsToFloat(third.x), uintBitsToFloat(third.y));
     turn = rotation(third.zw);
     o = float(third.w >> 16) / 65535.0;
+    uint gains = texel(changed, n + 3u).x;
+    gain = exp2((vec3(gains & 1023u, gains >> 10 & 1023u, gains >> 20) - 512.0) / 128.0);
   }
   vec3 offset = mean - eye;
   vec3 p = W * offset;
@@ -129,7 +132,7 @@ void main() {
   normal = floatBitsToUint(vec4(dot(axis, d) > 0.0 ? -axis : axis, 0.0));
 #endif
   d = rotated(vec4(-turn.xyz, turn.w), d);
-  tint = floatBitsToUint(vec4(max(colourOf(source, d), 0.0), slope.y));
+  tint = floatBitsToUint(vec4(gain * max(colourOf(source, d), 0.0), slope.y));
 }
 `;
 

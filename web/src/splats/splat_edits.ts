@@ -1,20 +1,24 @@
 /** Splats that edits changed, as they come over the wire (see `cagefield.formats.page_splat_edits`). */
 import { ByteReader, PageFile } from "../field/page_file";
-import { wholes } from "./splat_file";
+import { axesOf, covariancesOf } from "./shapes";
+import { meansOf, wholes } from "./splat_file";
 
 export const EDITS_MAGIC = "cagesped";
-const VERSION = 1;
+const VERSION = 2;
 
 /**
  * Words of a changed splat's record: the mean's floats, whose harmonics it has; its covariance's floats (xx, xy, xz,
- * yy | yz, zz); its turn and opacity.
+ * yy | yz, zz); its turn and opacity; what its colour is multiplied by, and three that say nothing.
  */
-export const CHANGED = 12;
+export const CHANGED = 16;
 
 interface EditsHeader {
   /** Splats of the field that was edited. */
   count: number;
   changed: number;
+  /** Whether means and shapes are quantised. */
+  packed: boolean;
+  log_scales: [number, number];
 }
 
 export interface SplatEdits {
@@ -30,14 +34,19 @@ export interface SplatEdits {
 
 export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
   const file = await PageFile.open<EditsHeader>(new ByteReader(source), EDITS_MAGIC, VERSION);
-  const { count, changed } = file.header;
-  const hidden = unpackedBits((await file.read("hidden")) as Uint8Array, count);
+  const { count, changed, packed, log_scales: logs } = file.header;
+  const bytes = async (name: string): Promise<Uint8Array> => (await file.read(name)) as Uint8Array;
+  const floats = async (name: string): Promise<Float32Array<ArrayBuffer>> => (await file.read(name)) as Float32Array<ArrayBuffer>;
+  const hidden = unpackedBits(await bytes("hidden"), count);
   const sources = (await file.read("sources")) as Int32Array;
-  const means = (await file.read("means")) as Float32Array<ArrayBuffer>;
-  const covariances = (await file.read("covariances")) as Float32Array<ArrayBuffer>;
-  const opacities = wholes((await file.read("opacities")) as Uint8Array);
-  const turns = wholes((await file.read("turns")) as Uint8Array);
-  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns) };
+  const means = packed ? meansOf(await floats("chunks"), await bytes("means"), changed) : await floats("means");
+  const covariances = packed
+    ? covariancesOf(axesOf(wholes(await bytes("rotations")), wholes(await bytes("scales")), logs))
+    : await floats("covariances");
+  const opacities = wholes(await bytes("opacities"));
+  const turns = wholes(await bytes("turns"));
+  const gains = (await file.read("gains")) as Int32Array;
+  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns, gains) };
 }
 
 /** The first `count` bits, 0 or 1, the lowest of a byte first. */
@@ -47,13 +56,14 @@ export function unpackedBits(bits: Uint8Array, count: number): Uint8Array<ArrayB
   return out;
 }
 
-/** The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3, M]. */
+/** The records of M changed splats: sources [M], means [M, 3], covariances [M, 6], opacities [M], turns [3, M], gains [M]. */
 export function changedRecords(
   sources: Int32Array,
   means: Float32Array<ArrayBuffer>,
   covariances: Float32Array<ArrayBuffer>,
   opacities: Uint16Array,
   turns: Uint16Array,
+  gains: Int32Array,
 ): Uint32Array<ArrayBuffer> {
   const changed = sources.length;
   const records = new Uint32Array(CHANGED * changed);
@@ -65,6 +75,7 @@ export function changedRecords(
     for (let k = 0; k < 6; k++) records[at + 4 + k] = covariance[6 * n + k];
     records[at + 10] = turns[n] | (turns[changed + n] << 16);
     records[at + 11] = turns[2 * changed + n] | (opacities[n] << 16);
+    records[at + 12] = gains[n];
   }
   return records;
 }

@@ -1,6 +1,7 @@
 /** The edits of splats along a camera path (see `cagefield.formats.page_splat_path`). */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
+import { axesOf, covariancesOf, rotationOf } from "../splats/shapes";
 import { changedRecords, unpackedBits } from "../splats/splat_edits";
 import type { SplatEdits } from "../splats/splat_edits";
 import { wholes } from "../splats/splat_file";
@@ -14,21 +15,44 @@ interface Header {
   changed: number[];
   hidden: number[];
   sources: number[];
+  rotations: number[];
+  scales: number[];
+  opacities: number[];
+  gains: number[];
+  /** The state whose numbers a state's are differences to, or -1. */
+  after: number[];
   low: Vec3;
-  high: Vec3;
+  step: number;
+  stretch: number;
   log_scales: [number, number];
   whole: number;
 }
 
-/** A state as it came. */
+type List = "hidden" | "sources" | "rotations" | "scales" | "opacities" | "gains";
+
+/** A state as it came: [12, M] of `moves`, see the format. */
 interface State {
   hidden: Uint8Array;
   sources: Int32Array;
-  means: Uint16Array;
-  rotations: Uint16Array;
-  scales: Uint16Array;
+  shapes: Shapes;
   opacities: Uint16Array;
-  turns: Uint16Array;
+  gains: Int32Array;
+  moves: Uint16Array;
+}
+
+/** What splats are before the edits: axes [M, 9], made when they are first asked for. */
+class Shapes {
+  private made: Float32Array | null = null;
+
+  constructor(
+    private readonly rotations: Uint16Array,
+    private readonly scales: Uint16Array,
+    private readonly logs: [number, number],
+  ) {}
+
+  get axes(): Float32Array {
+    return (this.made ??= axesOf(this.rotations, this.scales, this.logs));
+  }
 }
 
 interface Unpacked {
@@ -48,27 +72,33 @@ export class SplatPath {
   ) {}
 
   static async read(source: ArrayBuffer): Promise<SplatPath> {
-    const file = await PageFile.open<Header>(new ByteReader(source), SPLAT_PATH, 1);
+    const file = await PageFile.open<Header>(new ByteReader(source), SPLAT_PATH, 2);
     const { header } = file;
-    const bytes = async (name: string): Promise<Uint8Array> => (await file.read(name)) as Uint8Array;
-    const pairs = async (name: string): Promise<Uint16Array> => wholes(await bytes(name));
     const times = (await file.read("times")) as Float32Array;
     const order = (await file.read("states")) as Uint16Array;
-    const hidden: Uint8Array[] = [];
-    for (let k = 0; k <= Math.max(...header.hidden); k++) hidden.push(await bytes(`hidden.${k}`));
-    const sources: Int32Array[] = [];
-    for (let k = 0; k <= Math.max(...header.sources); k++) sources.push((await file.read(`sources.${k}`)) as Int32Array);
+    const lists = new Map<string, Uint8Array | Int32Array>();
+    const shapes = new Map<string, Shapes>();
+    const list = (name: List, n: number): Uint8Array | Int32Array => lists.get(`${name}.${header[name][n]}`)!;
+    const pairs = (name: List, n: number): Uint16Array => wholes(list(name, n) as Uint8Array);
     const states: State[] = [];
-    for (const n of header.changed.keys())
+    for (const n of header.changed.keys()) {
+      // Arrays come in the order in which states first have them.
+      for (const name of ["hidden", "sources", "rotations", "scales", "opacities", "gains"] as const) {
+        const key = `${name}.${header[name][n]}`;
+        if (!lists.has(key)) lists.set(key, (await file.read(key)) as Uint8Array | Int32Array);
+      }
+      const key = `${header.rotations[n]} ${header.scales[n]}`;
+      if (!shapes.has(key)) shapes.set(key, new Shapes(pairs("rotations", n), pairs("scales", n), header.log_scales));
+      const before = header.after[n] < 0 ? null : states[header.after[n]].moves;
       states.push({
-        hidden: hidden[header.hidden[n]],
-        sources: sources[header.sources[n]],
-        means: await pairs(`means.${n}`),
-        rotations: await pairs(`rotations.${n}`),
-        scales: await pairs(`scales.${n}`),
-        opacities: await pairs(`opacities.${n}`),
-        turns: await pairs(`turns.${n}`),
+        hidden: list("hidden", n) as Uint8Array,
+        sources: list("sources", n) as Int32Array,
+        shapes: shapes.get(key)!,
+        opacities: pairs("opacities", n),
+        gains: list("gains", n) as Int32Array,
+        moves: unfolded(wholes((await file.read(`moves.${n}`)) as Uint8Array), before),
       });
+    }
     return new SplatPath(header, times, order, states);
   }
 
@@ -89,8 +119,9 @@ export class SplatPath {
       means = mixed(means, others.means, partners, 3, away);
       covariances = mixed(covariances, others.covariances, partners, 6, away);
     }
-    const records = changedRecords(state.sources, means, covariances, state.opacities, state.turns);
-    return { count: header.count, hidden: unpackedBits(state.hidden, header.count), changed: state.sources.length, means, records };
+    const count = state.sources.length;
+    const records = changedRecords(state.sources, means, covariances, state.opacities, state.moves.subarray(3 * count, 6 * count), state.gains);
+    return { count: header.count, hidden: unpackedBits(state.hidden, header.count), changed: count, means, records };
   }
 
   private numbers(state: State): Unpacked {
@@ -125,33 +156,37 @@ function mixed(rows: Float32Array, others: Float32Array, partners: Int32Array, w
   return out;
 }
 
-function unpack({ means, rotations, scales }: State, { low, high, log_scales: logs }: Header): Unpacked {
-  const count = means.length / 3;
-  const out = { means: new Float32Array(3 * count), covariances: new Float32Array(6 * count) };
-  for (let n = 0; n < count; n++) {
-    for (let k = 0; k < 3; k++) out.means[3 * n + k] = low[k] + ((high[k] - low[k]) * means[k * count + n]) / 65535;
-    const axes = rotationOf(rotations[n], rotations[count + n], rotations[2 * count + n]);
-    const variances = [0, 1, 2].map((k) => Math.exp(2 * (logs[0] + ((logs[1] - logs[0]) * scales[k * count + n]) / 65535)));
-    let at = 6 * n;
-    for (let i = 0; i < 3; i++)
-      for (let j = i; j < 3; j++) {
-        let sum = 0;
-        for (let k = 0; k < 3; k++) sum += axes[3 * i + k] * variances[k] * axes[3 * j + k];
-        out.covariances[at++] = sum;
-      }
-  }
-  return out;
+/** Numbers of 16 bits from their folded differences to others, in place; see `page_splat_path`. */
+export function unfolded(folded: Uint16Array, before: Uint16Array | null): Uint16Array {
+  for (let n = 0; n < folded.length; n++) folded[n] = (before === null ? 0 : before[n]) + ((folded[n] >>> 1) ^ -(folded[n] & 1));
+  return folded;
 }
 
-/** The matrix, row by row, of three numbers as `page_splats.encode_rotations` writes them. */
-export function rotationOf(a: number, b: number, c: number): number[] {
-  const left = (a >> 15) | ((b >> 15) << 1);
-  const three = [a, b, c].map((code) => ((code & 32767) - 16384) / (16383 * Math.SQRT2));
-  const most = Math.sqrt(Math.max(0, 1 - three[0] ** 2 - three[1] ** 2 - three[2] ** 2));
-  const [w, x, y, z] = [...three.slice(0, left), most, ...three.slice(left)];
-  return [
-    1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-  ]; // prettier-ignore
+function unpack({ moves, shapes }: State, { low, step, stretch }: Header): Unpacked {
+  const count = moves.length / 12;
+  const means = new Float32Array(3 * count);
+  const { axes } = shapes;
+  const moved = new Float32Array(9 * count);
+  for (let n = 0; n < count; n++) {
+    const row = (k: number): number => moves[k * count + n];
+    for (let k = 0; k < 3; k++) means[3 * n + k] = low[k] + step * row(k);
+    const turn = rotationOf(row(3), row(4), row(5));
+    const [xx, xy, xz, yy, yz, zz] = [6, 7, 8, 9, 10, 11].map((k) => stretch * (row(k) - 32768));
+    const stretched = [1 + xx, xy, xz, xy, 1 + yy, yz, xz, yz, 1 + zz];
+    multiply(moved, 9 * n, multiply([], 0, turn, 0, stretched, 0), 0, axes, 9 * n);
+  }
+  return { means, covariances: covariancesOf(moved) };
+}
+
+type Numbers = number[] | Float32Array;
+
+/** Puts the product of two matrices [3, 3] into `out`; all begin where it is said. */
+function multiply<Out extends Numbers>(out: Out, at: number, one: Numbers, first: number, other: Numbers, second: number): Out {
+  for (let i = 0; i < 3; i++)
+    for (let j = 0; j < 3; j++) {
+      let sum = 0;
+      for (let k = 0; k < 3; k++) sum += one[first + 3 * i + k] * other[second + 3 * k + j];
+      out[at + 3 * i + j] = sum;
+    }
+  return out;
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from cagefield.datasets.procedural.parts import Part, apply
+from cagefield.datasets.procedural.parts import Part, Placed
 
 
 class Around(Protocol):
@@ -56,21 +56,18 @@ class Occlusion:
         lattice = np.full([len(axis) for axis in axes], reach, np.float32)
         for part in self._parts:
             for primitive in part.primitives:
-                for pose in part.motion @ primitive.poses:
-                    half = np.abs(pose[:3, :3]) @ np.array(primitive.shape.extent) + reach
+                placed = Placed.build(part, primitive)
+                for number, center in enumerate(placed.shift):
+                    half = np.abs(placed.linear[number]) @ placed.extent + np.float32(reach)
                     near = tuple(
                         slice(*np.searchsorted(axis, (c - h, c + h)))
-                        for axis, c, h in zip(axes, pose[:3, 3], half, strict=True)
+                        for axis, c, h in zip(axes, center, half, strict=True)
                     )
                     grid = np.meshgrid(
                         *(axis[cut] for axis, cut in zip(axes, near, strict=True)), indexing="ij"
                     )
                     points = np.stack(grid).reshape(3, -1).astype(np.float32)
-                    inverse = np.linalg.inv(pose)
-                    local = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
-                    # a stretched shape: the smallest scale gives a lower bound
-                    factor = np.linalg.svd(pose[:3, :3], compute_uv=False)[-1]
-                    distance = primitive.shape.distance(local) * np.float32(factor)
+                    distance = placed.distance(points, np.full(points.shape[1], number))
                     lattice[near] = np.minimum(lattice[near], distance.reshape(grid[0].shape))
         return lows.astype(np.float32), lattice
 

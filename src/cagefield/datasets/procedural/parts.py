@@ -142,6 +142,21 @@ class Placed:
             return apply(self.inverse[0], vectors)
         return _products(self.inverse, instance, vectors)
 
+    def distance(self, points: Float32, instance: Int) -> Float32:
+        """Distance [N] of points [3,N] of the world to their instance [N]; to first order where stretched.
+
+        That is the local distance over the length of its gradient in the world, exact along the axes of a
+        stretched ball and near every surface; but no less than to the ball around the instance.
+        """
+        local = self.local(points, instance)
+        distance = self.primitive.shape.distance(local)
+        if not self.stretched:
+            return distance * self.scale[instance]
+        slope = self.world_gradient(self.local_gradient(local, instance), instance)
+        distance = distance / np.maximum(np.linalg.norm(slope, axis=0), np.float32(1e-6))
+        away = np.linalg.norm(points - self.shift.T[:, instance], axis=0) - self.radii[instance]
+        return np.asarray(np.maximum(distance, away), np.float32)
+
     def local_gradient(self, local: Float32, instance: Int) -> Float32:
         """Gradient [3,N] of the distance in the local frame, by differences over a tetrahedron."""
         step = (np.float32(4e-4) / self.scale)[instance]

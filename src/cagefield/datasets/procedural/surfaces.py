@@ -112,13 +112,7 @@ class SurfaceField:
                 low, high = item.part.bounds[0] - reach, item.part.bounds[1] + reach
                 part_rows[item.part.name] = np.flatnonzero(((points > low) & (points < high)).all(1))
             rows, instance = _candidates(item, points, part_rows[item.part.name], reach)
-            local = item.local(np.ascontiguousarray(points[rows].T), instance)
-            gap = item.primitive.shape.distance(local)
-            if item.stretched:
-                slope = item.world_gradient(item.local_gradient(local, instance), instance)
-                gap = gap / np.maximum(np.sqrt((slope**2).sum(0)), np.float32(1e-6))
-            else:
-                gap = gap * item.scale[instance]
+            gap = item.distance(np.ascontiguousarray(points[rows].T), instance)
             near = gap < reach
             rows, instance, gap = rows[near], instance[near], gap[near]
             before = distance[rows]

@@ -10,25 +10,32 @@ from cagefield.edits import Edit
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.extent import patch_box
-from cagefield.patches.light import reaches_of
+from cagefield.patches.light import REACHES, reaches_of
 from cagefield.patches.patcher import wants_patch
+from cagefield.patches.voxelised import coarsest_voxel
 from cagefield.typing import Array
 
 
 class PatchExtent:
-    """See the module. Of one field; splats have no patches."""
+    """See the module. Of one field."""
 
     def __init__(self, field: VoxelField | SplatField) -> None:
         self._field = field
 
     @cached_property
     def _reach(self) -> float:
-        return max(reaches_of(self._field), default=0.0) if isinstance(self._field, VoxelField) else 0.0
+        if isinstance(self._field, VoxelField):
+            return max(reaches_of(self._field), default=0.0)
+        return REACHES[-1] * float(np.linalg.norm(self._field.bounds[1] - self._field.bounds[0]))
 
     def boxes(self, edit: Edit) -> Array:
         """Boxes [B,2,3] (min, max) in deformed space outside which the edit, patched, changes nothing."""
-        if not (isinstance(self._field, VoxelField) and wants_patch(edit)):
+        if not wants_patch(edit):
             return edit.boxes
         reach = 0.0 if edit.relight == "none" else self._reach
-        box = patch_box(edit, float(self._field.voxel_size.max()), reach)
+        if isinstance(self._field, VoxelField):
+            voxel = float(self._field.voxel_size.max())
+        else:
+            voxel = coarsest_voxel(patch_box(edit, 0.0, reach))
+        box = patch_box(edit, voxel, reach)
         return np.concatenate([edit.boxes, box[None]])

@@ -127,8 +127,11 @@ class Scheduler:
 
     def display(self, page: int, display: Display, now: float) -> None:
         """A page shows another view."""
-        if self._pages[page].display != display:
-            self._pages[page].display = display
+        p = self._pages[page]
+        if p.display != display:
+            p.display = display
+            if p.draws != "nothing":
+                p.showing.lost()
             self._changed(page, now)
 
     def edits(self, revision: int, dragging: bool, now: float) -> None:
@@ -143,8 +146,6 @@ class Scheduler:
         self._revision, self._dragging = revision, dragging
         for page, p in self._pages.items():
             was_shown = same and p.shown_version == p.version
-            if p.draws != "nothing" and not same:
-                p.showing.lost()
             self._changed(page, now)
             if let_go:
                 p.changed = -math.inf
@@ -287,11 +288,15 @@ class Scheduler:
         return p.shown_version != p.version
 
     def _owes_edits(self, p: _Page) -> bool:
-        return p.draws != "nothing" and p.edits != (self._revision, not self._dragging)
+        if p.draws == "nothing":
+            return False
+        return p.edits not in ((self._revision, True), (self._revision, not self._dragging))
 
     def _edits(self, page: int) -> EditsRequest:
         p = self._pages[page]
         p.edits = self._revision, not self._dragging
+        # The page draws them over what it shows.
+        p.showing.lost()
         self._numbers += 1
         return EditsRequest(self._numbers, page, self._revision, not self._dragging)
 

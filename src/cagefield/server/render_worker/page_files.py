@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
@@ -55,7 +55,7 @@ class PageFiles:
         edits = self._renderers.edits(task.shown.edits)
         field = self._renderers.scene.field
         if isinstance(field, SplatField):
-            return self._splat_edits(field, EditStack(edits), task, stop)
+            return self._splat_edits(field, edits, task, stop)
         drawn = [self._prepared(edit) for edit in edits]
         same = all(one is other for one, other in zip(edits, drawn, strict=True))
         renderers = self._renderers.edited if same else self._own
@@ -73,18 +73,19 @@ class PageFiles:
             del self._occupancies[next(iter(self._occupancies))]
         return EditsDone(task.number, found.data, found.keys, mapped - began, time.perf_counter() - mapped)
 
-    @staticmethod
     def _splat_edits(
-        field: SplatField, edits: EditStack, task: PageEditsTask, stop: Stop
+        self, field: SplatField, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> EditsDone | Stopped:
         """All that edits change of splats, whatever the page has; none is split while something moves.
 
         Raises CagefieldError for pastes, whose colours a page that has loaded its splats does not have.
         """
-        if any(edit.source is not None for edit in edits.active):
+        if any(edit.source is not None for edit in shown):
             raise CagefieldError("the server draws what is pasted between scenes of splats")
         began, proceed = time.perf_counter(), giving_up(stop)
         try:
+            patcher = self._renderers.scene.patcher
+            edits = patcher.patched(shown, moving=not task.exact, proceed=proceed)
             changed = changed_splats(
                 field,
                 edits,

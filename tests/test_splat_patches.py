@@ -1,0 +1,165 @@
+"""Patches of splats: what edits uncover is filled with splats, and light goes along, whatever draws it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.options import Clone
+from cagefield.edits.patch import SplatPatch
+from cagefield.fields.splat import SplatField
+from cagefield.formats.page_splat_edits import (
+    decode_page_splat_edits,
+    encode_page_splat_edits,
+)
+from cagefield.patches.light import Ambience
+from cagefield.patches.patcher import Patcher
+from cagefield.patches.splats import splat_patch_of
+from cagefield.patches.voxelised import voxelised
+from cagefield.rendering.baked_splats import baked_splats
+from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
+from cagefield.rendering.moved_splats import moved_splats
+from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splat_splitting import split_of
+from cagefield.scene import Scene
+from cagefield.sh import C0
+from splat_rooms import LIGHT, REACH, STRENGTH, cage, room
+
+
+def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
+    """Around the floor, from above."""
+    return turntable((0.0, 0.0, 0.0), 3.0 * scale, 3, elevation=0.8, width=96, height=96, fov_x=0.6)
+
+
+def seen(field: SplatField, edits: EditStack, scale: float = 1.0) -> NDArray[np.float32]:
+    """Pictures [3,H,W,3] of a field under edits."""
+    renderer = SplatRenderer(field).with_edits(edits)
+    return np.stack([renderer.render(camera, background="white").rgb for camera in cameras(scale)])
+
+
+def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
+    """PSNR of two pictures."""
+    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
+
+
+def patched(field: SplatField, edit: Edit, light: Ambience | None = LIGHT) -> EditStack:
+    """The edit with its patch."""
+    return EditStack([edit.replace(patch=splat_patch_of(field, EditStack(), edit, light))])
+
+
+def test_a_deleted_box_leaves_a_floor_without_a_hole_or_a_shadow():
+    field, truth = room(True), seen(room(False), EditStack())
+    edit = Edit.delete(cage())
+    left = db(seen(field, EditStack([edit])), truth)
+    filled = db(seen(field, patched(field, edit, None)), truth)
+    relit = db(seen(field, patched(field, edit)), truth)
+    assert left < 24.0 and filled > left + 1.5 and relit > left + 9.0
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_units_make_no_difference(scale):
+    field = room(True, scale)
+    size = cage().aabb[1] - cage().aabb[0]
+    edit = Edit.delete(Cage.box(scale * cage().aabb.mean(axis=0), scale * size))
+    light = Ambience((scale * REACH,), (STRENGTH,))
+    there = seen(field, patched(field, edit, light), scale)
+    usual = room(True)
+    assert db(there, seen(usual, patched(usual, Edit.delete(cage())))) > 36.0
+
+
+def test_a_moved_box_takes_its_shadow_along():
+    field = room(True)
+    edit = Edit(cage(), adjustment="discrete").translate([-0.5, 0.25, 0.0])
+    truth = seen(room(True, by=(-0.5, 0.25)), EditStack())
+    bare, both = db(seen(field, EditStack([edit])), truth), db(seen(field, patched(field, edit)), truth)
+    assert both > bare + 5.0
+
+
+def test_later_edits_take_the_fill_along_and_a_pages_splats_are_the_same():
+    field = room(True)
+    first = Edit.delete(cage())
+    patch = splat_patch_of(field, EditStack(), first, LIGHT)
+    spot = Cage.box((0.1, 0.0, 0.0), (0.5, 0.5, 0.2))
+    second = Edit(spot, adjustment="discrete", fill="none", relight="none").translate([0.0, 0.0, 0.4])
+    stack = EditStack([first.replace(patch=patch), second])
+    drawn = deformed_splats(field, stack)
+    lifted = drawn.means[(np.abs(drawn.means - [0.1, 0.0, 0.4]) < [0.2, 0.2, 0.05]).all(axis=1)]
+    assert len(patch.sources) > 50 and len(lifted) > 30
+    split = split_of(field, stack)
+    for found in (None, split):
+        changed = changed_splats(field, stack, split=found)
+        whole = deformed_splats(field, stack, split=found)
+        means = np.concatenate([field.means[~changed.hidden], changed.splats.means])
+        sh = np.concatenate([field.sh[~changed.hidden], changed.splats.sh])
+        order, other = (np.lexsort(np.round(m, 5).T) for m in (means, whole.means))
+        np.testing.assert_allclose(means[order], whole.means[other], atol=1e-5)
+        np.testing.assert_allclose(np.sort(sh[:, 0, 0]), np.sort(whole.sh[:, 0, 0]), atol=1e-5)
+        file = decode_page_splat_edits(encode_page_splat_edits(field, changed))
+        assert changed.gains is not None
+        np.testing.assert_allclose(file.gains, changed.gains, rtol=0.003)
+    baked = baked_splats(field, stack)
+    pictures = [SplatRenderer(baked).render(camera, background="white").rgb for camera in cameras()]
+    assert db(np.stack(pictures), seen(field, stack)) > 45.0
+
+
+def test_a_clone_is_made_of_the_splats_of_its_cage():
+    field = room(True)
+    source = Cage.box((-0.6, -0.5, 0.05), (0.62, 0.62, 0.3))
+    edit = Edit.delete(Cage.box((0.1, 0.0, 0.05), (0.62, 0.62, 0.3))).replace(fill=Clone(source))
+    patch = splat_patch_of(field, EditStack(), edit, None)
+    inside = source.contains(field.means.astype(np.float64))
+    assert sorted(patch.sources) == list(np.flatnonzero(inside))
+    np.testing.assert_allclose(patch.points, field.means[patch.sources] + [0.7, 0.5, 0.0], atol=1e-5)
+
+
+def test_a_patch_of_another_field_adds_none_of_its_splats():
+    field = room(True)
+    stack = patched(field, Edit.delete(cage()))
+    (edit,) = stack
+    assert isinstance(edit.patch, SplatPatch)
+    other = room(True)
+    assert len(moved_splats(other, stack).source) == len(moved_splats(field, stack).source) - len(
+        edit.patch.sources
+    )
+
+
+def test_scenes_fill_and_relight_splats_unless_told_not_to():
+    field = room(True)
+    edit = Edit.delete(cage())
+    scene = Scene(field, edits=EditStack([edit]), cameras={"train": cameras()})
+    (made,) = scene.patched_edits
+    assert isinstance(made.patch, SplatPatch) and len(made.patch.sources) > 50
+    (kept,) = scene.with_edits(EditStack([edit.replace(fill="none", relight="none")])).patched_edits
+    assert kept.patch is None
+    patcher = Patcher(field, cameras(), lambda camera: pytest.fail("a drag found out about the light"))
+    (moving,) = patcher.patched([edit], moving=True)
+    assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
+
+
+def test_voxelised_splats_are_as_opaque_and_as_coloured():
+    field = room(False)
+    voxels = voxelised(field, np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.2]]), 0.025)
+    z = voxels.vertices % voxels.resolution[2]
+    low = voxels.bounds[0, 2]
+    column = np.bincount(voxels.vertices // voxels.resolution[2], voxels.density * 0.025)
+    heights = low + 0.025 * z
+    assert np.abs(np.average(heights, weights=voxels.density)) < 0.005
+    # What a ray straight down loses of a layer of splats of opacity .95 that overlap.
+    middle = column.reshape(-1)[column > 0].mean()
+    assert 1.5 < middle < 12.0
+    x = voxels.bounds[0, 0] + 0.025 * (voxels.vertices // (voxels.resolution[1] * voxels.resolution[2]))
+    red = 0.5 + C0 * voxels.sh[:, 0, 0]
+    np.testing.assert_allclose(red, 0.45 + 0.2 * x, atol=0.02)
+
+
+def test_nothing_to_fill_and_no_splats_at_all_make_empty_patches():
+    field = room(False)
+    nowhere = Edit.delete(Cage.box((0.0, 0.0, 3.0), (0.4, 0.4, 0.4)))
+    patch = splat_patch_of(field, EditStack(), nowhere, LIGHT)
+    assert not len(patch.sources) and not patch.gone.any()
+    none = field.take(np.zeros(len(field), bool))
+    assert not len(splat_patch_of(none, EditStack(), Edit.delete(cage()), LIGHT).sources)
