@@ -8,9 +8,10 @@ from functools import cached_property
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.patch import Patch, SplatPatch
+from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.patches.joining import joined
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
@@ -42,6 +43,7 @@ class Patcher:
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._kept: OrderedDict[Key, Patch | SplatPatch] = OrderedDict()
+        self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
     def patched(
         self,
@@ -63,6 +65,10 @@ class Patcher:
         if self._pastes is not None:
             edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
         for edit in edits:
+            if edit.pasted is not None and isinstance(self._field, VoxelField):
+                if proceed is not None:
+                    proceed()
+                edit = edit.replace(pasted=self._joined(tuple(made), edit, moving, preserve_opacity))
             if wants_patch(edit):
                 if proceed is not None:
                     proceed()
@@ -70,6 +76,22 @@ class Patcher:
                 edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
         return EditStack(made)
+
+    def _joined(
+        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+    ) -> Pasted | None:
+        """What a paste shows; of one that moves, without what it is put over, unless that is known."""
+        assert isinstance(self._field, VoxelField)  # splats are put between others
+        stack = EditStack(below)
+        key: Key = (*stack.active, edit.pasted, edit.deformed, preserve_opacity)
+        if key not in self._pasted:
+            if moving:
+                return edit.pasted
+            self._pasted[key] = joined(self._field, stack, edit, preserve_opacity=preserve_opacity)
+        self._pasted.move_to_end(key)
+        while len(self._pasted) > KEPT:
+            self._pasted.popitem(last=False)
+        return self._pasted[key]
 
     @cached_property
     def ambience(self) -> Ambience:

@@ -5,7 +5,7 @@ an edit) as a whole. With V^c the canonical and V the deformed inner cage of a d
 
 - in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
 - in V but not in V^c: hidden, for V shows what was in V^c.
-- pasted: it goes to V; all others in V are hidden.
+- pasted: it goes to V; all others stay.
 
 With a patch, splats around V^c get new light, or go, and new ones fill what was uncovered: copies of others.
 

@@ -320,9 +320,11 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
     """The splats that faces go through, in two parts each; of a splat that several cut, the deepest cut."""
     best = np.full(len(rows), np.inf)
     t, direction = np.zeros(len(rows)), np.zeros((len(rows), 3))
-    # The cage of a paste is in another scene, where what is pasted was cut already.
-    cuts: list[tuple[Cage, Mask]] = [(edit.inner, np.full(len(rows), edit.source is None))]
-    if not edit.deleted:
+    # A paste hides nothing; its cage is in another scene, where what is pasted was cut already.
+    cuts: list[tuple[Cage, Mask]] = (
+        [] if edit.source is not None else [(edit.inner, np.ones(len(rows), bool))]
+    )
+    if not edit.deleted and edit.source is None:
         # What lands in the deformed cage hides what stays there, but not what leaves.
         cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))
     size = np.linalg.norm(A, axis=(1, 2))

@@ -47,15 +47,14 @@ class DiscreteWarp:
     def to_deformed(self, points: Array) -> Mapped:
         """From V^c: into V, also for a copy (the map is single valued, and the original stays besides).
 
-        Lost are the points of V outside V^c, which the moved content covers, for a delete those of V^c, for a
-        paste those of V.
+        Lost are the points of V outside V^c, which the moved content covers, and for a delete those of V^c. A
+        paste leaves all where they are: it is shown with what is there.
         """
         mapped = Mapped.identity(points)
         if self.inner is None:
             mapped.lost[:] = self.source.contains(points)
             return mapped
         if self.pasted:
-            mapped.lost[:] = self.inner.deformed.contains(points)
             return mapped
         inside, deformed, J = self.inner.inverse(points)
         mapped.put(inside, deformed, J)
