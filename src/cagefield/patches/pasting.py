@@ -63,7 +63,7 @@ def check_kinds(source: VoxelField | SplatField, field: VoxelField | SplatField)
         if not isinstance(source, SplatField):
             raise EditError(
                 "it holds voxels and this scene splats; export it as splats"
-                " (cagefield export SCENE THING.ply) and paste that file"
+                " (cagefield export SCENE -o THING.ply) and paste that file"
             )
         if field.discs and not source.discs:
             raise EditError(
