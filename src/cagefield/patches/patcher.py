@@ -75,6 +75,8 @@ class Patcher:
                 patch = self._patch(tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
             made.append(edit)
+        while len(self._pasted) > max(KEPT, len(made)):
+            self._pasted.popitem(last=False)
         return EditStack(made)
 
     def _joined(
@@ -89,8 +91,6 @@ class Patcher:
                 return edit.pasted
             self._pasted[key] = joined(self._field, stack, edit, preserve_opacity=preserve_opacity)
         self._pasted.move_to_end(key)
-        while len(self._pasted) > KEPT:
-            self._pasted.popitem(last=False)
         return self._pasted[key]
 
     @cached_property
