@@ -9,6 +9,7 @@ do; frames a second compare it with the server's renderer on the same cores.
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import time
 from collections.abc import Iterator
@@ -67,7 +68,10 @@ class PagePictures:
     def run(self) -> None:
         """Prints the tables."""
         fields, rows = (
-            ["| scene | vertices | file, MB | textures, MB | levels |", "| --- |" + " ---: |" * 4],
+            [
+                "| scene | vertices | file, MB | textures, MB | with bricks of 4^3, MB | levels |",
+                "| --- |" + " ---: |" * 5,
+            ],
             [],
         )
         for name in EDITS:
@@ -118,7 +122,11 @@ class PagePictures:
         camera = scene.cameras["test"][0].resized(self.width, self.width * 3 // 4)
         camera = Camera(camera.c2w, camera.width, camera.height, camera.fx, camera.fx, camera.cx, camera.cy)
         for edit in ("", *EDITS[name]):
-            edits = for_pages(load_edits(EXAMPLES / f"{edit}.yaml")) if edit else EditStack([])
+            edits = EditStack([])
+            if edit:
+                stack = load_edits(EXAMPLES / f"{edit}.yaml")
+                # What they leave is filled, and light is changed, as in the editor.
+                edits = for_pages(dataclasses.replace(scene, edits=stack).patched_edits)
             renderer = base.with_edits(edits)
             data = encode_page_edits(renderer)
             page.edit(data)

@@ -4,7 +4,8 @@ python benchmarks/slow_line.py SCENE [--mbit 10] [--latency 40] [-o benchmarks/r
 
 SCENE is a scene folder of voxels. Chromium's own throttle slows what it loads from a server on this machine:
 the folder of `cagefield export --embed`, the one file of `cagefield export`, and the editor, whose kernels an
-earlier page has made ready. Bytes divided by the line's rate are what no machine can beat.
+earlier page has made ready: its server's pictures, and when the page has the coarse field and all of it.
+Bytes divided by the line's rate are what no machine can beat.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from cagefield.benchmarking.machine import cpu_model
 from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
 from cagefield.formats.page_file import bytes_until
 from cagefield.scene import Scene
-from editor_page import CHROMIUM, FLAGS
+from editor_page import CHROMIUM, FLAGS, asking
 
 PATIENCE = 300.0
 LEVEL = "window.cagefieldViewer?.viewer?.renderer.level"
@@ -84,6 +85,14 @@ class SlowLine:
             self._shown(link, ("window.cagefield?.settled === true",))
             shown = self._shown(link, ("Boolean(window.cagefield?.picture)", "window.cagefield.settled"))
             rows.append(("editor, by the server", None, shown[0], None, shown[1]))
+            shown = self._shown(
+                asking(link, "page"),
+                (
+                    "window.cagefield?.page.why === null",
+                    "window.cagefield.page.loads === 1 && window.cagefield.now.loading === null",
+                ),
+            )
+            rows.append(("editor, drawn by the page", None, shown[0], None, shown[1]))
         table = [
             "| page | MB to the first picture | line alone, s | first, s | MB | line alone, s | whole, s |"
         ]

@@ -46,8 +46,9 @@ def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
             settle(page)
         yield page
         browser.close()
-    assert complaints == []
-    assert [other for other in asked if not other.startswith((url.rsplit("/", 1)[0], "data:"))] == []
+    assert complaints == [], complaints
+    own = (url.rsplit("/", 1)[0], "data:", "blob:")
+    assert [other for other in asked if not other.startswith(own)] == [], asked
 
 
 def until(page: Any, condition: str, seconds: float = 120.0) -> None:

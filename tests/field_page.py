@@ -130,7 +130,8 @@ def field_page(splats: bool = False) -> Iterator[FieldPage]:
         page.evaluate(_START, "SplatRenderer" if splats else "FieldRenderer")
         yield FieldPage(page, splats)
         browser.close()
-    assert [said for said in complaints if not any(word in said for word in USUAL)] == []
+    left = [said for said in complaints if not any(word in said for word in USUAL)]
+    assert left == [], left
 
 
 def _array(text: str, kind: Any) -> NDArray[Any]:

@@ -184,7 +184,12 @@ class _Patches:
         self.moving, self.settled = moving, settled
 
     def patched(
-        self, edits: Sequence[Edit], *, moving: bool = False, preserve_opacity: bool = True
+        self,
+        edits: Sequence[Edit],
+        *,
+        moving: bool = False,
+        bending: bool = True,
+        preserve_opacity: bool = True,
     ) -> EditStack:
         patch = self.moving if moving else self.settled
         return EditStack(

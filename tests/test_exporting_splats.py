@@ -222,3 +222,20 @@ def test_renderers_of_splats_that_are_opened_and_closed_leave_nothing() -> None:
             page.page.evaluate("r.dispose()")
             seen.append(sum(page.page.evaluate("({...gpuObjects})").values()))
         assert seen == [seen[0]] * 4 and seen[0] <= 1
+
+
+def test_a_page_of_many_splats_may_have_them_sorted_beside_it(tmp_path: Path) -> None:
+    file = tmp_path / "scene.html"
+    file.write_text(
+        ScenePage.of(splats_scene(count=33_000, smaller=4.0), "many").one_file(), encoding="utf-8"
+    )
+    with shown(file) as page:
+        page.mouse.move(60, 60)
+        page.mouse.down()
+        for step in range(3):
+            pictures = page.evaluate("cagefieldViewer.viewer.pictures")
+            page.mouse.move(70 + 5 * step, 60)
+            until(page, f"cagefieldViewer.viewer.pictures > {pictures}")
+        page.mouse.up()
+        settle(page)
+    # The page's policy lets the worker in: else the console would have words, which `shown` fails for.

@@ -73,6 +73,19 @@ def test_the_page_draws_what_the_kernel_draws(page: FieldPage, degree: int, cont
     check_alike(Renderer(field).render(seen, normals=True), page.draw(seen))
 
 
+def test_samples_behind_empty_space_lie_beside_faces_of_cells_in_an_unbounded_field(page: FieldPage) -> None:
+    field = lumps(1, True)
+    page.edit(None)
+    page.load(encode_page_field(field))
+    seen = Camera.look_at((0.2, 0.1, 0.9), (0.1, 0.2, 0.0), width=64, height=48, fov_x=1.4)
+    ours, drawn = Renderer(field).render(seen, normals=True), page.draw(seen)
+    assert ours is not None and ours.normals is not None
+    solid = ours.opacity > 0.5
+    off = np.linalg.norm(ours.normals[solid] - drawn.normals[solid], axis=1)
+    # Where a sample is on a face, rounding says which cell's slope is taken.
+    assert solid.mean() > 0.05 and (off > 0.1).mean() < 2e-3
+
+
 def test_the_coarse_level_comes_first(page: FieldPage) -> None:
     field = lumps(0, False, resolution=(81, 70, 66))
     page.edit(None)

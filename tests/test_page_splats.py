@@ -147,6 +147,94 @@ def test_many_splats_are_sorted_by_a_worker(page: FieldPage) -> None:
     assert off[0] > 48 * 36 and off[1] == 0
 
 
+def test_a_drag_of_many_splats_is_unpacked_and_sorted_beside_the_page(page: FieldPage) -> None:
+    field = splats(0, 33_000)
+    field = dataclasses.replace(field, log_scales=field.log_scales - 1.5)
+    page.load(encode_page_splats(field))
+    turned = [
+        Edit(Cage.box((0, 0, 0), (2.2,) * 3), adjustment="discrete").rotate((0.0, angle, 0.0))
+        for angle in (0.8, 1.6)
+    ]
+    files = [edited_unsplit(field, EditStack([edit])) for edit in turned]
+    # Large enough for the worker, and most splats are in it.
+    assert all(len(file) > 1 << 20 for file in files)
+    there, back = (
+        {**seen.to_dict(), "c2w": seen.c2w.ravel().tolist()}
+        for seen in turntable((0, 0, 0), 3.2, 2, elevation=0.4, width=48, height=36, fov_x=0.8)
+    )
+    steps = page.page.evaluate(
+        """async ([files, there, back]) => {
+            r.setSize(there.width, there.height);
+            const shot = (camera, sorted) => {
+                r.setCamera(camera);
+                r.render({ sorted });
+                return r.read().rgba.join();
+            };
+            shot(there, true);
+            const seen = [];
+            for (const file of files) {
+                const edits = await cagefieldViewer.readEditsBeside(bytes(file));
+                const before = r.sortedHere;
+                const prepared = r.prepare(edits);
+                shot(back, false);  // a view that is turned meanwhile does not wait either
+                r.setCamera(there);
+                await prepared;
+                r.setEdits(edits);
+                const drawn = shot(there, false);
+                seen.push([r.sortedHere - before, r.inOrder, drawn]);
+            }
+            r.setEdits(null);
+            const before = r.sortedHere;
+            for (const [n, file] of files.entries()) {
+                r.setEdits(await cagefieldViewer.readSplatEdits(bytes(file)));
+                seen[n].push(shot(there, true) === seen[n][2]);
+            }
+            return [seen.map(([here, order, _, same]) => [here, order, same]), r.sortedHere - before];
+        }""",
+        [[base64.b64encode(file).decode() for file in files], there, back],
+    )
+    assert steps == [[[0, True, True]] * 2, 2]
+    page.edit(None)
+
+
+def test_without_workers_many_splats_are_sorted_on_the_page(page: FieldPage) -> None:
+    field = splats(0, 33_000)
+    page.load(encode_page_splats(dataclasses.replace(field, log_scales=field.log_scales - 1.5)))
+    there, back = (
+        {**seen.to_dict(), "c2w": seen.c2w.ravel().tolist()}
+        for seen in turntable((0, 0, 0), 3.2, 2, elevation=0.4, width=48, height=36, fov_x=0.8)
+    )
+    order = page.page.evaluate(
+        """async ([data, there, back]) => {
+            const { Worker } = window;
+            window.Worker = class {
+                constructor() { setTimeout(() => this.onerror(new Event("error"))); }
+                postMessage() {}
+                addEventListener() {}
+                terminate() {}
+            };
+            try {
+                const own = new cagefieldViewer.SplatRenderer(gl);
+                await own.load(bytes(data));
+                own.setSize(there.width, there.height);
+                const seen = [];
+                const draw = (camera) => { own.setCamera(camera); own.render(); seen.push(own.inOrder); };
+                draw(there);
+                const answer = new Promise((done) => { own.onOrder = done; });
+                draw(back);
+                await answer;
+                draw(back);
+                own.dispose();
+                return seen;
+            } finally {
+                window.Worker = Worker;
+            }
+        }""",
+        [base64.b64encode(encode_page_splats(field)).decode(), there, back],
+    )
+    assert order == [True, False, True]
+
+
 def test_eight_bits_do_where_there_are_no_floats(page: FieldPage) -> None:
     field = ball_of_splats()
     page.page.evaluate(

@@ -352,10 +352,13 @@ class Scene:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
         from cagefield.rendering.nerf import render_nerf
 
+        # What is relit is voxels: too rough for all of what a continuous edit bends.
+        patched = self.patcher.patched(self.edits.edits, bending=False)
+        exact = EditStack(edit.replace(lattice=None) for edit in patched)
         return render_nerf(
             original,
             camera,
-            edits=self._exact_edits,
+            edits=exact,
             background=background,
             preserve_opacity=self.preserve_opacity,
             normals=normals,

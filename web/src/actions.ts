@@ -97,15 +97,15 @@ export class Actions {
   /** Fills what a move or a delete uncovers, or leaves it. */
   toggleFill(): void {
     this.withSelected((edit) => {
-      if (!fillable(this.app.store.now)) this.app.say("only a move or a delete of voxels uncovers something to fill", "warning");
+      if (!fillable(this.app.store.now)) this.app.say("only a move or a delete uncovers something to fill", "warning");
       else this.app.send({ type: "change", edit: edit.id, fill: edit.fill === "none" ? "surroundings" : "none" });
     });
   }
 
-  /** Lets shadows go along with a discrete edit, or stay. */
+  /** Lets shadows go along with an edit, or stay. */
   toggleShadows(): void {
     this.withSelected((edit) => {
-      if (!relightable(this.app.store.now)) this.app.say("shadows go along only with a discrete edit of voxels", "warning");
+      if (!relightable(this.app.store.now)) this.app.say("choose an edit first: its shadows go along, or stay", "warning");
       else this.app.send({ type: "change", edit: edit.id, relight: edit.relight === "none" ? "occlusion" : "none" });
     });
   }

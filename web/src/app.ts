@@ -7,39 +7,21 @@ import { Drag, leading } from "./drag";
 import { Gizmo } from "./gizmo";
 import { Grid } from "./grid";
 import { Handles } from "./handles";
-import { Latency } from "./latency";
 import { Lines } from "./lines";
 import { PageRenderer } from "./page_renderer";
 import { Pictures } from "./pictures";
 import { Player } from "./player";
+import { Presenter } from "./presenter";
 import { recallCamera, recallTools } from "./session_storage";
 import { cageOverlay, shownCages } from "./cage_overlay";
-import { Throttle } from "./throttle";
 import { Viewport } from "./viewport";
 import { Store, obstacle, selected, showsCages, target } from "./store";
-import type { Figures } from "./store";
-import { decode, headed, unpack } from "./picture_message";
+import { headed } from "./picture_message";
 import type { Operation } from "./operations";
-import type { Answer, Ask, EditState, Hello, Job, PageMessage, PictureHeader, Preview, ServerMessage, State, Vec3 } from "./protocol";
+import type { Answer, Ask, EditState, Hello, Job, PageMessage, Preview, ServerMessage, State, Vec3 } from "./protocol";
 
 /** What of the page's state shows in the canvas. */
 const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection", "preview"] as const;
-
-/** Milliseconds between figures while pictures keep coming: a text that changes costs a frame of its own. */
-const FIGURES_EVERY = 300;
-
-/**
- * When a drag's next picture is asked for, frames after the beginning of one that draws a picture. Sooner, and it
- * would wait here to be drawn and show an older drag; later, and there would be fewer of them.
- */
-const ASKED_AFTER = 0.5;
-
-/** A picture, and when it came and was decoded. */
-interface Arrived {
-  header: PictureHeader;
-  received: number;
-  decoded: number;
-}
 
 export class App {
   readonly store = new Store(recallTools());
@@ -47,15 +29,10 @@ export class App {
   readonly pictures: Pictures;
   readonly gizmo: Gizmo;
   readonly camera: CameraFeed;
-  readonly latency = new Latency();
   readonly player: Player;
+  readonly presenter: Presenter;
   readonly page: PageRenderer;
   drag: Drag | null = null;
-  /** Called before a picture is asked for: what it should show is to be sent. */
-  beforeAsking: (() => void)[] = [];
-  lastPicture: PictureHeader | null = null;
-  /** When a picture or a state last came. */
-  lastNews = 0;
   private readonly lines: Lines;
   private readonly handles: Handles;
   private readonly connection: Connection;
@@ -63,18 +40,7 @@ export class App {
   private readonly questions = new Map<number, (answer: Answer | null) => void>();
   private requests = 0;
   private drags = 0;
-  private pictureChain: Promise<void> = Promise.resolve();
-  /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
-  private undrawn: Arrived[] = [];
-  /** Edits that the next frame shows. */
-  private taken: number[] = [];
-  private drawn: Arrived[] = [];
-  /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
-  private orbitFrom: number | null = null;
   private placedAfter: number | null = null;
-  /** The figures below the picture: those of the last one, however soon it came after the one before it. */
-  private readonly figures = new Throttle<Figures>(FIGURES_EVERY, (figures) => this.store.set({ figures }));
-
   constructor(host: HTMLElement) {
     this.viewport = new Viewport(host);
     this.pictures = new Pictures(this.viewport);
@@ -84,12 +50,11 @@ export class App {
     this.camera = new CameraFeed(this.viewport, (message) => this.send(message));
     this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.viewport.invalidate());
     this.player = new Player(this);
+    this.presenter = new Presenter(this);
     this.page = new PageRenderer(this);
     this.camera.drawnHere = () => this.page.draws;
-    this.viewport.guessed.push(() => this.orbitGuessed());
     this.viewport.beforeFrame.push(() => this.arrange());
-    this.viewport.beforeFrame.push(() => this.askForMore());
-    this.viewport.afterFrame.push((time) => this.framed(time));
+    this.viewport.beforeFrame.push(() => this.presenter.askForMore());
     this.store.listen((now, before) => {
       if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
       if (DRAWN.some((key) => now[key] !== before[key])) this.viewport.invalidate();
@@ -139,7 +104,7 @@ export class App {
   moveDrag(operation: Operation, time: number): void {
     if (this.drag === null) return;
     this.drag.move(operation);
-    this.latency.moved(this.drag.id, this.drag.seq, time);
+    this.presenter.latency.moved(this.drag.id, this.drag.seq, time);
     this.store.set({ limit: this.drag.why });
     this.viewport.invalidate();
   }
@@ -234,7 +199,7 @@ export class App {
   }
 
   private takeState(state: State): void {
-    this.lastNews = performance.now();
+    this.presenter.news = performance.now();
     const placed = state.edits.find((edit) => this.placedAfter !== null && edit.id > this.placedAfter);
     if (this.drag?.ended) {
       this.drag = null;
@@ -281,111 +246,10 @@ export class App {
     this.send({ type: "display", view, before, split });
   }
 
-  /** Takes note of a picture of the page's own, which the next frame shows. */
-  drew(header: PictureHeader, received: number, decoded: number): void {
-    this.lastPicture = header;
-    this.lastNews = performance.now();
-    this.orbitSeen(header.camera);
-    this.drawn.push({ header, received, decoded });
-  }
-
-  /** The next frame shows edits: the server may send the next ones. */
-  acknowledge(edits: number[]): void {
-    this.taken.push(...edits);
-  }
-
   private takeBinary(bytes: ArrayBuffer): void {
     const { header, start } = headed(bytes);
     if (header.type === "edits") this.page.take(header, bytes.slice(start));
-    else this.takePicture(bytes, header, start);
-  }
-
-  /** Decodes a picture away from the main thread, and shows pictures in the order in which they came. */
-  private takePicture(bytes: ArrayBuffer, header: PictureHeader, start: number): void {
-    const received = performance.now();
-    const { picture, depth } = unpack(bytes, header, start);
-    const decoding = decode(header, picture);
-    this.pictureChain = this.pictureChain.then(async () => {
-      try {
-        const image = await decoding;
-        const decoded = performance.now();
-        this.page.served(header);
-        // Of what the page draws itself, what the server sends comes too late.
-        if (this.page.outdates(header)) {
-          if (image instanceof ImageBitmap) image.close();
-          this.viewport.invalidate();
-        } else {
-          this.pictures.show(header, image, depth, this.camera.viewpoint(header.camera));
-          this.orbitSeen(header.camera);
-          this.lastPicture = header;
-        }
-        this.lastNews = performance.now();
-        this.undrawn.push({ header, received, decoded });
-      } catch {
-        this.say("a picture from the server could not be decoded", "warning");
-        this.send({ type: "presented", picture: header.picture });
-      }
-    });
-  }
-
-  /** From amid the field, whose middle is nothing to orbit around, the next picture says what is. */
-  private orbitGuessed(): void {
-    const { hello } = this.store.now;
-    if (hello === null) return;
-    const [low, high] = hello.bounds;
-    const amid = this.viewport.camera.position.toArray().every((x, i) => low[i] < x && x < high[i]);
-    this.orbitFrom = amid ? this.camera.seq + 1 : null;
-  }
-
-  /** Once: the orbit's centre is what the picture of a camera message shows in the middle of the view. */
-  private orbitSeen(camera: number): void {
-    if (this.orbitFrom === null || camera < this.orbitFrom || camera !== this.camera.seq) return;
-    const distance = this.pictures.depth.at(0.5, 0.5);
-    if (distance === null) return;
-    this.viewport.orbitAt(distance);
-    this.orbitFrom = null;
-  }
-
-  private framed(time: number): void {
-    this.latency.framed(time);
-    const shown = this.drawn;
-    this.drawn = [];
-    for (const picture of shown) this.presented(picture);
-  }
-
-  /** Asks for the next picture while the frame with this one is drawn and goes to the screen. */
-  private askForMore(): void {
-    const pictures = this.undrawn.map(({ header }) => header.picture);
-    const numbers = [...pictures, ...this.taken];
-    if (numbers.length > 0) {
-      const waits = this.drag !== null && this.taken.length === 0;
-      setTimeout(() => {
-        for (const action of this.beforeAsking) action();
-        for (const picture of numbers) this.send({ type: "presented", picture });
-      }, waits ? ASKED_AFTER * this.viewport.frameTime : 0);
-    }
-    this.drawn.push(...this.undrawn);
-    this.undrawn = [];
-    this.taken = [];
-  }
-
-  private presented({ header, received, decoded }: Arrived): void {
-    const time = performance.now();
-    const { drag, seq, camera, revision, width, full_width, final, render_ms, encode_ms } = header;
-    this.latency.shown(
-      { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
-      received, decoded, render_ms, encode_ms,
-    ); // prettier-ignore
-    const figures: Figures = {
-      perSecond: this.latency.perSecond(time),
-      renderMs: render_ms,
-      encodeMs: encode_ms,
-      width: full_width,
-      height: header.full_height,
-      final,
-      page: header.picture === 0,
-    };
-    this.figures.put(figures, final);
+    else this.presenter.take(bytes, header, start);
   }
 
   /** The cages of an edit as they are shown now. */

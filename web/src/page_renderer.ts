@@ -11,7 +11,7 @@ import { Choice, memoryLimit } from "./field/choice";
 import { Pacing } from "./field/pacing";
 import { RESTS, SETTLES, Still } from "./field/still";
 import { PageScene } from "./page_scene";
-import type { TakenEdits } from "./page_scene";
+import { isFiner, isServed, NOTHING, ownHeader, sameView, sightOf } from "./page_sight";
 import { AnyRenderer } from "./splats/any_renderer";
 import type { App } from "./app";
 import type { EditsHeader, PictureHeader } from "./protocol";
@@ -25,9 +25,6 @@ const PATIENCE = 5;
 
 /** Distances that are read back of a picture, at most. */
 const MOST_DISTANCES = 120_000;
-
-/** What a picture shows: drawn anew where any of it is other than before. */
-type Seen = readonly unknown[];
 
 export class PageRenderer {
   /** Pictures that the page has drawn. */
@@ -43,7 +40,7 @@ export class PageRenderer {
   private refused: { why: string; pictured: number | undefined } | null = null;
   /** What the server was told, and of which page. */
   private told: { here: DrawnHere; page: number | null } = { here: "nothing", page: null };
-  private seen: Seen = [];
+  private seen = NOTHING;
   private slow = 0;
   /** Whether the last picture, or part of one, had its splats in order. */
   private inOrder = true;
@@ -161,14 +158,14 @@ export class PageRenderer {
 
   /** Splats have been sorted for the camera: the view is drawn anew. */
   private ordered(): void {
-    this.seen = [];
+    this.seen = NOTHING;
     this.app.viewport.invalidate();
   }
 
   private async restore(): Promise<void> {
     if (this.closed !== null) return;
     await this.drawer.restore();
-    this.seen = [];
+    this.seen = NOTHING;
     this.changed();
   }
 
@@ -176,17 +173,17 @@ export class PageRenderer {
     if (this.draws) this.draw();
     const { taken } = this;
     this.taken = [];
-    if (taken.length > 0) this.app.acknowledge(taken);
+    if (taken.length > 0) this.app.presenter.acknowledge(taken);
   }
 
   /** Draws the view where it is other than before; at rest, the next part of the whole picture. */
   private draw(): void {
     const { app } = this;
-    const seen = this.sight();
-    const moved = !seen.every((part, n) => part === this.seen[n]);
-    const waits = moved && this.isOnlyFiner(seen);
+    const seen = sightOf(app, this.drawer.level, this.scene.edits);
+    const moved = seen.edits !== this.seen.edits || !sameView(seen, this.seen);
+    const waits = moved && this.stays && isFiner(seen, this.seen);
     this.seen = seen;
-    if (waits || this.isServed()) return;
+    if (waits || isServed(app, seen.edits, this.told.here === "all")) return;
     if (moved) this.drawMoved();
     else if (this.drawsStills) this.drawStill();
     if (this.drawsStills && !this.still.whole) app.viewport.invalidate();
@@ -205,7 +202,7 @@ export class PageRenderer {
     const drawn = this.paint(size[0], size[1], { first: 0, count: size[1] }, false);
     this.still.moved(performance.now(), drawn && scale === 1 && this.inOrder);
     if (drawn) this.present(size[0], size[1]);
-    else this.seen = [];
+    else this.seen = NOTHING;
   }
 
   /** Draws the next rows of the whole picture; where all are there, says so once the camera rests. */
@@ -213,8 +210,8 @@ export class PageRenderer {
     const { app, still } = this;
     const { width, height } = app.viewport.pixels;
     if (still.whole) {
-      const last = app.lastPicture;
-      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq) app.drew(this.header(width, height, this.took), 0, 0);
+      const last = app.presenter.last;
+      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq) app.presenter.drew(this.header(width, height), 0, 0);
       return;
     }
     const most = this.drawer.inBands ? this.pacing.rows(width, height) : height;
@@ -223,31 +220,9 @@ export class PageRenderer {
     if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height)) this.present(width, height);
   }
 
-  /** What is to be seen. */
-  private sight(): Seen {
-    const { viewport, store } = this.app;
-    const { view, before, split } = store.now;
-    const { width, height } = viewport.pixels;
-    return [...viewport.viewProjection.elements, width, height, view, before, split, this.drawer.level, this.scene.edits];
-  }
-
-  /** Whether a drag has ended on a whole picture, which stays until the server's is there with the edits' own lattices. */
-  private isOnlyFiner(seen: Seen): boolean {
-    const last = seen.length - 1;
-    const before = this.seen[last] as TakenEdits | null | undefined;
-    const now = seen[last] as TakenEdits | null;
-    if (!before || !now || this.drawsStills || !this.still.whole || this.app.lastPicture?.picture !== 0) return false;
-    return before.header.revision === now.header.revision && seen.every((part, n) => n === last || part === this.seen[n]);
-  }
-
-  /** Whether the server's picture is there and shows it. */
-  private isServed(): boolean {
-    const { lastPicture: last, camera, store } = this.app;
-    const { edits } = this.scene;
-    const { view, before, split } = store.now;
-    if (last === null || last.picture === 0 || edits === null || !camera.resting || last.camera !== camera.seq) return false;
-    const same = last.view === view && last.before === before && last.split === split && last.drag === edits.header.drag;
-    return same && last.revision >= edits.header.revision && (last.final || this.told.here !== "all");
+  /** Whether a whole picture of the page's own stays until the server's is there. */
+  private get stays(): boolean {
+    return !this.drawsStills && this.still.whole && this.app.presenter.last?.picture === 0;
   }
 
   /** Draws rows of the view, splats `sorted` for it or as they were; false where there is nothing to draw. */
@@ -287,7 +262,7 @@ export class PageRenderer {
     app.pictures.showOwn(distances, (framebuffer, across, down) => drawer.show(across, down, framebuffer, view));
     this.drawn += 1;
     const { edits } = this.scene;
-    app.drew(this.header(width, height, this.took), edits?.received ?? 0, edits?.taken ?? 0);
+    app.presenter.drew(this.header(width, height), edits?.received ?? 0, edits?.taken ?? 0);
   }
 
   private measured(pixels: number, took: number, isWhole: boolean): void {
@@ -300,16 +275,8 @@ export class PageRenderer {
     else if (this.choice.serverIsFaster) this.close(`the server is faster: ${this.choice.words}`);
   }
 
-  /** What one of the page's pictures shows, in the words for the server's; those are numbered from 1. */
-  private header(width: number, height: number, renderMs: number): PictureHeader {
-    const { app } = this;
-    const { view, before, split } = app.store.now;
-    const { drag, seq, revision } = this.scene.edits?.header ?? { drag: 0, seq: 0, revision: 0 };
-    const whole = this.still.whole && width === app.viewport.pixels.width;
-    return {
-      type: "picture", picture: 0, camera: app.camera.seq, drag, seq, revision, view, before, split,
-      x: 0, y: 0, width, height, full_width: width, full_height: height, final: whole && this.drawsStills,
-      format: "rgb", picture_bytes: 0, depth_bytes: 0, depth_width: 0, depth_height: 0, depth_scale: 1, render_ms: renderMs, encode_ms: 0,
-    }; // prettier-ignore
+  private header(width: number, height: number): PictureHeader {
+    const final = this.drawsStills && this.still.whole && width === this.app.viewport.pixels.width;
+    return ownHeader(this.app, this.scene.edits, [width, height], final, this.took);
   }
 }

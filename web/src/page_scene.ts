@@ -61,6 +61,7 @@ export class PageScene {
     this.chain = this.chain.then(async () => {
       try {
         const edits = await readAnyEdits(file, this.unpacked);
+        await this.drawer.prepare(edits);
         if (name !== this.name) return;
         this.drawer.setEdits(edits);
         this.unpacked = edits;

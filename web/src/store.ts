@@ -153,13 +153,13 @@ export function obstacle(edit: EditState, mode: Editor["mode"]): string | null {
   return null;
 }
 
-/** Whether the selected edit has light that goes along: discrete ones of voxels have. */
+/** Whether there is a selected edit: all of them may take light along. */
 export function relightable(editor: Editor): boolean {
-  const edit = selected(editor);
-  return edit !== null && edit.kind !== "continuous" && editor.hello?.splats !== true;
+  return selected(editor) !== null;
 }
 
 /** Whether the selected edit uncovers something that can be filled; a copy leaves its source where it is. */
 export function fillable(editor: Editor): boolean {
-  return relightable(editor) && selected(editor)?.kind !== "copy";
+  const edit = selected(editor);
+  return edit !== null && edit.kind !== "continuous" && edit.kind !== "copy";
 }

@@ -58,9 +58,9 @@ export function testApi(app: App): TestApi {
       return app.store.now;
     },
     get picture() {
-      return app.lastPicture;
+      return app.presenter.last;
     },
-    latency: app.latency,
+    latency: app.presenter.latency,
     get page() {
       const { drawn, why, draws, here, scene, drawer, choice } = app.page;
       return { drawn, why, draws, here, loads: scene.loads, uploaded: { ...drawer.uploaded }, rates: choice.words };
@@ -74,14 +74,14 @@ export function testApi(app: App): TestApi {
       return { id, seq, ended, why, followed };
     },
     get settled() {
-      const picture = app.lastPicture;
+      const picture = app.presenter.last;
       const { state, view, before, split, preview } = app.store.now;
       if (app.drag !== null || preview !== null || picture === null || state === null || !app.camera.resting) return false;
       const seen = picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
       return picture.final && seen && picture.view === view && picture.before === before && picture.split === split;
     },
     get quiet() {
-      return performance.now() - app.lastNews;
+      return performance.now() - app.presenter.news;
     },
     screen(id, kind, index, cage = "deformed") {
       const edit = app.store.now.state?.edits.find((each) => each.id === id);

@@ -46,8 +46,13 @@ class Case:
 
     @property
     def edits(self) -> EditStack:
-        """The edit stack of the file."""
-        return parse_edits(self.text, source=self.file)
+        """The edit stack of the file; exact maps, which are their truth, carry the light along as it was."""
+        edits = parse_edits(self.text, source=self.file)
+        if self.moved is not None:
+            return edits
+        return EditStack(
+            edit.replace(relight="none") if edit.adjustment == "continuous" else edit for edit in edits
+        )
 
     @property
     def kind(self) -> str:

@@ -67,7 +67,7 @@ class Edit:
       sheets is shown.
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
       leaves it as it was trained, a `Clone` copies a cage.
-    - relight: "occlusion" takes contact shadows along, of a discrete edit; "none" leaves them.
+    - relight: "occlusion" takes contact shadows along; "none" leaves them.
     - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
       then a cage in that scene's space, which the operations take to where it stands in this one. Relative
       to the folder of this scene, or absolute. See `Edit.paste`.

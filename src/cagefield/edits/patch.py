@@ -42,12 +42,12 @@ class Patch:
 class NewLight:
     """The log of what the light at points of a grid is multiplied by, values [X,Y,Z].
 
-    Vertex (0, 0, 0) lies at `origin` [3], the next ones `spacing` apart, world units; `known` [X,Y,Z] are
+    Vertex (0, 0, 0) lies at `origin` [3], the next ones `spacing` [3] apart, world units; `known` [X,Y,Z] are
     those with a value.
     """
 
     origin: Array
-    spacing: float
+    spacing: Array
     values: Float32
     known: Float32
 

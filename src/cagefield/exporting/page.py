@@ -47,7 +47,7 @@ PART = 3 << 16
 INDEX, SCRIPT = "index.html", "viewer.js"
 NAMES = {"field": "scene.field", "edits": "scene.edits", "path": "scene.path"}
 
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; worker-src blob:; "
 ONE_FILE = _POLICY + "script-src 'unsafe-inline'"
 FOLDER = _POLICY + "script-src 'self'; connect-src 'self'"
 

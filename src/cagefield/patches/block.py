@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.cages import Cage
 from cagefield.edits import EditStack
 from cagefield.fields.contraction import uncontract
 from cagefield.fields.voxel import VoxelField
@@ -34,7 +35,8 @@ SOLID = 0.3
 class Block:
     """Vertices [X,Y,Z] of a field's grid: density per world unit, and colours where there is density.
 
-    slot [X,Y,Z] is the row of `sh` [M,K,3], -1 where a vertex has no colour.
+    slot [X,Y,Z] is the row of `sh` [M,K,3], -1 where a vertex has no colour. In a block of a `stride` above 1
+    cells of so many vertices an axis stand for vertices (`pooled`), each at the cell's middle.
     """
 
     field: VoxelField
@@ -42,6 +44,7 @@ class Block:
     density: Float32
     slot: NDArray[np.int64]
     sh: Float32
+    stride: int = 1
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -76,12 +79,58 @@ class Block:
 
     def positions(self, where: Mask) -> Array:
         """World positions [N,3] of the vertices of a mask [X,Y,Z]."""
-        return world_of(self.field, np.argwhere(where) + self.low)
+        middle = 0.5 * (self.stride - 1)
+        return world_of(self.field, self.stride * np.argwhere(where) + self.low + middle)
 
     def lookup(self, values: AnyField, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
         """Values [X,Y,Z] of the block interpolated at world positions [N,3]."""
-        g = self.field.grid_coordinates(points) - self.low
+        middle = 0.5 * (self.stride - 1)
+        g = (self.field.grid_coordinates(points) - self.low - middle) / self.stride
         return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=outside))
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """World distances of neighbours along x, y and z."""
+        x, y, z = (self.stride * float(edge) for edge in self.field.voxel_size)
+        return x, y, z
+
+    def pooled(self, stride: int) -> Block:
+        """A block of cells of so many vertices an axis, each as dense as its densest; without colours."""
+        if stride == 1:
+            return self
+        padding = [(0, -n % stride) for n in self.shape]
+        x, y, z = (-(-n // stride) for n in self.shape)
+        density = np.pad(self.density, padding).reshape(x, stride, y, stride, z, stride).max(axis=(1, 3, 5))
+        known = np.pad(self.slot, padding, constant_values=-1)
+        slot = np.minimum(known.reshape(x, stride, y, stride, z, stride).max(axis=(1, 3, 5)), 0)
+        return replace(self, density=density, slot=slot, sh=self.sh[:1], stride=stride)
+
+    def reaching(self, box: Array) -> Block:
+        """The block grown by empty vertices to hold a world-space box [2,3], also beyond the field's grid."""
+        if self.field.contracted:
+            return self
+        g = (self.field.grid_coordinates(box) - self.low) / self.stride
+        before = np.maximum(np.ceil(-g[0]), 0.0).astype(np.int64)
+        after = np.maximum(np.ceil(g[1]).astype(np.int64) + 1 - np.array(self.shape), 0)
+        padding = list(zip(before.tolist(), after.tolist(), strict=True))
+        return replace(
+            self,
+            low=self.low - self.stride * before,
+            density=np.pad(self.density, padding),
+            slot=np.pad(self.slot, padding, constant_values=-1),
+        )
+
+    def around(self, changed: Mask, region: Cage) -> tuple[Cage, Block]:
+        """(the part of a region that shows the vertices of a mask [X,Y,Z], the block cropped to it)."""
+        at, field = np.argwhere(changed), self.field
+        if not len(at):
+            return region, self
+        first, last = at.min(axis=0), at.max(axis=0)
+        # A vertex shows in the cells around it, which need their own vertices.
+        low, high = world_of(field, np.stack([first - 1, last + 1]) + self.low)
+        if field.contracted and np.abs((np.stack([low, high]) - field.center) / field.half_size).max() > 1.0:
+            return region, self
+        return Cage.box(0.5 * (low + high), high - low), self.cropped(first - 2, last + 2)
 
     def with_density(self, where: Mask, density: Float32, *, slots: bool = False) -> Block:
         """The block with the densities [N] at the vertices of a mask; those without colour become grey.

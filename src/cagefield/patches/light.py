@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
+from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
 from cagefield.patches.seen import SeenPairs
@@ -85,8 +86,7 @@ def distance_in(block: Block, solid: Mask) -> Distance:
     """The distance to what is solid [X,Y,Z] of a block; far outside of the block."""
     if not solid.any():
         return lambda points: np.full(len(points), FAR)
-    spacing = tuple(float(edge) for edge in block.field.voxel_size)
-    values = ndimage.distance_transform_edt(~solid, sampling=spacing)
+    values = ndimage.distance_transform_edt(~solid, sampling=block.spacing)
     return lambda points: block.lookup(values, points, outside=FAR)
 
 
@@ -173,6 +173,20 @@ class Lighting:
         total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
         smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
         return replace(self, log_ratio=smooth)
+
+    def at(self, block: Block, points: Array) -> Array:
+        """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
+        total = block.lookup(self.where.astype(np.float32), points)
+        return np.asarray(block.lookup(self.dense(block), points) / np.maximum(total, 1e-3))
+
+    def on_grid(self, block: Block) -> NewLight:
+        """The same, for splats. Not of contracted fields."""
+        first = np.zeros(block.shape, bool)
+        first[0, 0, 0] = True
+        values = self.dense(block).astype(np.float32)
+        return NewLight(
+            block.positions(first)[0], np.array(block.spacing), values, self.where.astype(np.float32)
+        )
 
     def dense(self, block: Block) -> Array:
         """The log of the ratio [X,Y,Z], 0 elsewhere."""

@@ -14,7 +14,7 @@ from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import SOLID, Block, block_of, world_of
+from cagefield.patches.block import SOLID, Block, block_of
 from cagefield.patches.cloning import cloned
 from cagefield.patches.extent import RIM, patch_box
 from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
@@ -107,7 +107,8 @@ def patch_of(
 ) -> Patch:
     """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
     made = made_of(field, below, edit, ambience, settled=settled, preserve_opacity=preserve_opacity)
-    region, under = made.work.around(made.under)
+    changed = made.under.differs(made.before) | made.inside
+    region, under = made.under.around(changed, made.work.region)
     part = None if made.part_light is None else made.work.relit_part(made.part_light)
     return Patch(region, under.layer(), None if part is None else part.layer())
 
@@ -160,18 +161,6 @@ class _Work:
         if not edit.keep_source:
             emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
         return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
-
-    def around(self, under: Block) -> tuple[Cage, Block]:
-        """(the region that shows a block, the block): no more of it than differs from what was there."""
-        field, changed = under.field, np.argwhere(under.differs(self.before) | self.inside)
-        if not len(changed):
-            return self.region, under
-        first, last = changed.min(axis=0), changed.max(axis=0)
-        # A vertex shows in the cells around it, which need their own vertices.
-        low, high = world_of(field, np.stack([first - 1, last + 1]) + under.low)
-        if field.contracted and np.abs((np.stack([low, high]) - field.center) / field.half_size).max() > 1.0:
-            return self.region, under
-        return Cage.box(0.5 * (low + high), high - low), under.cropped(first - 2, last + 2)
 
     @cached_property
     def surface(self) -> Mask:

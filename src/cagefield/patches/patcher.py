@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import cast
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.patches.bending import bent_voxels
 from cagefield.patches.joining import joined
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
 from cagefield.patches.seen import seen_pairs
-from cagefield.patches.splats import splat_patch_of
+from cagefield.patches.splats import bent_splats, splat_patch_of
 from cagefield.patches.voxelised import voxelised_whole
 from cagefield.rendering.render_result import RenderResult
 
@@ -42,7 +44,7 @@ class Patcher:
         pastes: Pastes | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
-        self._kept: OrderedDict[Key, Patch | SplatPatch] = OrderedDict()
+        self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
         self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
     def patched(
@@ -50,10 +52,14 @@ class Patcher:
         edits: Sequence[Edit],
         *,
         moving: bool = False,
+        bending: bool = True,
         preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
     ) -> EditStack:
         """The stack of the edits, in order, with their patches.
+
+        Before a continuous edit that takes light along comes one of its own for that (`patches.bending`),
+        unless it is `moving`; with `bending` False there is none, and the stack is as long as the edits.
 
         While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
         place: this does not depend on where that is. Edits that stay meanwhile keep the patches they have.
@@ -74,6 +80,11 @@ class Patcher:
                     proceed()
                 patch = self._patch(tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
+            elif bending and not moving and wants_light(edit):
+                if proceed is not None:
+                    proceed()
+                light = self._light(tuple(made), edit)
+                made += [] if light is None else [light]
             made.append(edit)
         while len(self._pasted) > max(KEPT, len(made)):
             self._pasted.popitem(last=False)
@@ -117,7 +128,7 @@ class Patcher:
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
-            return self._kept[key]
+            return cast("Patch | SplatPatch", self._kept[key])
         if not wants_patch(edit, moving):
             return None
         ambience = self.ambience if relit else None
@@ -128,10 +139,30 @@ class Patcher:
             )
         else:
             patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving)
-        self._kept[key] = patch
+        self._keep(key, patch)
+        return patch
+
+    def _light(self, below: tuple[Edit, ...], edit: Edit) -> Edit | None:
+        """The edit that changes the light under a continuous one; None where none changes."""
+        if not self.ambience.shows:
+            return None
+        stack = EditStack(below)
+        shape = edit.inner, edit.outer, edit.deformed, edit.shell, edit.falloff, edit.width
+        key: Key = ("light", *stack.active, *shape, edit.allow_folding)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return cast("Edit | None", self._kept[key])
+        if isinstance(self._field, VoxelField):
+            found = bent_voxels(self._field, stack, edit, self.ambience)
+        else:
+            found = bent_splats(self._field, stack, edit, self.ambience)
+        self._keep(key, found)
+        return found
+
+    def _keep(self, key: Key, found: Patch | SplatPatch | Edit | None) -> None:
+        self._kept[key] = found
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
-        return patch
 
 
 def wants_patch(edit: Edit, moving: bool = False) -> bool:
@@ -141,3 +172,14 @@ def wants_patch(edit: Edit, moving: bool = False) -> bool:
     if edit.keep_source:
         return edit.relight != "none" and not moving
     return edit.fill != "none" or edit.relight != "none"
+
+
+def wants_light(edit: Edit) -> bool:
+    """True for a continuous edit that is shown and takes light along."""
+    return (
+        edit.adjustment == "continuous"
+        and edit.enabled
+        and edit.changes_anything
+        and edit.relight != "none"
+        and edit.is_possible
+    )

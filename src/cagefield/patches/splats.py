@@ -25,7 +25,8 @@ from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import Block, interpolated, world_of
+from cagefield.patches.bending import bending_light, light_box, light_edit
+from cagefield.patches.block import Block, block_of, interpolated, world_of
 from cagefield.patches.extent import patch_box
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.making import Made, made_of
@@ -88,6 +89,30 @@ def splat_patch_of(
         after = voxelised(where_they_are(field, pasted), _box_of(edit, box), voxel)
     made = made_of(grid, EditStack(), edit, ambience, settled=settled, after=after)
     return _Splats.of(field, splats, grid, moved).patch(field, edit, made)
+
+
+def bent_splats(field: SplatField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit:
+    """The edit that changes the light of splats under a continuous edit (`patches.bending`)."""
+    field = with_pasted(field, below)
+    box = light_box(edit, 0.0, ambience.reach)
+    splats = where_they_are(field, _around(field, moved_splats(field, below), box))
+    voxel = voxel_for(splats, box)
+    box = light_box(edit, voxel, ambience.reach)
+    block = block_of(voxelised(splats, box, voxel), EditStack(), box)
+    coarse, light = bending_light(block, edit, ambience)
+    none, points = np.zeros(0, np.int64), np.zeros((0, 3))
+    patch = SplatPatch(
+        field,
+        Cage.box(box.mean(axis=0), box[1] - box[0]),
+        np.zeros((1, 1, 1), bool),
+        light.on_grid(coarse),
+        None,
+        none,
+        points,
+        np.zeros((0, 3, 3)),
+        points,
+    )
+    return light_edit(edit, patch)
 
 
 def _box_of(edit: Edit, box: Array) -> Array:
@@ -244,12 +269,7 @@ class _Splats:
 
 def _new_light(block: Block, light: Lighting | None) -> NewLight:
     """The light on a block; none at all where it stays."""
-    values, known = np.zeros(block.shape, np.float32), np.zeros(block.shape, np.float32)
-    if light is not None:
-        values[light.where] = light.log_ratio
-        known[light.where] = 1.0
-    origin = world_of(block.field, block.low[None])[0]
-    return NewLight(origin, float(block.field.voxel_size.max()), values, known)
+    return (light or Lighting(np.zeros(block.shape, bool), np.zeros(0))).on_grid(block)
 
 
 def _surface(block: Block, fresh: Mask, up: Array) -> tuple[Array, Array]:

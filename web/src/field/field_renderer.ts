@@ -139,6 +139,9 @@ export class FieldRenderer implements SceneDrawer {
     if (shown) await this.take(shown.level, () => turn === this.loading);
   }
 
+  /** Of voxels' edits nothing takes long. */
+  async prepare(): Promise<void> {}
+
   /** The edits that the field is seen through; null for none. Uploads what is other than before. */
   setEdits(edits: PageEdits | null): void {
     this.onGpu.set(edits);

@@ -182,7 +182,7 @@ void main() {
     if (m > 2.0 * halfGrid.x) end = t;
     float run = emptyRun(g, safeInverse(v));
     if (run >= 0.0) {
-      leap = m > 1.0 ? min(0.5 * run, 0.25 * m / max(max(abs(gd.x), abs(gd.y)), abs(gd.z))) : run;
+      leap = m > 1.0 ? min(0.5 * run, 0.25 * m / max(max(abs(gd.x), abs(gd.y)), abs(gd.z))) : run + 0.5 * h;
       leap = max(leap, h);
     }
 #else

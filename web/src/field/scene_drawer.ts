@@ -25,6 +25,8 @@ export interface SceneDrawer<Edits = PageEdits> {
   setSize(width: number, height: number): void;
   setCamera(camera: PinholeCamera): void;
   load(source: ReadableStream<Bytes> | ArrayBuffer, options?: LoadOptions): Promise<void>;
+  /** Does beside the page what takes long of showing edits; `setEdits` with the same edits is then quick. */
+  prepare(edits: Edits): Promise<void>;
   setEdits(edits: Edits | null): void;
   /** Draws what the camera sees; false while there is nothing to draw. */
   render(picture?: Picture): boolean;

@@ -8,7 +8,8 @@ import type { PageEdits } from "../field/page_edits";
 import type { Bytes } from "../field/page_file";
 import type { SceneDrawer } from "../field/scene_drawer";
 import type { Distances, View } from "../field/views";
-import { EDITS_MAGIC, readSplatEdits } from "./splat_edits";
+import { readEditsBeside } from "./edits_reader";
+import { EDITS_MAGIC } from "./splat_edits";
 import type { SplatEdits } from "./splat_edits";
 import { MAGIC } from "./splat_file";
 import { SplatRenderer } from "./splat_renderer";
@@ -99,6 +100,11 @@ export class AnyRenderer implements SceneDrawer<AnyEdits> {
     await this.inner.restore();
   }
 
+  /** Has the splats of edits sorted; of voxels nothing takes long. */
+  async prepare(edits: AnyEdits): Promise<void> {
+    if (this.inner instanceof SplatRenderer && isOfSplats(edits)) await this.inner.prepare(edits);
+  }
+
   /** Edits of what is loaded; null for none. */
   setEdits(edits: AnyEdits | null): void {
     if (this.inner instanceof SplatRenderer) {
@@ -134,7 +140,7 @@ export class AnyRenderer implements SceneDrawer<AnyEdits> {
 
 /** Edits of voxels, what a file leaves out of them from `before`, or of splats, which a file has whole. */
 export async function readAnyEdits(source: ArrayBuffer, before: AnyEdits | null): Promise<AnyEdits> {
-  if (magicOf(new Uint8Array(source)) === EDITS_MAGIC) return await readSplatEdits(source);
+  if (magicOf(new Uint8Array(source)) === EDITS_MAGIC) return await readEditsBeside(source);
   return await readEdits(source, isOfSplats(before) ? null : before);
 }
 

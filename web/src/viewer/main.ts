@@ -1,6 +1,7 @@
 /** The script of exported scenes: their viewer, and what tests and other pages need of it under one name. */
 import { FieldRenderer } from "../field/field_renderer";
 import { readEdits } from "../field/page_edits";
+import { readEditsBeside } from "../splats/edits_reader";
 import { readSplatEdits } from "../splats/splat_edits";
 import { SplatRenderer } from "../splats/splat_renderer";
 import { take } from "./sources";
@@ -12,6 +13,7 @@ interface ViewerApi {
   readEdits: typeof readEdits;
   SplatRenderer: typeof SplatRenderer;
   readSplatEdits: typeof readSplatEdits;
+  readEditsBeside: typeof readEditsBeside;
   /** Takes parts of files that are in the page itself. */
   take: typeof take;
   /** The scene that the page shows. */
@@ -24,7 +26,7 @@ declare global {
   }
 }
 
-window.cagefieldViewer = { FieldRenderer, readEdits, SplatRenderer, readSplatEdits, take };
+window.cagefieldViewer = { FieldRenderer, readEdits, SplatRenderer, readSplatEdits, readEditsBeside, take };
 
 function element(selector: string): HTMLElement {
   const found = document.querySelector<HTMLElement>(selector);

@@ -92,7 +92,8 @@ def look_ahead(
     where a contracted march ends.
 
     A contracted ray is bent outside the inner box: it goes half of the straight run there, and no farther
-    than a quarter of the way to the centre.
+    than a quarter of the way to the centre. Inside, the next sample is amid the first step after the run: at
+    its end all the samples that follow would lie on faces of cells, where the gradient jumps.
     """
     g = q
     h = step
@@ -114,6 +115,8 @@ def look_ahead(
         run = empty_run(bricks, g, safe_inverse(v))
         if run >= 0.0:
             empty = 1
+            if m <= 1.0:
+                run += 0.5 * h
             leap = qd.max(qd.min(run * share, limit), h)
     else:
         run = empty_run(bricks, g, inverse)

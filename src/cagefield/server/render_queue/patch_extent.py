@@ -9,9 +9,10 @@ import numpy as np
 from cagefield.edits import Edit
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.patches.bending import light_box
 from cagefield.patches.extent import patch_box
 from cagefield.patches.light import REACHES, reaches_of
-from cagefield.patches.patcher import wants_patch
+from cagefield.patches.patcher import wants_light, wants_patch
 from cagefield.patches.voxelised import coarsest_voxel
 from cagefield.typing import Array
 
@@ -30,12 +31,18 @@ class PatchExtent:
 
     def boxes(self, edit: Edit) -> Array:
         """Boxes [B,2,3] (min, max) in deformed space outside which the edit, patched, changes nothing."""
-        if not wants_patch(edit):
+        if not (wants_patch(edit) or wants_light(edit)):
             return edit.boxes
         reach = 0.0 if edit.relight == "none" else self._reach
         if isinstance(self._field, VoxelField):
             voxel = float(self._field.voxel_size.max())
         else:
-            voxel = coarsest_voxel(patch_box(edit, 0.0, reach))
-        box = patch_box(edit, voxel, reach)
+            voxel = coarsest_voxel(_box(edit, 0.0, reach))
+        box = _box(edit, voxel, reach)
         return np.concatenate([edit.boxes, box[None]])
+
+
+def _box(edit: Edit, voxel: float, reach: float) -> Array:
+    if edit.adjustment == "continuous":
+        return light_box(edit, voxel, reach)
+    return patch_box(edit, voxel, reach)

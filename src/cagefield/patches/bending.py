@@ -1,0 +1,106 @@
+"""The light of a continuous edit: what it bends takes its contact shadows along.
+
+A sample of the deformed field shows a canonical point; the light on that point is changed before the edit
+takes it anywhere. So this light is an edit of its own, right before the continuous one, that moves nothing:
+its patch shows the surroundings, and what is between the cages, in the light that falls on it once it is
+bent. With F the edit's map to deformed space, the light on a canonical point p with normal n is multiplied by
+
+    o'(F(p), F_*(n)) / o(p, n),
+
+o the openness (`patches.light`) among what is solid, o' among what is solid in deformed space. It is smooth
+and worked out on a grid of at most FINEST vertices an axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit
+from cagefield.edits.patch import Patch, SplatPatch
+from cagefield.edits.stack import EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import SOLID, Block, block_of
+from cagefield.patches.extent import RIM
+from cagefield.patches.light import (
+    Ambience,
+    Lighting,
+    distance_in,
+    lit_vertices,
+    nearness,
+)
+from cagefield.typing import Array, Mask
+from cagefield.warps.device_stack import DeviceStack
+from cagefield.warps.forward import to_deformed
+
+FINEST = 128
+"""Vertices along the longest axis of the grid that the light is worked out on."""
+
+LATTICE = 32
+"""Nodes an axis of the map by which it is found out what is solid in deformed space."""
+
+UNSEEN = 0.03
+"""The log of a change of light that is left out."""
+
+
+def light_box(edit: Edit, voxel: float, reach: float) -> Array:
+    """The box [2,3] (min, max) in which a continuous edit changes the light. World units."""
+    assert edit.outer is not None
+    margin = 1.5 * reach + RIM * voxel
+    return np.asarray(edit.outer.aabb + margin * np.array([[-1.0], [1.0]]))
+
+
+def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, Lighting]:
+    """(a coarser block, what the light on it is multiplied by) once a continuous edit has bent a block."""
+    assert edit.outer is not None
+    coarse = block.pooled(max(1, -(-max(block.shape) // FINEST))).reaching(edit.outer.aabb)
+    where = lit_vertices(coarse)
+    points, normals = coarse.positions(where), coarse.normals[where].astype(np.float64)
+    moved = to_deformed(edit.exact_warp, points, coarse=True)
+    # Normals go with the transposed inverse of the map's Jacobian.
+    turned = np.einsum("nji,nj->ni", np.linalg.inv(moved.jacobian), normals)
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
+    old, new = distance_in(coarse, coarse.solid), distance_in(coarse, _solid_after(coarse, edit))
+    before = nearness(old, points, normals, ambience.reaches)
+    after = nearness(new, moved.points, turned, ambience.reaches)
+    log = ambience.log_openness(after) - ambience.log_openness(before)
+    log[np.abs(log) < UNSEEN] = 0.0
+    return coarse, Lighting(where, log).smoothed(coarse)
+
+
+def bent_voxels(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit | None:
+    """The edit that changes the light of a voxel field under a continuous edit; None where none changes."""
+    box = light_box(edit, float(field.voxel_size.max()), ambience.reach)
+    block = block_of(field, below, box)
+    coarse, light = bending_light(block, edit, ambience)
+    where = block.slot >= 0
+    log = light.at(coarse, block.positions(where))
+    log[np.abs(log) < UNSEEN] = 0.0
+    relit = block.relit(where, np.exp(log))
+    changed = relit.differs(block)
+    if not changed.any():
+        return None
+    region, relit = relit.around(changed, Cage.box(box.mean(axis=0), box[1] - box[0]))
+    return light_edit(edit, Patch(region, relit.layer()))
+
+
+def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:
+    """An edit that moves nothing and shows a patch, for what another one does."""
+    low, high = patch.region.aabb
+    nothing = Cage.box(low, 1e-6 * (high - low))
+    return Edit.delete(nothing, name=edit.name).replace(fill="none", relight="none", patch=patch)
+
+
+def _solid_after(block: Block, edit: Edit) -> Mask:
+    """What is solid [X,Y,Z] of a block once the edit has bent it."""
+    assert edit.outer is not None
+    solid = block.solid.copy()
+    points = block.positions(np.ones(solid.shape, bool))
+    inside = np.flatnonzero(edit.outer.contains(points))
+    stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=LATTICE)]))
+    asked = points[inside].astype(np.float32)
+    canonical, *_ = stack.to_canonical(
+        asked, np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), asked.shape)
+    )
+    solid.reshape(-1)[inside] = block.lookup(block.depth, canonical.astype(np.float64)) > SOLID
+    return solid

@@ -1,0 +1,134 @@
+"""Continuous edits take their contact shadows along: voxels and splats."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.patch import SplatPatch
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.bending import bent_voxels
+from cagefield.patches.block import block_of
+from cagefield.patches.light import Ambience
+from cagefield.patches.patcher import Patcher
+from cagefield.patches.splats import bent_splats
+from cagefield.rendering.renderer import Renderer
+from cagefield.sh import C0
+from splat_rooms import LIGHT, REACH, STRENGTH
+from splat_rooms import room as splat_room
+
+VERTICES = 60
+FLOOR, TOP = -0.4, 0.0
+LIFT = 9 * 2.0 / (VERTICES - 1)
+GAP = 0.1
+"""Between floor and box: the outer cage ends there."""
+
+INNER = Cage.box((0.1, 0.0, -0.13), (0.6, 0.6, 0.38))
+OUTER = Cage.box((0.1, 0.0, 0.13), (1.2, 1.2, 0.94))
+RAISED = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, LIFT))
+
+
+def room(lift: float, resolution: int = VERTICES) -> VoxelField:
+    """A grey floor, and a box so high over it beside the gap; both are shaded by how near the other is."""
+    axis = np.linspace(-1.0, 1.0, resolution)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    edge = axis[1] - axis[0]
+    floor = (z <= FLOOR) & (z > FLOOR - 4.0 * edge)
+    box = (np.abs(x - 0.1) < 0.25) & (np.abs(y) < 0.25) & (z > FLOOR + GAP + lift) & (z < TOP + lift)
+    rgb = np.where(box[..., None], (0.8, 0.3, 0.2), 0.6) * np.ones((*box.shape, 1))
+    from_box, from_floor = (ndimage.distance_transform_edt(~solid) * edge for solid in (box, floor))
+    other = np.where(floor, from_box, from_floor)
+    rgb *= (1.0 - STRENGTH * np.clip(1.0 - other / REACH, 0.0, 1.0))[..., None]
+    away, nearest = ndimage.distance_transform_edt(~(floor | box), return_indices=True)
+    rgb = rgb[tuple(nearest)]
+    vertices = np.flatnonzero(away < 2.0)
+    density = np.where((floor | box).reshape(-1)[vertices], 2.0 / edge, 0.0)
+    return VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]),
+        (resolution,) * 3,
+        vertices,
+        density.astype(np.float32),
+        ((rgb.reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
+    )
+
+
+def cameras() -> tuple[Camera, ...]:
+    """Around the floor, from a little above it."""
+    return turntable((0.1, 0.0, -0.3), 3.0, 3, elevation=0.35, width=80, height=64, fov_x=0.5)
+
+
+def seen(field: VoxelField, edits: EditStack) -> NDArray[np.float32]:
+    """Pictures of a field under edits."""
+    renderer = Renderer(field).with_edits(edits)
+    return np.stack([renderer.render(camera, background="white").rgb for camera in cameras()])
+
+
+def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
+    """PSNR of two pictures."""
+    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
+
+
+def test_what_is_lifted_takes_its_shade_off_the_ground():
+    field, truth = room(0.0), seen(room(LIFT), EditStack())
+    light = bent_voxels(field, EditStack(), RAISED, LIGHT)
+    assert light is not None
+    bare, lit = (
+        db(seen(field, EditStack([RAISED])), truth),
+        db(seen(field, EditStack([light, RAISED])), truth),
+    )
+    assert lit > bare + 5.0
+
+
+def test_light_alone_moves_nothing_and_far_things_keep_theirs():
+    field = room(0.0)
+    light = bent_voxels(field, EditStack(), RAISED, LIGHT)
+    assert light is not None
+    block = block_of(field, EditStack([light]), field.bounds)
+    plain = block_of(field, EditStack(), field.bounds)
+    np.testing.assert_array_equal(block.density, plain.density)
+    both = (block.slot >= 0) & (plain.slot >= 0)
+    moved = np.abs(block.colours(both) - plain.colours(both)).max(axis=1)
+    away = np.linalg.norm(plain.positions(both)[:, :2] - [0.1, 0.0], axis=1)
+    assert moved.max() > 0.1 and moved[away > 0.25 * np.sqrt(2.0) + 1.3 * REACH].max() < 0.01
+
+
+def test_what_stays_where_it_is_has_no_other_light():
+    still = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 1e-6))
+    assert bent_voxels(room(0.0), EditStack(), still, LIGHT) is None
+
+
+@pytest.mark.parametrize("kind", ["voxels", "splats"])
+def test_patchers_put_the_light_before_its_edit(kind: str):
+    field = room(0.0) if kind == "voxels" else splat_room(True)
+    edit = RAISED.replace(name="raise")
+    patcher = Patcher(field, (), lambda camera: pytest.fail("the light is known"))
+    patcher.__dict__["ambience"] = LIGHT
+    light, same = patcher.patched([edit])
+    assert same is edit and light.patch is not None and light.changes_anything
+    assert patcher.patched([edit])[0] is light
+    assert tuple(patcher.patched([edit], moving=True)) == (edit,)
+    assert tuple(patcher.patched([edit], bending=False)) == (edit,)
+    assert tuple(patcher.patched([edit.replace(relight="none")])) == (edit.replace(relight="none"),)
+    patcher.__dict__["ambience"] = Ambience((), ())
+    assert tuple(patcher.patched([edit])) == (edit,)
+
+
+def test_splats_under_what_is_lifted_get_lighter():
+    field = splat_room(True)
+    on_floor = np.abs(field.means[:, 2]) < 0.01
+    means = field.means + np.where(on_floor, 0.0, 0.15)[:, None].astype(np.float32) * [[0.0, 0.0, 1.0]]
+    field = dataclasses.replace(field, means=means)
+    inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
+    light = bent_splats(field, EditStack(), Edit(inner, outer).translate((0.0, 0.0, 0.4)), LIGHT)
+    assert isinstance(light.patch, SplatPatch)
+    log = light.patch.light.at(field.means.astype(np.float64))
+    away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
+    under, far = on_floor & (away == 0.0), on_floor & (away > 1.3 * REACH)
+    assert log[under].mean() > 0.15 and np.abs(log[far]).max() < 0.05
