@@ -22,7 +22,6 @@ from cagefield.exporting import (
     fitting_cameras,
     inside,
     scene_mesh,
-    scene_up,
     upright_turn,
 )
 from cagefield.formats.splat_files import read_splats
@@ -158,7 +157,7 @@ def test_a_scene_with_z_up_stands_upright_in_files(
         assert -10.0 * np.log10(np.square(got.rgb - expected.rgb).mean() + 1e-12) > least
     # Imported, it stands as before: what was low is low on the cameras' pictures.
     imported = import_splats(read)
-    up = scene_up(dataclasses.replace(scene, cameras=imported.cameras))
+    up = dataclasses.replace(scene, cameras=imported.cameras).up
     np.testing.assert_allclose(up, (0, -1, 0), atol=1e-6)
     assert read.means @ up == pytest.approx(-read.means[:, 1], abs=1e-5)
     assert np.median(read.means @ up) == pytest.approx(np.median(field.means[:, 2]), abs=0.01)
@@ -279,8 +278,8 @@ def test_points_lie_on_the_surface(capsys: pytest.CaptureFixture[str], tmp_path:
 
 
 def test_up_is_the_cameras(tmp_path: Path) -> None:
-    np.testing.assert_allclose(scene_up(ball_scene()), (0, 0, 1))
-    np.testing.assert_allclose(scene_up(dataclasses.replace(ball_scene(), cameras={})), (0, 0, 1))
+    np.testing.assert_allclose(ball_scene().up, (0, 0, 1))
+    np.testing.assert_allclose(dataclasses.replace(ball_scene(), cameras={}).up, (0, 0, 1))
 
 
 # ---- refusals ----

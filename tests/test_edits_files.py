@@ -39,7 +39,8 @@ edits:
 
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
     text = textwrap.dedent((files.__doc__ or "").split("\n\n")[1])
-    first, second = parse_edits(text)
+    first, second, third = parse_edits(text)
+    assert third == Edit.paste("../microphone", Cage.box((0, 0, 0), 2), name="microphone")
     assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8
     assert second.deleted and second.inner == Cage.box((2, 0, 0), 0.5)
 

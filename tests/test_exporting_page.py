@@ -183,7 +183,14 @@ class _Patches:
     def __init__(self, moving: Patch, settled: Patch) -> None:
         self.moving, self.settled = moving, settled
 
-    def patched(self, edits: Sequence[Edit], *, moving: bool = False, bending: bool = True) -> EditStack:
+    def patched(
+        self,
+        edits: Sequence[Edit],
+        *,
+        moving: bool = False,
+        bending: bool = True,
+        preserve_opacity: bool = True,
+    ) -> EditStack:
         patch = self.moving if moving else self.settled
         return EditStack(
             edit if edit.adjustment == "continuous" else edit.replace(patch=patch) for edit in edits
@@ -213,7 +220,12 @@ def test_patches_are_those_of_edits_that_have_begun_and_of_whole_ones() -> None:
         rows = arrays[f"rows.{state}"]
         have = [rows[44 * edit + row, 3] for edit in range(2) for row in (5, 7)]
         assert [place for place in have if place > 0] == places
-    keys_of = [layer_key(layer) for patch in (patches.moving, patches.settled) for layer in patch.layers]
+    keys_of = [
+        layer_key(layer)
+        for patch in (patches.moving, patches.settled)
+        for layer in (patch.under, patch.part)
+        if layer is not None
+    ]
     named = [[keys_of.index(header["layer_keys"][number]) for number in numbers] for numbers in shown]
     # 0 is what a move left; 1 and 2 are a whole edit's.
     assert list(dict.fromkeys(map(tuple, named))) == [(), (0,), (1, 2, 0), (1, 2, 1, 2)]

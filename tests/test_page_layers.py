@@ -15,6 +15,8 @@ from cagefield.formats.page_edits import MAGIC, VERSION, encode_changed_edits, e
 from cagefield.formats.page_field import BRICK, encode_page_field
 from cagefield.formats.page_file import from_byte_planes, unpack
 from cagefield.formats.page_layers import encode_layer
+from cagefield.patches.joining import joined
+from cagefield.patches.pasting import SourceContent, pasted
 from cagefield.rendering.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
@@ -71,6 +73,25 @@ def test_the_page_draws_patches_as_the_kernel_does(page: FieldPage, name: str) -
 def test_the_page_draws_patches_of_an_unbounded_field(page: FieldPage) -> None:
     field = lumps(0, True)
     check_patched(page, field, stack(field, "after another"))
+
+
+@pytest.mark.parametrize("contracted", [False, True])
+def test_the_page_draws_pastes_as_the_kernel_does(page: FieldPage, contracted: bool) -> None:
+    """Another scene's lumps, twice: turned and scaled, put over the field's own."""
+    field, other, seen = lumps(1, contracted), lumps(2, False, seed=9), camera(contracted)
+    cage = Cage.box((0.1, 0.0, 0.0), 0.9)
+    shown = pasted(SourceContent(other, EditStack()), cage, field)
+    edit = Edit.paste("other", cage).scale(0.6).rotate((0.2, 0.0, 0.7)).replace(pasted=shown)
+    first = edit.translate((0.1, -0.6, 0.1) if contracted else (-0.5, 0.3, 0.2))
+    first = first.replace(pasted=joined(field, EditStack(), first))
+    assert first.pasted is not shown
+    renderer = Renderer(field, EditStack([TURNED, first, edit.translate((0.6, -0.2, 0.3))]))
+    page.edit(None)
+    page.load(encode_page_field(field))
+    page.edit(encode_page_edits(renderer))
+    check_alike(renderer.render(seen, normals=True), page.draw(seen))
+    bare = Renderer(field, EditStack([TURNED])).render(seen)
+    assert bare is not None and psnr(page.draw(seen).rgb, bare.rgb) < (38.0 if contracted else 25.0)
 
 
 def test_the_page_draws_patches_as_the_oracle_does(page: FieldPage) -> None:

@@ -225,11 +225,14 @@ def test_layers_lie_behind_the_field_and_apart() -> None:
         other(field, np.array(box), (0.5, 0.5, 0.5))
         for box in ([[-1, -1, -1], [0, 0, 0]], [[0, 0, 0], [1, 1, 1]])
     )
-    places = places_of((low, high, low))
+    again = dataclasses.replace(low)
+    places = places_of((low, high, again))
     spans = [
         (p + slices_of(layer)[0], p + slices_of(layer)[1])
-        for p, layer in zip(places, (low, high, low), strict=True)
+        for p, layer in zip(places, (low, high, again), strict=True)
     ]
+    # The same layer twice is there once.
+    assert places_of((low, high, low, again)) == (places[0], places[1], places[0], places[2])
     assert all(p % ALIGNED == 0 for p in places) and spans[0][0] >= 24
     assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
 

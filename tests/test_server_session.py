@@ -396,7 +396,7 @@ def test_colours_stay_with_the_order_of_the_edits() -> None:
 
 def test_edit_texts_go_out_and_come_in() -> None:
     s = session(ARM.translate((0.1, 0, 0)), CUP)
-    text = s.edit_text(1)
+    text = dump_edits(EditStack([s.document.entry(1).edit]))
     assert s.load_edits(text, append=True) == 1
     moved = ARM.translate((0.1, 0, 0))
     assert [entry.edit for entry in s.document.entries] == [moved, CUP, moved]

@@ -9,6 +9,9 @@
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
                           "preserve_opacity": false if edits leave density as it is}
 
+Edits may paste from other scenes (`Edit.source`), whose folders stay where they are: relative paths of
+sources are relative to SCENE.
+
 A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
 a half of each.
 """
@@ -17,6 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Callable, Mapping
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -24,18 +28,22 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cagefield.atomic_files import replaced_file, replaced_folder
+from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera
-from cagefield.edits import EditStack, LatticeError
+from cagefield.edits import Edit, EditStack, LatticeError
 from cagefield.edits.files import dump_edits, load_edits
+from cagefield.edits.placing import placed_paste
+from cagefield.edits.sources import rebased
 from cagefield.errors import SceneError
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.patches.pasting import content_box
 from cagefield.rendering.render_result import Background, RenderResult, background_rgb
 from cagefield.scene_files import (
     CAMERAS,
@@ -53,6 +61,8 @@ from cagefield.scene_files import (
     recover,
     write_json,
 )
+from cagefield.scene_sources import SceneSources
+from cagefield.typing import Array
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -77,7 +87,8 @@ class Scene:
     when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
     the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
     the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
-    `preserve_opacity` multiplies density by |J d| where an edit moved it.
+    `preserve_opacity` multiplies density by |J d| where an edit moved it. `folder` is the one that it was
+    opened from: sources of pastes are relative to that, or to the working directory where it is None.
 
     Raises:
         CagefieldError: a background outside [0, 1].
@@ -92,6 +103,7 @@ class Scene:
     gains: tuple[tuple[float, float, float], ...] = ()
     original: NerfField | None = None
     preserve_opacity: bool = True
+    folder: Path | None = None
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -191,6 +203,7 @@ class Scene:
                 gains=gains,
                 original=original,
                 preserve_opacity=preserve_opacity,
+                folder=folder.absolute(),
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -199,7 +212,7 @@ class Scene:
         """Writes the scene folder `path`, complete or not at all.
 
         With `overwrite` a scene that is there is replaced once the new one is complete; other files in its
-        folder are kept.
+        folder are kept. Relative sources of pastes are written as that folder sees them.
 
         Raises:
             SceneError: something else is there, or a scene and no `overwrite`.
@@ -209,7 +222,8 @@ class Scene:
             self.field.save(draft / FIELD)
             if self.original is not None:
                 save_nerf(self.original, draft / ORIGINAL)
-            (draft / EDITS).write_text(dump_edits(self.edits), encoding="utf-8")
+            edits = EditStack(rebased(self.edits, self.folder, target))
+            (draft / EDITS).write_text(dump_edits(edits), encoding="utf-8")
             write_json(
                 {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
                 draft / CAMERAS,
@@ -240,9 +254,36 @@ class Scene:
             raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
         scene = dataclasses.replace(self, edits=edits)
         scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
-        if "patcher" in self.__dict__:
-            scene.__dict__["patcher"] = self.patcher
+        for shared in ("patcher", "_pasting"):
+            if shared in self.__dict__:
+                scene.__dict__[shared] = self.__dict__[shared]
         return scene
+
+    def paste(
+        self,
+        source: Path | str,
+        *,
+        at: ArrayLike | None = None,
+        size: float | None = None,
+        name: str | None = None,
+    ) -> Edit:
+        """The edit that pastes all of another scene, a scene folder or a file of splats, upright.
+
+        Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
+        and scale it as any other edit. `at` [3] is where the middle of its base stands, beside what this
+        scene holds where it is left out; `size` is its longest edge, in this scene's units, as large as it is
+        there where it is left out. A relative path is relative to the scene's folder.
+
+        Raises:
+            CagefieldError: there is no such scene, or its field is of another kind than this one's.
+        """
+        look = self.sources.look(os.fspath(source), self.field)
+        up = self.up
+        if at is None:
+            grown = 1.0 if size is None else size / float((look.box[1] - look.box[0]).max())
+            at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
+        found = Path(source).resolve().stem if name is None else name
+        return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
         """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.
@@ -337,6 +378,7 @@ class Scene:
     @cached_property
     def patcher(self) -> Patcher:
         """What fills the places that edits uncover, and takes light along; shared by `with_edits`."""
+        from cagefield.patches.pastes import Pastes
         from cagefield.patches.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of
 
@@ -345,12 +387,23 @@ class Scene:
         def render(camera: Camera) -> RenderResult:
             return cast(RenderResult, plain().render(camera, background="black", normals=True))
 
-        return Patcher(self.field, self.cameras.get("train", ()), render)
+        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self.sources))
 
     @property
     def patched_edits(self) -> EditStack:
-        """The edits with the patches that they ask for."""
-        return self.patcher.patched(self.edits.edits)
+        """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
+        return self.patcher.patched(self.edits.edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def up(self) -> Array:
+        """The unit direction [3] that is up for the scene's cameras; z where it has none."""
+        poses = [camera.c2w for group in self.cameras.values() for camera in group]
+        return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+    @cached_property
+    def sources(self) -> SceneSources:
+        """The scenes that edits paste from."""
+        return SceneSources(self.folder, _open_pasted, self.__dict__.get("_pasting", ()))
 
     @cached_property
     def _exact_splats(self) -> AnyRenderer:
@@ -359,6 +412,23 @@ class Scene:
     @property
     def _exact_edits(self) -> EditStack:
         return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
+
+
+def _beside(box: Array, up: Array, size: Array) -> Array:
+    """A point [3] at the foot of a box [2,3], beside it: with room for a box of a size [3], turned anyhow."""
+    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
+    aside = np.eye(3)[int(np.argmin(np.abs(up)))]
+    aside = aside - (aside @ up) * up
+    aside /= np.linalg.norm(aside)
+    reach = half @ np.abs(aside) + 0.5 * float(np.linalg.norm(size))
+    return np.asarray(middle + reach * aside - half @ np.abs(up) * up)
+
+
+def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:
+    """The scene of a folder, which is being pasted into the scenes of other ones."""
+    scene = Scene.open(folder)
+    scene.__dict__["_pasting"] = pasting
+    return scene
 
 
 def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:

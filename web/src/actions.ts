@@ -88,6 +88,7 @@ export class Actions {
   /** Continuous to move, and all discrete kinds back to continuous. */
   toggleKind(): void {
     this.withSelected((edit) => {
+      if (edit.source !== null) return this.app.say("what is pasted stays a copy; remove it to take it away", "warning");
       const kind = edit.kind === "continuous" ? "move" : "continuous";
       this.app.send({ type: "change", edit: edit.id, kind });
     });

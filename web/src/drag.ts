@@ -134,8 +134,10 @@ export class Drag {
   private after(operation: Operation): Cages {
     const { inner, deformed, outer } = this.start;
     switch (this.target) {
-      case "field":
-        return { inner, deformed: apply(operation, deformed), outer };
+      case "field": {
+        const there = apply(operation, deformed);
+        return { inner: this.edit.source === null ? inner : there, deformed: there, outer };
+      }
       case "outer":
         return { inner, deformed, outer: outer && apply(operation, outer) };
       case "inner":
@@ -151,6 +153,6 @@ export class Drag {
   /** The inner cage after a drag in Set mode; the deformed one with it, as long as nothing tells them apart. */
   private innerAfter(operation: Operation): { inner: Posed; deformed: Posed } {
     const inner = apply(operation, this.start.inner);
-    return { inner, deformed: this.edit.operations.length === 0 ? inner : this.start.deformed };
+    return { inner, deformed: this.edit.operations.length === 0 || this.edit.source !== null ? inner : this.start.deformed };
   }
 }

@@ -2,6 +2,7 @@
 import type { Actions } from "./actions";
 import type { App } from "./app";
 import type { Pointer } from "./pointer";
+import type { Dialogs } from "./ui/dialogs";
 
 export interface Binding {
   /** As shown: "Ctrl+Shift+Z". Several may do the same. */
@@ -12,7 +13,7 @@ export interface Binding {
 }
 
 /** All bindings. Letters that have another meaning during a drag are not among them. */
-export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: { saveAs: () => void }): Binding[] {
+export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: Pick<Dialogs, "saveAs" | "paste">): Binding[] {
   return [
     { group: "Tools", keys: ["1", "G"], what: "Move", run: () => actions.tool("translate") },
     { group: "Tools", keys: ["2", "R"], what: "Rotate", run: () => actions.tool("rotate") },
@@ -30,6 +31,7 @@ export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: 
     { group: "Edits", keys: ["Delete", "Backspace"], what: "Remove", run: () => actions.remove() },
     { group: "Edits", keys: ["Ctrl+D"], what: "Duplicate", run: () => actions.duplicate() },
     { group: "Edits", keys: ["Ctrl+C"], what: "Copy as text; Ctrl+V pastes", run: () => actions.copy() },
+    { group: "Edits", keys: ["Shift+V"], what: "Paste from another scene", run: () => dialogs.paste() },
     { group: "Edits", keys: ["Ctrl+Z"], what: "Undo", run: () => actions.command("undo") },
     { group: "Edits", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], what: "Redo", run: () => actions.command("redo") },
     { group: "View", keys: ["F"], what: "Focus on the cage, or on the surface under the mouse", run: () => actions.focus(pointer.at.x, pointer.at.y) },

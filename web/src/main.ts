@@ -32,7 +32,7 @@ listenForKeys(app, actions, pointer, keys);
 const panel = h(
   "aside",
   { class: "panel" },
-  editsList(app, actions),
+  editsList(app, actions, questions),
   options(app, actions),
   historyList(app),
   pathList(app, actions, questions),

@@ -25,6 +25,7 @@ export type PageMessage =
   | Apply
   | SetCage
   | Place
+  | PasteScene
   | FitInner
   | OuterMargin
   | Change
@@ -98,12 +99,13 @@ export interface MoveCornersBy {
 /**
  * A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
  *
- * The "path" is the camera path between its keyframes, as its video goes.
+ * The "path" is the camera path between its keyframes, as its video goes; "sources" are the scenes and files
+ * that can be pasted.
  */
 export interface Ask {
   type: "ask";
   request: number;
-  what: "surface" | "edit_text" | "grid" | "path";
+  what: "surface" | "edit_text" | "grid" | "path" | "sources";
   x?: number;
   y?: number;
   edit?: number | null;
@@ -270,6 +272,15 @@ export interface OuterMargin {
   margin: number;
 }
 /**
+ * A new edit: all of another scene, or of a file of splats, upright on the surface amid the picture.
+ *
+ * The path is one of the answer to `ask` for "sources", or any other under the server's root.
+ */
+export interface PasteScene {
+  type: "paste_scene";
+  source: string;
+}
+/**
  * A new edit: a cage pair around the surface seen at a pixel (x, y in [0,1] of the camera's picture).
  *
  * Without a pixel it goes around the middle of what the camera sees.
@@ -361,7 +372,7 @@ export interface SetPath {
   loop?: boolean;
 }
 /**
- * The answer to an `ask`: a point and its normal, a text, a grid, or the path; or nothing.
+ * The answer to an `ask`: a point and its normal, a text, a grid, the path, or sources; or nothing.
  */
 export interface Answer {
   type: "answer";
@@ -371,6 +382,7 @@ export interface Answer {
   text: string | null;
   grid: Vec3[][];
   stills: Still[];
+  sources: string[];
   failed: boolean;
 }
 /**
@@ -403,6 +415,7 @@ export interface EditState {
   enabled: boolean;
   locked: boolean;
   kind: "continuous" | "move" | "copy" | "delete";
+  source: string | null;
   shell: "flow" | "trilinear";
   falloff: "smooth" | "linear";
   width: number;

@@ -5,7 +5,7 @@ import { box } from "./cages";
 export function edit(change: Partial<EditState> = {}): EditState {
   const inner: Corners = box([0, 0, 0], [0.6, 0.6, 0.6]);
   return {
-    id: 1, name: "edit 1", colour: "#4cc2ff", enabled: true, locked: false, kind: "continuous",
+    id: 1, name: "edit 1", colour: "#4cc2ff", enabled: true, locked: false, kind: "continuous", source: null,
     shell: "flow", falloff: "smooth", width: 1, lattice: 0, lattice_error: null, fill: "surroundings", relight: "occlusion",
     inner, deformed: inner, outer: box([0, 0, 0], [1.6, 1.6, 1.6]),
     pivot: [0, 0, 0], inner_pivot: [0, 0, 0], outer_pivot: [0, 0, 0], operations: [], problem: null, ...change,

@@ -121,7 +121,7 @@ describe("what is drawn", () => {
 describe("keys", () => {
   const nobody: unknown = {};
   it("each mean one thing, and all that the editor needs is there", () => {
-    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, { saveAs: vi.fn() }).flatMap((binding) => binding.keys);
+    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, { saveAs: vi.fn(), paste: vi.fn() }).flatMap((binding) => binding.keys);
     expect(new Set(all).size).toBe(all.length);
     for (const key of ["1", "2", "3", "G", "R", "S", "F", "H", "D", "Tab", "Delete", "Escape", "Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+S", "Ctrl+C", "?"]) {
       expect(all).toContain(key);
@@ -132,7 +132,7 @@ describe("keys", () => {
   it("switch what is filled, and whether shadows go along, where there is such a thing", () => {
     const store = new Store();
     const app = { store, send: vi.fn(), say: vi.fn() };
-    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, { saveAs: vi.fn() });
+    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, { saveAs: vi.fn(), paste: vi.fn() });
     const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
     store.set({ state: state({ edits: [edit({ kind: "move" })] }) });
     press("U");
@@ -146,6 +146,19 @@ describe("keys", () => {
     press("U");
     expect(app.say).toHaveBeenCalledOnce();
     expect(app.send).toHaveBeenCalledTimes(3);
+  });
+
+  it("ask what to paste from another scene, and what is pasted stays a copy", () => {
+    const store = new Store({ state: state({ edits: [edit({ kind: "copy", source: "/root/chair" })] }) });
+    const app = { store, send: vi.fn(), say: vi.fn() };
+    const questions = { saveAs: vi.fn(), paste: vi.fn() };
+    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, questions);
+    const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
+    press("Shift+V");
+    expect(questions.paste).toHaveBeenCalledOnce();
+    press("D");
+    expect(app.send).not.toHaveBeenCalled();
+    expect(app.say).toHaveBeenCalledOnce();
   });
 
   it("are named as they are shown", () => {

@@ -33,6 +33,7 @@ class ApplyEdits:
         from cagefield.cli.report import describe_edits
         from cagefield.edits import EditStack
         from cagefield.edits.files import load_edits
+        from cagefield.edits.sources import rebased
         from cagefield.scene import Scene
         from cagefield.scene_files import check_destination
 
@@ -42,10 +43,15 @@ class ApplyEdits:
                 f"without -o the scene {self.scene} itself would change; give -o NEW_SCENE, or --overwrite"
             )
         scene = Scene.open(self.scene)
-        stack = load_edits(self.edits)
+        stack = EditStack(
+            rebased(load_edits(self.edits), self.edits.absolute().parent, self.scene.absolute())
+        )
         if self.append:
             stack = EditStack([*scene.edits, *stack])
         stack.check()
+        for edit in stack:
+            if edit.source is not None and edit.enabled:
+                scene.with_edits(EditStack([edit.replace(relight="none")])).patched_edits  # noqa: B018  a scene that is not there
         lines = describe_edits(stack, scene.field)
         if not self.check:
             check_destination(destination, self.overwrite)

@@ -171,7 +171,7 @@ class Export:
 
     def _splats(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes splats; a line of figures."""
-        from cagefield.exporting import baked, inside, scene_up, upright
+        from cagefield.exporting import baked, inside, upright
         from cagefield.fields.splat import SplatField
         from cagefield.formats.splat_files import write_splats
         from cagefield.formats.splat_import import axis_of, nearest_up
@@ -182,7 +182,7 @@ class Export:
             splats, figures = self._fitted(scene)
         if cages:
             splats = splats.take(inside(cages, splats.means))
-        up = scene_up(scene) if self.up is None else axis_of(self.up)
+        up = scene.up if self.up is None else axis_of(self.up)
         turned = upright(splats, up)
         write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
@@ -213,14 +213,14 @@ class Export:
 
     def _mesh(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes a mesh; a line of figures."""
-        from cagefield.exporting import inside, scene_mesh, scene_up
+        from cagefield.exporting import inside, scene_mesh
         from cagefield.formats.mesh_files import write_mesh
 
         with progress_bar("Meshing") as move:
             mesh = scene_mesh(scene, self.resolution, lambda done: move(done, 1.0, ""))
         if cages:
             mesh = mesh.kept(inside(cages, mesh.positions))
-        write_mesh(self.out, mesh, scene_up(scene))
+        write_mesh(self.out, mesh, scene.up)
         return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours"
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:

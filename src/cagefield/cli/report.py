@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield import hex_determinant
+from cagefield.cage_checks import format_vector
 from cagefield.edits.options import Clone
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
@@ -65,6 +66,8 @@ def _title(edit: Edit) -> str:
     hidden = "" if edit.enabled else " (hidden)"
     if edit.deleted:
         kind = "delete"
+    elif edit.source is not None:
+        kind = f"paste from {edit.source}"
     elif edit.adjustment == "discrete":
         kind = "discrete copy" if edit.keep_source else "discrete move"
     else:
@@ -90,6 +93,11 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
         return
     for operation in edit.operations:
         yield f"{operation.noun} {operation}"
+    if edit.source is not None:
+        low, high = edit.deformed.aabb
+        box = " x ".join(f"{edge:.4g}" for edge in high - low)
+        yield f"shows what its cage holds there in {box} around {format_vector(0.5 * (low + high))}"
+        return
     if not edit.changes_anything:
         yield "changes nothing: the inner cage is where it was"
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -18,8 +19,9 @@ from cagefield.edits.limits import as_text, flow_reach, largest_safe
 from cagefield.edits.names import problem_of_name
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import FEATHER, Adjustment, Fill, Relight, problem_of_options
-from cagefield.edits.patch import Patch, SplatPatch
+from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
+from cagefield.edits.sources import problem_of_source
 from cagefield.errors import CageError, DeviceError, EditError
 from cagefield.fields.voxel import VoxelField
 from cagefield.typing import Array
@@ -67,8 +69,11 @@ class Edit:
       leaves it as it was trained, a `Clone` copies a cage.
     - relight: "occlusion" takes contact shadows along; "none" leaves them.
     - feather: of a discrete edit of voxels, how many voxels along the faces of V blend into what is there.
+    - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
+      then a cage in that scene's space, which the operations take to where it stands in this one. Relative
+      to the folder of this scene, or absolute. See `Edit.paste`.
     - patch: of a discrete edit, what the field that it was made for shows where something was taken away
-      (`cagefield.patches.patched`); no part of edit files.
+      (`cagefield.patches`); no part of edit files, as `pasted`, what a paste shows there.
 
     Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
     shells are reported by `check`, which every evaluation calls.
@@ -90,7 +95,9 @@ class Edit:
     fill: Fill = "surroundings"
     relight: Relight = "occlusion"
     feather: float = FEATHER
+    source: str | None = None
     patch: Patch | SplatPatch | None = None
+    pasted: Pasted | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "operations", tuple(self.operations))
@@ -107,6 +114,8 @@ class Edit:
             fading=(self.falloff, self.width),
             lattice=self.lattice,
             surroundings=(self.fill, self.relight, self.feather),
+        ) or problem_of_source(
+            self.source, is_copy=self.adjustment == "discrete" and self.keep_source and not self.deleted
         )
         if problem is not None:
             raise self._error(problem)
@@ -116,6 +125,14 @@ class Edit:
     def delete(cls, cage: Cage, *, name: str = "") -> Edit:
         """The edit that empties a cage."""
         return cls(cage, adjustment="discrete", deleted=True, name=name)
+
+    @classmethod
+    def paste(cls, source: str | os.PathLike[str], cage: Cage, *, name: str = "") -> Edit:
+        """The edit that copies what a cage holds in another scene: a scene folder, or a file of splats.
+
+        `Scene.paste` makes one of the whole scene, of a size and at a place that suit.
+        """
+        return cls(cage, adjustment="discrete", keep_source=True, source=os.fspath(source), name=name)
 
     @cached_property
     def deformed(self) -> Cage:
@@ -166,13 +183,27 @@ class Edit:
 
     @cached_property
     def changes_anything(self) -> bool:
-        """False when the inner cage is where it was (and not deleted): the map is the identity."""
-        return self.deleted or not np.array_equal(self.inner.corners, self.deformed.corners)
+        """False when the inner cage is where it was (and not deleted or pasted): the map is the identity."""
+        if self.deleted or self.source is not None:
+            return True
+        return not np.array_equal(self.inner.corners, self.deformed.corners)
+
+    @property
+    def under(self) -> VoxelField | None:
+        """What its region shows instead of nothing, if that is a layer."""
+        return self.patch.under if isinstance(self.patch, Patch) else None
+
+    @property
+    def part(self) -> VoxelField | None:
+        """What V shows instead of the field, if that is a layer."""
+        if self.pasted is not None:
+            return self.pasted.part
+        return self.patch.part if isinstance(self.patch, Patch) else None
 
     @property
     def layers(self) -> tuple[VoxelField, ...]:
-        """The layers of its patch, if it has one."""
-        return () if self.patch is None else self.patch.layers
+        """`under` and `part`, those of them that there are."""
+        return tuple(layer for layer in (self.under, self.part) if layer is not None)
 
     @property
     def boxes(self) -> Array:
@@ -198,10 +229,14 @@ class Edit:
     def exact_warp(self) -> Warp:
         """The map of this edit without its lattice. Raises `EditError` as `check` does."""
         self.check()
-        inner = HexahedronMap(self.inner, self.deformed)
+        place = None if self.pasted is None else self.pasted.place
+        inner = HexahedronMap(place or self.inner, self.deformed)
         if self.adjustment == "discrete" or self.outer is None:
             region = None if self.patch is None else self.patch.read_instead
-            return DiscreteWarp(self.inner, None if self.deleted else inner, self.keep_source, region)
+            foreign = self.source is not None
+            return DiscreteWarp(
+                self.inner, None if self.deleted else inner, self.keep_source, region, foreign
+            )
         return ContinuousWarp(inner, self.outer, self._last_shell)
 
     @cached_property
@@ -356,6 +391,14 @@ class Edit:
             raise self._error("a shell needs an outer cage")
         falloff = Falloff(self.falloff, self.width)
         return SHELLS[self.shell](self.inner, self.deformed, self.outer, falloff)
+
+    def unread(self) -> EditError:
+        """The error of a paste without what it pastes."""
+        return self.cannot_paste("nobody has read it; render the edit as part of a Scene")
+
+    def cannot_paste(self, why: str) -> EditError:
+        """The error of a paste that cannot be shown."""
+        return self._error(f"pastes from {self.source}: {why}")
 
     def _error(self, message: str) -> EditError:
         return EditError(f'edit "{self.name}": {message}' if self.name else f"edit: {message}")

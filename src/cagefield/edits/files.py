@@ -25,6 +25,10 @@
         fill: surroundings                    # if left out: what it stood on goes on; or none, or a cage
                                               # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
         relight: occlusion                    # or none: contact shadows go along, if left out
+      - name: microphone
+        source: ../microphone                 # a copy from another scene, or a file of splats: relative to
+                                              # this file's folder, or absolute
+        inner: {center: [0, 0, 0], size: 2}   # in that scene's space
 
 Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
 world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
@@ -153,6 +157,7 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
             "fill",
             "relight",
             "feather",
+            "source",
         ),
     )
     inner = _cage(keys["inner"])
@@ -160,7 +165,10 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
     options: dict[str, Any] = {"deleted": deleted}
     if "outer" in keys and not keys["outer"].is_null:
         options["outer"] = _outer(keys["outer"], inner)
-    options["adjustment"] = "discrete" if deleted else "continuous"
+    pasted = "source" in keys and not keys["source"].is_null
+    options["adjustment"] = "discrete" if deleted or pasted else "continuous"
+    if pasted:
+        options["source"], options["keep_source"] = keys["source"].text(), not deleted
     if "adjustment" in keys:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
     if "fill" in keys:
@@ -292,12 +300,14 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
     content: dict[str, Any] = {"name": edit.name} if edit.name else {}
     if edit.deleted:
         content["delete"] = True
+    if edit.source is not None:
+        content["source"] = edit.source
     content["inner"] = _from_cage(edit.inner)
     if edit.outer is not None:
         content["outer"] = _margin(edit.inner, edit.outer) or _from_cage(edit.outer)
     if edit.operations:
         content["operations"] = [_from_operation(operation) for operation in edit.operations]
-    if not edit.deleted:
+    if not edit.deleted and edit.source is None:
         content["adjustment"] = edit.adjustment
     if edit.adjustment == "continuous" or edit.shell != "flow":
         content["shell"] = edit.shell
@@ -305,7 +315,7 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["falloff"] = edit.falloff
     if edit.width != 1.0:
         content["width"] = edit.width
-    if edit.keep_source:
+    if edit.keep_source and edit.source is None:
         content["keep_source"] = True
     if isinstance(edit.fill, Clone):
         content["fill"] = {"clone": _from_cage(edit.fill.source)}

@@ -16,13 +16,21 @@ def problem_of_name(name: object) -> str | None:
     """Why an edit may not have a name, and the cure; None where it may."""
     if not isinstance(name, str):
         return f"an edit's name must be text, got {type(name).__name__}"
-    bad = next((c for c in name if unicodedata.category(c) in _UNSAFE), None)
-    if bad is not None:
-        what = "half a character (a lone surrogate)" if "\ud800" <= bad <= "\udfff" else "a control character"
-        return f"the name {json.dumps(name[:40])} holds {what}, U+{ord(bad):04X}; leave it out"
+    problem = problem_of_text(name)
+    if problem is not None:
+        return f"the name {problem}"
     if len(name) > MOST_CHARACTERS:
         return f"the name has {len(name)} characters, a name has at most {MOST_CHARACTERS}; shorten it"
     return None
+
+
+def problem_of_text(text: str) -> str | None:
+    """The text and what it holds that no file, page and terminal takes; None where that is nothing."""
+    bad = next((c for c in text if unicodedata.category(c) in _UNSAFE), None)
+    if bad is None:
+        return None
+    what = "half a character (a lone surrogate)" if "\ud800" <= bad <= "\udfff" else "a control character"
+    return f"{json.dumps(text[:40])} holds {what}, U+{ord(bad):04X}; leave it out"
 
 
 def mended(name: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from cagefield.edits.edit import Edit
 
-DELETED_FROM = 0.5
-"""The part from which on a deletion is there: there is no half of it."""
+WHOLE_FROM = 0.5
+"""The part from which on a deletion or a paste is there: there is no half of it."""
 
 
 def partial_edit(edit: Edit, part: float) -> Edit | None:
@@ -13,8 +13,8 @@ def partial_edit(edit: Edit, part: float) -> Edit | None:
 
     Raises `EditError` where an operation leads, at that part, to an impossible cage.
     """
-    if edit.deleted:
-        return edit if part >= DELETED_FROM else None
+    if edit.deleted or edit.source is not None:
+        return edit if part >= WHOLE_FROM else None
     if part >= 1.0:
         return edit
     return edit.replace(operations=tuple(operation.part(part) for operation in edit.operations))

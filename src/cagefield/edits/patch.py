@@ -1,4 +1,4 @@
-"""What takes the place of the field where a discrete edit took something away.
+"""What takes the place of the field where a discrete edit took something away, or brought something in.
 
 A patch belongs to an edit and to the field that it was made for (`cagefield.patches`); it is no part of an
 edit file. It is read in deformed space of the edits before its own.
@@ -36,11 +36,6 @@ class Patch:
     def read_instead(self) -> Cage | None:
         """Where, outside of V, layers are read and not the field."""
         return self.region
-
-    @property
-    def layers(self) -> tuple[VoxelField, ...]:
-        """`under`, and `part` where there is one."""
-        return (self.under,) if self.part is None else (self.under, self.part)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +89,6 @@ class SplatPatch:
         """None: splats have no layers."""
         return None
 
-    @property
-    def layers(self) -> tuple[VoxelField, ...]:
-        """None."""
-        return ()
-
     def takes_away(self, points: Array) -> Mask:
         """[N], True for points [N,3] whose splats go."""
         if not self.gone.any():
@@ -107,3 +97,18 @@ class SplatPatch:
         inside = ((g >= 0) & (g < self.gone.shape)).all(axis=1)
         g[~inside] = 0
         return np.asarray(self.gone[tuple(g.T)] & inside)
+
+
+@dataclass(frozen=True, eq=False)
+class Pasted:
+    """What a paste (`Edit.source`) shows in the field that it was made for.
+
+    Attributes:
+        part: of voxels, a layer, which has in `place` what V^c holds in the other scene; place: a cage in the
+            field's grid.
+        splats: of splats, those in V^c, in the other scene's space.
+    """
+
+    part: VoxelField | None = None
+    place: Cage | None = None
+    splats: SplatField | None = None

@@ -199,9 +199,11 @@ class EditStack:
             mapped = edit.warp.to_canonical(p[rows])
             p[rows], J[rows] = mapped.points, mapped.jacobian @ J[rows]
             number -= len(edit.layers)
-            layer[rows[mapped.lost]] = number if edit.layers else -1
-            if len(edit.layers) > 1:
-                layer[rows[mapped.inside]] = number + 1
+            layer[rows[mapped.lost]] = number if edit.under is not None else -1
+            if edit.part is not None:
+                layer[rows[mapped.inside]] = number + len(edit.layers) - 1
+            elif edit.source is not None:
+                raise edit.unread()
         if viewdirs is None:
             return CanonicalSamples(p, None, None, J, layer)
         d = _points(viewdirs, "viewdirs")

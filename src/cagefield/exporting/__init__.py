@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from cagefield.cages import Cage
-from cagefield.camera_paths import shared_up
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import EditStack
 from cagefield.edits.files import load_edits, parse_edits
@@ -55,7 +54,7 @@ def baked(scene: Scene) -> SplatField:
     """The splats of a scene of splats as its edits make them. Raises EditError for an edit that cannot be."""
     if not isinstance(scene.field, SplatField):
         raise CagefieldError("the scene holds voxels, no splats; fit splats to it")
-    return baked_splats(scene.field, scene.edits, preserve_opacity=scene.preserve_opacity)
+    return baked_splats(scene.field, scene.patched_edits, preserve_opacity=scene.preserve_opacity)
 
 
 def fitted_splats(
@@ -94,18 +93,12 @@ def fitting_cameras(scene: Scene) -> Cameras:
     bounds = edited_bounds(scene.field.bounds, scene.patched_edits)
     beyond = not np.allclose(bounds, scene.field.bounds)
     if not train or (beyond and not scene.field.unbounded):
-        train += _rings(bounds, scene_up(scene))
+        train += _rings(bounds, scene.up)
     if not test:
         train, test = tuple(c for n, c in enumerate(train) if n % 8 or len(train) < 4), train[::8]
     train, test = _evenly(train, MOST_VIEWS), _evenly(test, MOST_HELD_OUT)
     middle, spacing = scene.field.center, scene.field.sample_spacing
     return tuple(_sized(c, middle, spacing) for c in train), tuple(_sized(c, middle, spacing) for c in test)
-
-
-def scene_up(scene: Scene) -> NDArray[np.float64]:
-    """The unit direction [3] that is up for a scene's cameras; z where it has none."""
-    poses = [camera.c2w for group in scene.cameras.values() for camera in group]
-    return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
 
 
 def upright(splats: SplatField, up: ArrayLike) -> SplatField:

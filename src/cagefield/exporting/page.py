@@ -20,7 +20,7 @@ from cagefield.atomic_files import replaced_folder
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.exporting import FOV_X, scene_up
+from cagefield.exporting import FOV_X
 from cagefield.exporting.path_states import PathEdits, path_edits
 from cagefield.exporting.splat_path_states import splat_path_edits
 from cagefield.fields.splat import SplatField
@@ -31,6 +31,7 @@ from cagefield.formats.page_splat_edits import encode_page_splat_edits
 from cagefield.formats.page_splats import encode_page_splats
 from cagefield.keyframes import Keyframe, stills
 from cagefield.rendering.deformed_splats import changed_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.renderer import Renderer
 from cagefield.rendering.splat_splitting import split_of
 from cagefield.scene import Scene
@@ -96,7 +97,7 @@ class ScenePage:
             found["path"] = along.data
         header = {
             "start": _view(_start(scene)),
-            "up": scene_up(scene).tolist(),
+            "up": scene.up.tolist(),
             "centre": field.center.tolist(),
             "background": None if scene.background is None else list(scene.background),
             "path": _path(keys, loop),
@@ -164,10 +165,10 @@ def _splat_files(
             "the scene's splats are discs (2DGS), which pages do not draw; "
             "export them as .ply, or render a video"
         )
+    preserve_opacity, edits = scene.preserve_opacity, scene.patched_edits
+    field = with_pasted(field, edits)
     found = {"field": encode_page_splats(field, background=scene.background)}
-    preserve_opacity = scene.preserve_opacity
-    if scene.edits.active:
-        edits = scene.patched_edits
+    if edits.active:
         split = split_of(field, edits)
         changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
         found["edits"] = encode_page_splat_edits(field, changed, packed=True)
@@ -205,7 +206,7 @@ def _start(scene: Scene) -> Camera:
     bounds = scene.field.bounds
     radius = 0.6 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
     return turntable(
-        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene_up(scene), width=400, height=400, fov_x=FOV_X
+        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene.up, width=400, height=400, fov_x=FOV_X
     )[0]
 
 

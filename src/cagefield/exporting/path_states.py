@@ -79,8 +79,9 @@ def path_edits(
     times = state_times(line, edits, MOST_STATES)
     if times is None:
         return None
-    on_way = for_pages(patcher.patched(edits.edits, moving=True))
-    edits = for_pages(patcher.patched(edits.edits, bending=False))
+    kept = renderer.preserve_opacity
+    on_way = for_pages(patcher.patched(edits.edits, moving=True, preserve_opacity=kept))
+    edits = for_pages(patcher.patched(edits.edits, preserve_opacity=kept, bending=False))
     knots = [parts_at(line, edits, t) for t in times]
     unique = list(dict.fromkeys(knots))
     moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]

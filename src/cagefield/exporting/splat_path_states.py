@@ -14,6 +14,7 @@ from cagefield.formats.page_splat_path import SPLAT_BYTES, SplatPathState, encod
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.patches.patcher import Patcher
 from cagefield.rendering.deformed_splats import changed_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_splitting import Split, split_of
 
 BUDGET = 48 << 20
@@ -38,6 +39,8 @@ def splat_path_edits(
         return None
 
     on_way, edits = patcher.patched(edits.edits, moving=True), patcher.patched(edits.edits, bending=False)
+    # With all that is pasted, also in states without it.
+    field = with_pasted(field, edits)
 
     # Split for the whole edits, once, so that the same splats are on their way in all states.
     split: Split | None = split_of(field, edits)

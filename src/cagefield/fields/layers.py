@@ -31,11 +31,14 @@ def slices_of(layer: VoxelField) -> tuple[int, int]:
 
 
 def places_of(layers: Sequence[VoxelField]) -> tuple[int, ...]:
-    """The place of each layer."""
-    places, free = [], 0
+    """The place of each layer; one that is there several times has one place."""
+    places: dict[int, int] = {}
+    free = 0
     for layer in layers:
+        if id(layer) in places:
+            continue
         free = free or -(-layer.resolution[0] // ALIGNED) * ALIGNED
         low, high = slices_of(layer)
-        places.append(free - low)
+        places[id(layer)] = free - low
         free += high - low
-    return tuple(places)
+    return tuple(places[id(layer)] for layer in layers)

@@ -34,6 +34,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.morton import morton_codes
 from cagefield.formats.page_file import pack, unpack
+from cagefield.rendering.pasted_splats import at_rest
 from cagefield.rendering.splat_rasterizer import near_depth
 from cagefield.typing import AnyArray, Float32
 
@@ -88,13 +89,17 @@ def page_order(field: SplatField) -> NDArray[np.int64]:
 def encode_page_splats(
     field: SplatField, *, background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
 ) -> bytes:
-    """The file of a field. Raises FieldError for a field without splats, and for one of discs."""
+    """The file of a field. Raises FieldError for a field without splats, and for one of discs.
+
+    What edits paste (`pasted_splats.with_pasted`) has no opacity in it: their file shows it.
+    """
     if not len(field):
         raise FieldError("the field is empty: it has no splats to show")
     if field.discs:
         raise FieldError("the server draws this scene: its splats are discs (2DGS), which pages do not draw")
     order, ends = _layout(field)
     centre = field.center
+    shown = np.where(at_rest(field), np.float32(0.0), field.opacities)
     steps = np.maximum(np.abs(field.sh[:, 1:]).max(axis=(0, 2), initial=0.0) / 127.0, SH_STEP)
     levels, arrays = [], {}
     for number, (first, end) in enumerate(zip((0, *ends), ends, strict=False)):
@@ -103,7 +108,7 @@ def encode_page_splats(
         parts = {
             "chunks": chunks,
             "means": means,
-            **encode_shapes(field.quaternions[rows], field.log_scales[rows], field.opacities[rows]),
+            **encode_shapes(field.quaternions[rows], field.log_scales[rows], shown[rows]),
             "colours": byte_pairs(np.clip(32768 + np.round(field.sh[rows, 0] / COLOUR_STEP), 0, 65535).T),
             "sh": (128 + np.round(field.sh[rows, 1:] / steps[:, None])).astype(np.uint8).transpose(1, 2, 0),
         }

@@ -193,11 +193,12 @@ class Block:
 AnyField = NDArray[np.floating] | NDArray[np.bool_]
 
 
-def block_of(field: VoxelField, below: EditStack, box: Array) -> Block:
+def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacity: bool = True) -> Block:
     """The block that holds a world-space box [2,3], as edits make the field.
 
     Where these leave the field alone its vertices are taken as they are. Where they move it, density and
-    colours are interpolated, and colours turned; where they leave nothing, density is 0.
+    colours are interpolated, and colours turned; where they leave nothing, density is 0. What they stretch is
+    thinner where they `preserve_opacity`, by the mean over directions, |det J|^(1/3).
     """
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
     g = field.grid_coordinates(corners)
@@ -210,7 +211,7 @@ def block_of(field: VoxelField, below: EditStack, box: Array) -> Block:
     if not below.active:
         return block
     parts = [
-        _changed(block, below, np.arange(first, min(first + AT_ONCE, block.density.size)))
+        _changed(block, below, np.arange(first, min(first + AT_ONCE, block.density.size)), preserve_opacity)
         for first in range(0, block.density.size, AT_ONCE)
     ]
     rows, raw, sh = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -244,7 +245,7 @@ def _stored(field: VoxelField, low: NDArray[np.int64], shape: NDArray[np.int64])
 
 
 def _changed(
-    block: Block, below: EditStack, rows: NDArray[np.int64]
+    block: Block, below: EditStack, rows: NDArray[np.int64], preserve_opacity: bool
 ) -> tuple[NDArray[np.int64], Float32, Float32]:
     """(rows [M], density [M], sh [M,K,3]) of those of some vertices (flat indices) that the edits change."""
     points = world_of(block.field, np.stack(np.unravel_index(rows, block.shape), axis=1) + block.low)
@@ -255,20 +256,28 @@ def _changed(
     mapped = below.to_canonical(points)
     changed = (mapped.points != points).any(axis=1) | (mapped.layer != 0)
     sources = (block.field, *below.layers)
-    read = _read(sources, mapped.layer[changed], mapped.points[changed], mapped.jacobian[changed])
-    return rows[changed], *read
+    jacobian = mapped.jacobian[changed]
+    raw, sh = _read(sources, mapped.layer[changed], mapped.points[changed], jacobian)
+    return rows[changed], raw * _stretch(jacobian) if preserve_opacity else raw, sh
 
 
 def sampled(
-    field: VoxelField, below: EditStack, points: Array, turn: Array | None = None
+    field: VoxelField,
+    below: EditStack,
+    points: Array,
+    turn: Array | None = None,
+    *,
+    preserve_opacity: bool = True,
 ) -> tuple[Float32, Float32]:
     """(density [N] before its clamp, sh [N,K,3]) of a field under edits at points [N,3].
 
-    Colours are turned as the edits turn them and, after that, as the Jacobians `turn` [N,3,3] do.
+    Colours are turned as the edits turn them and, after that, as the Jacobians `turn` [N,3,3] do; density as
+    for `block_of`.
     """
     mapped = below.to_canonical(points)
     jacobian = mapped.jacobian if turn is None else mapped.jacobian @ np.linalg.inv(turn)
-    return _read((field, *below.layers), mapped.layer, mapped.points, jacobian)
+    raw, sh = _read((field, *below.layers), mapped.layer, mapped.points, jacobian)
+    return raw * _stretch(jacobian) if preserve_opacity else raw, sh
 
 
 def _read(
@@ -300,6 +309,11 @@ def interpolated(field: VoxelField, points: Array) -> tuple[Float32, Float32]:
         raw += weight * field.density[slot]
         sh += weight[:, None, None] * field.sh[slot]
     return raw.astype(np.float32), sh.astype(np.float32)
+
+
+def _stretch(jacobian: Array) -> Float32:
+    """|det J|^(1/3) [N]: |J d|, in the mean over directions."""
+    return np.cbrt(np.abs(np.linalg.det(jacobian))).astype(np.float32)
 
 
 def _turns(jacobian: Array) -> Array:

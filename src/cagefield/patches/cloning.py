@@ -23,17 +23,26 @@ NEAREST = 24
 """Differences at the rim that a vertex takes the mean of."""
 
 
-def cloned(block: Block, below: EditStack, inner: Cage, source: Cage, inside: Mask, surface: Mask) -> Block:
+def cloned(
+    block: Block,
+    below: EditStack,
+    cages: tuple[Cage, Cage],
+    inside: Mask,
+    surface: Mask,
+    preserve_opacity: bool = True,
+) -> Block:
     """The block with the vertices in V^c, `inside` [X,Y,Z], showing what is in the source cage.
 
-    surface [X,Y,Z]: the surface vertices around V^c, to whose colours it is blended.
+    cages: (V^c, the source cage). surface [X,Y,Z]: the surface vertices around V^c, to whose colours it is
+    blended. `preserve_opacity` as for `block_of`.
     """
+    inner, source = cages
     where = np.asarray(inside)
     points = block.positions(where)
     within, found, jacobian = HexahedronMap(source, inner)(points)
     density, sh = np.zeros(len(points), np.float32), np.zeros((len(points), *block.sh.shape[1:]), np.float32)
     turn = np.asarray(np.linalg.inv(jacobian), np.float64)
-    density[within], sh[within] = sampled(block.field, below, found, turn)
+    density[within], sh[within] = sampled(block.field, below, found, turn, preserve_opacity=preserve_opacity)
     filled = block.with_density(where, density, slots=True)
     coefficients = filled.sh.copy()
     rows = filled.slot[where]

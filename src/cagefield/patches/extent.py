@@ -17,11 +17,11 @@ def patch_box(edit: Edit, voxel: float, reach: float, *, settled: bool = True) -
     `voxel` is the largest edge of a voxel. `reach` is that of the light (`Ambience.reach`), 0 where the light
     stays. Unless it is `settled`, the light at the part's new place stays, and its seam.
     """
-    box = edit.inner.aabb
+    box = edit.inner.aabb if edit.source is None else edit.deformed.aabb
     margin = max(RIM * voxel, 0.5 * float(np.median(box[1] - box[0])))
     if reach > 0.0:
         margin = max(margin, 1.5 * reach + RIM * voxel)
-    if settled and (reach > 0.0 or edit.feather > 0.0):
+    if settled and (reach > 0.0 or (edit.feather > 0.0 and edit.source is None)):
         moved = edit.deformed.aabb
         box = np.stack([np.minimum(box[0], moved[0]), np.maximum(box[1], moved[1])])
     return np.asarray(box + margin * np.array([[-1.0], [1.0]]))

@@ -60,19 +60,27 @@ class Made:
 
 
 def made_of(
-    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    preserve_opacity: bool = True,
+    after: VoxelField | None = None,
 ) -> Made:
     """What a discrete edit of a field makes of it, under the edits below; `ambience` None leaves the light.
 
     A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
-    is moved to, and keeps the light that it had.
+    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away;
+    `after` is the field with it, where the edit does not say that.
     """
-    work = _Work.of(field, below, edit, ambience, settled)
+    work = _Work.of(field, below, edit, ambience, settled, preserve_opacity, after)
     lighting = part_light = None
     support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
     if ambience is not None and ambience.shows:
         lighting = work.light(ambience)
-        part_light = work.part_light(ambience) if work.settled else None
+        part_light = work.part_light(ambience) if work.settled and edit.source is None else None
     under = _lit(work.emptied, lighting)
     if support is not None:
         hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
@@ -84,15 +92,22 @@ def made_of(
         else:
             under = rebuilt(under, footprint, work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
-        under = cloned(under, below, edit.inner, edit.fill.source, work.inside, work.surface)
+        cages = edit.inner, edit.fill.source
+        under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
     return Made(work, under, lighting, part_light, support)
 
 
 def patch_of(
-    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    preserve_opacity: bool = True,
 ) -> Patch:
     """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
-    made = made_of(field, below, edit, ambience, settled=settled)
+    made = made_of(field, below, edit, ambience, settled=settled, preserve_opacity=preserve_opacity)
     changed = made.under.differs(made.before) | made.inside
     region, under = made.under.around(changed, made.work.region)
     part = made.work.shown_part(made.part_light, made.under)
@@ -107,7 +122,8 @@ def _lit(block: Block, light: Lighting | None) -> Block:
 class _Work:
     """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
 
-    settled: the part is shown at its new place, and casts its shadow there.
+    settled: the part is shown at its new place, and casts its shadow there. pasted [X,Y,Z]: what is solid
+    with a paste, None of another edit.
     """
 
     edit: Edit
@@ -117,21 +133,34 @@ class _Work:
     inside: Mask
     part: Mask
     settled: bool
+    pasted: Mask | None = None
 
     @classmethod
     def of(
-        cls, field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience | None, settled: bool
+        cls,
+        field: VoxelField,
+        below: EditStack,
+        edit: Edit,
+        ambience: Ambience | None,
+        settled: bool,
+        preserve_opacity: bool,
+        after: VoxelField | None,
     ) -> _Work:
         settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
         reach = ambience.reach if ambience is not None and ambience.shows else 0.0
         box = patch_box(edit, voxel, reach, settled=settled)
-        before = block_of(field, below, box)
+        before = block_of(field, below, box, preserve_opacity=preserve_opacity)
+        region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
+        if edit.source is not None:
+            shown, stack = (field, below.append(edit)) if after is None else (after, EditStack())
+            pasted = block_of(shown, stack, box, preserve_opacity=preserve_opacity).solid
+            none = np.zeros(before.shape, bool)
+            return cls(edit, region, before, before, none, none, settled, pasted)
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
         emptied = before
         if not edit.keep_source:
             emptied = before.with_density(inside, np.zeros(int(inside.sum()), np.float32))
-        region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         return cls(edit, region, before, emptied, inside, before.solid & inside, settled)
 
     @cached_property
@@ -163,6 +192,8 @@ class _Work:
         solid = self.emptied.solid.copy()
         if not self.settled:
             return solid
+        if self.pasted is not None:
+            return self.pasted
         phi = HexahedronMap(self.edit.inner, self.edit.deformed)
         inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))
         solid.reshape(-1)[inside] = self.before.lookup(self.before.depth, canonical) > SOLID
@@ -196,7 +227,7 @@ class _Work:
 
     def shown_part(self, light: Lighting | None, there: Block) -> Block | None:
         """The content of V^c as it is put into `there`; no more has colours. None where it stays."""
-        feather = self.edit.feather if self.settled else 0.0
+        feather = self.edit.feather if self.settled and self.edit.source is None else 0.0
         if light is None and feather == 0.0:
             return None
         block = _lit(self.before, light)

@@ -9,12 +9,14 @@ from typing import cast
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.patch import Patch, SplatPatch
+from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import bent_voxels
+from cagefield.patches.joining import joined
 from cagefield.patches.light import Ambience, ambience_of
 from cagefield.patches.making import patch_of
+from cagefield.patches.pastes import Pastes
 from cagefield.patches.seen import seen_pairs
 from cagefield.patches.splats import bent_splats, splat_patch_of
 from cagefield.patches.voxelised import voxelised_whole
@@ -30,7 +32,8 @@ class Patcher:
     """Gives discrete edits the patches that their `fill` and `relight` ask for.
 
     `cameras` are those that the field was photographed from: how contact shadows show is found in pictures
-    from there by `render`, which draws the field without edits, with normals.
+    from there by `render`, which draws the field without edits, with normals. Pastes show what `pastes`
+    reads.
     """
 
     def __init__(
@@ -38,9 +41,11 @@ class Patcher:
         field: VoxelField | SplatField,
         cameras: Sequence[Camera],
         render: Callable[[Camera], RenderResult],
+        pastes: Pastes | None = None,
     ) -> None:
-        self._field, self._cameras, self._render = field, cameras, render
+        self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
+        self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
     def patched(
         self,
@@ -48,6 +53,7 @@ class Patcher:
         *,
         moving: bool = False,
         bending: bool = True,
+        preserve_opacity: bool = True,
         proceed: Callable[[], None] | None = None,
     ) -> EditStack:
         """The stack of the edits, in order, with their patches.
@@ -58,13 +64,22 @@ class Patcher:
         While an edit is `moving` its patch shows what it left, without the shadow of the part at its new
         place: this does not depend on where that is. Edits that stay meanwhile keep the patches they have.
         `proceed` is called between patches, and may raise.
+
+        Raises `EditError` for a paste of a scene that is not there, or that cannot be pasted.
         """
         made: list[Edit] = []
+        feathers = isinstance(self._field, VoxelField)
+        if self._pastes is not None:
+            edits = self._pastes.read(edits, self._field, preserve_opacity=preserve_opacity, proceed=proceed)
         for edit in edits:
-            if wants_patch(edit):
+            if edit.pasted is not None and isinstance(self._field, VoxelField):
                 if proceed is not None:
                     proceed()
-                patch = self._patch(tuple(made), edit, moving)
+                edit = edit.replace(pasted=self._joined(tuple(made), edit, moving, preserve_opacity))
+            if wants_patch(edit, feathers=feathers):
+                if proceed is not None:
+                    proceed()
+                patch = self._patch(tuple(made), edit, moving, preserve_opacity)
                 edit = edit if patch is None else edit.replace(patch=patch)
             elif bending and not moving and wants_light(edit):
                 if proceed is not None:
@@ -72,7 +87,23 @@ class Patcher:
                 light = self._light(tuple(made), edit)
                 made += [] if light is None else [light]
             made.append(edit)
+        while len(self._pasted) > max(KEPT, len(made)):
+            self._pasted.popitem(last=False)
         return EditStack(made)
+
+    def _joined(
+        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+    ) -> Pasted | None:
+        """What a paste shows; of one that moves, without what it is put over, unless that is known."""
+        assert isinstance(self._field, VoxelField)  # splats are put between others
+        stack = EditStack(below)
+        key: Key = (*stack.active, edit.pasted, edit.deformed, preserve_opacity)
+        if key not in self._pasted:
+            if moving:
+                return edit.pasted
+            self._pasted[key] = joined(self._field, stack, edit, preserve_opacity=preserve_opacity)
+        self._pasted.move_to_end(key)
+        return self._pasted[key]
 
     @cached_property
     def ambience(self) -> Ambience:
@@ -82,25 +113,31 @@ class Patcher:
             return ambience_of(self._field, pairs)
         return ambience_of(voxelised_whole(self._field), pairs)
 
-    def _patch(self, below: tuple[Edit, ...], edit: Edit, moving: bool) -> Patch | SplatPatch | None:
+    def _patch(
+        self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
+    ) -> Patch | SplatPatch | None:
         """The patch of an edit; None for one that wants none while it moves."""
         stack = EditStack(below)
         # A drag does not wait for the light to be found out about.
         known = not moving or "ambience" in self.__dict__
         relit = edit.relight == "occlusion" and known and self.ambience.shows
-        kind = edit.deleted, edit.keep_source, edit.fill, edit.feather
+        if edit.source is not None and not relit:
+            return None
+        kind = edit.deleted, edit.keep_source, edit.fill, edit.feather, edit.pasted, preserve_opacity
         what: Key = (*stack.active, edit.inner, *kind, relit)
         settled: Key = (*what, edit.deformed if relit or edit.feather > 0.0 else None)
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Patch | SplatPatch", self._kept[key])
-        if not wants_patch(edit, moving):
+        if not wants_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
         ambience = self.ambience if relit else None
         patch: Patch | SplatPatch
         if isinstance(self._field, VoxelField):
-            patch = patch_of(self._field, stack, edit, ambience, settled=not moving)
+            patch = patch_of(
+                self._field, stack, edit, ambience, settled=not moving, preserve_opacity=preserve_opacity
+            )
         else:
             patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving)
         self._keep(key, patch)
@@ -129,13 +166,17 @@ class Patcher:
             self._kept.popitem(last=False)
 
 
-def wants_patch(edit: Edit, moving: bool = False) -> bool:
-    """True for an edit that is shown, and leaves something to be filled or put into another light."""
+def wants_patch(edit: Edit, moving: bool = False, *, feathers: bool = True) -> bool:
+    """True for an edit that is shown, and leaves something to be filled or put into another light.
+
+    `feathers`: or that has a seam, which splats have not.
+    """
     if edit.adjustment != "discrete" or not (edit.enabled and edit.changes_anything):
         return False
+    seam = feathers and edit.feather > 0.0
     if edit.keep_source:
-        return not moving and (edit.relight != "none" or edit.feather > 0.0)
-    return edit.fill != "none" or edit.relight != "none" or (edit.feather > 0.0 and not edit.deleted)
+        return not moving and (edit.relight != "none" or seam)
+    return edit.fill != "none" or edit.relight != "none" or (seam and not edit.deleted)
 
 
 def wants_light(edit: Edit) -> bool:

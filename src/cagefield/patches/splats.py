@@ -35,6 +35,7 @@ from cagefield.patches.voxelised import voxel_for, voxelised
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.baked_splats import where_they_are
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.sh import C0
 from cagefield.typing import AnyArray, Array, Mask
 from cagefield.warps.inner_map import HexahedronMap
@@ -76,6 +77,7 @@ def splat_patch_of(
     """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
     # Splats overlap: their seams are soft.
     edit = edit.replace(feather=0.0)
+    field = with_pasted(field, below.append(edit))
     reach = ambience.reach if ambience is not None and ambience.shows else 0.0
     place = settled and not edit.deleted
     moved = _around(field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, reach)))
@@ -83,12 +85,17 @@ def splat_patch_of(
     voxel = voxel_for(splats, patch_box(edit, 0.0, reach, settled=place))
     box = patch_box(edit, voxel, reach, settled=place) + 3.0 * voxel * np.array([[-1.0], [1.0]])
     grid = voxelised(splats, _box_of(edit, box), voxel)
-    made = made_of(grid, EditStack(), edit, ambience, settled=settled)
+    after = None
+    if edit.source is not None:
+        pasted = _around(field, moved_splats(field, below.append(edit)), box)
+        after = voxelised(where_they_are(field, pasted), _box_of(edit, box), voxel)
+    made = made_of(grid, EditStack(), edit, ambience, settled=settled, after=after)
     return _Splats.of(field, splats, grid, moved).patch(field, edit, made)
 
 
 def bent_splats(field: SplatField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit:
     """The edit that changes the light of splats under a continuous edit (`patches.bending`)."""
+    field = with_pasted(field, below)
     box = light_box(edit, 0.0, ambience.reach)
     splats = where_they_are(field, _around(field, moved_splats(field, below), box))
     voxel = voxel_for(splats, box)

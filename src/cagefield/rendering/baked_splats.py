@@ -18,6 +18,7 @@ from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.rendering.splat_splitting import split_of
 from cagefield.sh_rotation import rotated_sh
 from cagefield.typing import Array, Float32
@@ -35,6 +36,7 @@ def baked_splats(
     """
     if not edits.active:
         return field
+    field = with_pasted(field, edits)
     moved = moved_splats(field, edits)
     parts = []
     found = split_of(field, edits) if split else None

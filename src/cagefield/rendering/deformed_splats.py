@@ -28,6 +28,7 @@ from cagefield.edits import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.sh import brightened
 from cagefield.typing import Array, Float32, Mask
 
@@ -99,6 +100,7 @@ def deformed_splats(
     Raises:
         EditError: an edit that cannot be evaluated.
     """
+    field = with_pasted(field, edits)
     moved = moved_splats(field, edits, coarse=coarse, proceed=proceed)
     children = None
     if split is not None:
@@ -162,6 +164,8 @@ def _carried(
 class ChangedSplats:
     """What edits change of a field of N splats: M splats that it does not have, and those that go.
 
+    N counts those that edits paste (`pasted_splats.with_pasted`), which are hidden where they are.
+
     Attributes:
         hidden: [N], True where the field's splat is not shown as it is.
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
@@ -189,6 +193,7 @@ def changed_splats(
     proceed: Callable[[], None] | None = None,
 ) -> ChangedSplats:
     """How `deformed_splats`, with the same arguments, differ from the field's own."""
+    field = with_pasted(field, edits)
     moved = moved_splats(field, edits, coarse=coarse, proceed=proceed)
     if split is not None:
         moved = moved.without(split.parents)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.edits import EditStack
+from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.pasted_splats import at_rest, pasted_rows, with_pasted
 
 
 def deformed_splats_reference(
@@ -17,13 +18,20 @@ def deformed_splats_reference(
 
     Each edit alone is `EditStack.to_deformed` of a stack of one; a copy leaves the original besides.
     """
-    source = np.arange(len(field))
-    p, J = field.means.astype(np.float64), np.tile(np.eye(3), (len(field), 1, 1))
+    field = with_pasted(field, edits)
+    source = np.flatnonzero(~at_rest(field))
+    p, J = field.means[source].astype(np.float64), np.tile(np.eye(3), (len(source), 1, 1))
     for edit in edits.active:
         mapped = EditStack([edit]).to_deformed(p)
         shown = ~mapped.hidden
         parts = [(source[shown], mapped.points[shown], (mapped.jacobian @ J)[shown])]
-        if edit.adjustment == "discrete" and edit.keep_source:
+        if edit.source is not None:
+            rows = pasted_rows(field, edit)
+            there = EditStack([Edit(edit.inner, adjustment="discrete", operations=edit.operations)])
+            moved = there.to_deformed(field.means[rows])
+            inside = edit.inner.contains(field.means[rows].astype(np.float64))
+            parts.append((rows[inside], moved.points[inside], moved.jacobian[inside]))
+        elif edit.adjustment == "discrete" and edit.keep_source:
             original = edit.inner.contains(p) & ~edit.deformed.contains(p)
             parts.append((source[original], p[original], J[original]))
         source, p, J = (np.concatenate([part[n] for part in parts]) for n in range(3))

@@ -95,7 +95,7 @@ class DeviceGrid:
         index[:first] = base.index.to_numpy()
         densities, colours = [base.density.to_numpy()], [base.sh.to_numpy()]
         stored = len(densities[0])
-        for layer, place in zip(layers, places, strict=True):
+        for place, layer in dict(zip(places, layers, strict=True)).items():
             vertices, density, sh = _by_brick(layer)
             index[vertices + place * ny * nz] = np.arange(stored, stored + len(vertices), dtype=np.int32)
             stored += len(vertices)

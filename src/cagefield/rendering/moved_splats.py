@@ -5,6 +5,7 @@ an edit) as a whole. With V^c the canonical and V the deformed inner cage of a d
 
 - in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
 - in V but not in V^c: hidden, for V shows what was in V^c.
+- pasted: it goes to V; all others stay.
 
 With a patch, splats around V^c get new light, or go, and new ones fill what was uncovered: copies of others.
 
@@ -23,10 +24,12 @@ from numpy.typing import NDArray
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat import SplatField
+from cagefield.rendering.pasted_splats import at_rest, of_same_scene, pasted_rows
 from cagefield.sh import brightened
 from cagefield.typing import Array, Mask
 from cagefield.warps.discrete import DiscreteWarp
 from cagefield.warps.forward import to_deformed
+from cagefield.warps.inner_map import HexahedronMap
 
 UNSEEN = 0.01
 """The log of a change of light that is left out."""
@@ -63,10 +66,10 @@ class MovedSplats:
         return brightened(harmonics[self.source], self.gains)
 
     @classmethod
-    def at_rest(cls, count: int) -> MovedSplats:
-        """N splats, all in their places."""
+    def at_rest(cls, field: SplatField) -> MovedSplats:
+        """A field's splats, all in their places; those that edits are to paste are shown nowhere."""
         none = np.zeros((0, 3))
-        return cls(np.zeros(count, bool), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
+        return cls(at_rest(field), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
 
     @property
     def is_at_rest(self) -> bool:
@@ -91,9 +94,29 @@ class MovedSplats:
     ) -> MovedSplats:
         """What one more edit makes of a field's. Raises `EditError` where it cannot be evaluated."""
         moved, carried = self._moved(edit, field.means, coarse, proceed)
+        if edit.source is not None:
+            moved, carried = moved._with(edit, field)
         if isinstance(edit.patch, SplatPatch):
             return moved._patched(edit, edit.patch, field, carried)
         return moved
+
+    def _with(self, edit: Edit, field: SplatField) -> tuple[MovedSplats, Array]:
+        """(these and what an edit pastes, where those last rows [C,3] come from)."""
+        rows = pasted_rows(field, edit)
+        inside, points, jacobian = HexahedronMap(edit.deformed, edit.inner)(
+            field.means[rows].astype(np.float64)
+        )
+        gains = None
+        if self.gains is not None:
+            gains = np.concatenate([self.gains, np.ones((len(points), 3))])
+        rows = rows[inside]
+        return MovedSplats(
+            self.left,
+            np.concatenate([self.source, rows]),
+            np.concatenate([self.points, points]),
+            np.concatenate([self.jacobian, jacobian]),
+            gains,
+        ), field.means[rows].astype(np.float64)
 
     def _moved(
         self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
@@ -152,7 +175,7 @@ class MovedSplats:
         in_boxes(field.means, patch.region.aabb[None], inside)
         still = np.flatnonzero(inside & ~self.left)
         points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
-        outside = ~edit.inner.contains(points)
+        outside = np.ones(len(points), bool) if edit.source is not None else ~edit.inner.contains(points)
         gone = patch.takes_away(points) & outside
         log = np.where(outside, patch.light.at(points), 0.0)
         lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
@@ -167,7 +190,7 @@ class MovedSplats:
             (self.source[kept], self.points[kept], self.jacobian[kept], gains[kept]),
             (still[lit], points[lit], turn, np.tile(np.exp(log[lit])[:, None], 3)),
         ]
-        if patch.field is field:
+        if of_same_scene(patch.field, field):
             parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
         return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -191,7 +214,9 @@ def moved_splats(
     coarse: bool = False,
     proceed: Callable[[], None] | None = None,
 ) -> MovedSplats:
-    """A field's splats under edits. Raises `EditError` where an edit cannot be evaluated.
+    """A field's splats under edits, with those that they paste behind them (`pasted_splats.with_pasted`).
+
+    Raises `EditError` where an edit cannot be evaluated.
 
     What the first of the edits made is kept between calls. `coarse` and `proceed` as for `to_deformed`.
     """
@@ -199,7 +224,7 @@ def moved_splats(
     known = known_stacks.setdefault(field, [])
     usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
     start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)
-    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(len(field)), 0)
+    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(field), 0)
     found = [start] if start else []
     for number, edit in enumerate(active[count:], start=count + 1):
         moved = moved.then(edit, field, coarse, proceed)

@@ -48,6 +48,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
+from cagefield.rendering.pasted_splats import descend, descend_from_all, with_pasted
 from cagefield.rendering.splat_profile import ENDS, LEAST_OPAQUE, MOST_OPAQUE, mass_across, part_between
 from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
@@ -103,14 +104,16 @@ def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
 
     The field itself where none is; children come last. Raises as `split_of`.
     """
-    split = split_of(field, edits)
-    return field if split is None else _joined([field.take(~split.parents), split.children])
+    split, field = split_of(field, edits), with_pasted(field, edits)
+    return field if split is None else _joined([_taken(field, ~split.parents), split.children])
 
 
 def split_of(
     field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
 ) -> Split | None:
     """Which splats of a field one Gaussian each does not show under the edits, and their children, or None.
+
+    Those that the edits paste are counted behind the field's (`pasted_splats.with_pasted`).
 
     Known of a field while it lives, for the edits asked for last.
 
@@ -120,6 +123,7 @@ def split_of(
     active = edits.active
     if not active:
         return None
+    field = with_pasted(field, edits)
     known = known_splits.get(field)
     if known is not None and known[0] == active:
         return known[1]
@@ -132,7 +136,10 @@ def split_of(
         parts: list[_Part] = []
         if children is not None:
             stay, others = _settled(children, before, edit, None, most - len(children), proceed)
-            parts = [(children.take(stay), sources[stay]), *((part, sources[rows]) for part, rows in others)]
+            parts = [
+                (_taken(children, stay), sources[stay]),
+                *((part, sources[rows]) for part, rows in others),
+            ]
         stay, others = _settled(
             field, before, edit, parents, most - sum(len(part) for part, _ in parts), proceed
         )
@@ -171,7 +178,7 @@ def _settled(
         if turn == 0:
             stay = split[0]
         else:
-            done.append((found.take(split[0]), sources[split[0]]))
+            done.append((_taken(found, split[0]), sources[split[0]]))
         found, sources = split[1], sources[split[2]]
         room -= len(found)
     return stay, done if found is field else [*done, (found, sources)]
@@ -313,8 +320,11 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
     """The splats that faces go through, in two parts each; of a splat that several cut, the deepest cut."""
     best = np.full(len(rows), np.inf)
     t, direction = np.zeros(len(rows)), np.zeros((len(rows), 3))
-    cuts: list[tuple[Cage, Mask]] = [(edit.inner, np.ones(len(rows), bool))]
-    if not edit.deleted:
+    # A paste hides nothing; its cage is in another scene, where what is pasted was cut already.
+    cuts: list[tuple[Cage, Mask]] = (
+        [] if edit.source is not None else [(edit.inner, np.ones(len(rows), bool))]
+    )
+    if not edit.deleted and edit.source is None:
         # What lands in the deformed cage hides what stays there, but not what leaves.
         cuts.append((edit.deformed, ~edit.inner.contains(points) | edit.keep_source))
     size = np.linalg.norm(A, axis=(1, 2))
@@ -396,7 +406,11 @@ def _parted(
         bounds=field.bounds,
         unbounded=field.unbounded,
     )
-    return stay, parted, n
+    return stay, descend(parted, field, n), n
+
+
+def _taken(field: SplatField, rows: Mask) -> SplatField:
+    return descend(field.take(rows), field, rows)
 
 
 def _joined(parts: list[SplatField]) -> SplatField:
@@ -404,6 +418,7 @@ def _joined(parts: list[SplatField]) -> SplatField:
     means, log_scales, quaternions, opacities, sh = (
         np.concatenate([getattr(part, name) for part in parts]) for name in names
     )
-    return dataclasses.replace(
+    joined = dataclasses.replace(
         parts[0], means=means, log_scales=log_scales, quaternions=quaternions, opacities=opacities, sh=sh
     )
+    return descend_from_all(joined, parts)

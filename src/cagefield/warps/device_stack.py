@@ -84,8 +84,9 @@ class DeviceStack:
             nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
         places = iter(stack.places)
         for number, edit in enumerate(edits):
-            for column, _ in zip((UNDER, PART), edit.layers, strict=False):
-                params[number, column] = next(places)
+            for column, layer in ((UNDER, edit.under), (PART, edit.part)):
+                if layer is not None:
+                    params[number, column] = next(places)
         for number in range(len(edits)):
             params[number, ALONE] = not _meets(params[:number], params[number])
         boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))

@@ -17,13 +17,15 @@ class DiscreteWarp:
     """Move (V shows what was in V^c, the rest of V^c is empty), copy (V^c stays), delete (V^c is empty).
 
     `inner` maps V onto V^c; None deletes, and then `source` is the cage that is emptied. `patched` is the
-    region, V^c and what lies around it, where a patch takes the place of the field (`edits.patch`).
+    region, V^c and what lies around it, where a patch takes the place of the field (`edits.patch`). What V
+    shows is `pasted` where it comes from another scene, so that nothing of this one goes there.
     """
 
     source: Cage
     inner: HexahedronMap | None
     keep_source: bool = False
     patched: Cage | None = None
+    pasted: bool = False
 
     @property
     def region(self) -> Cage | None:
@@ -45,11 +47,14 @@ class DiscreteWarp:
     def to_deformed(self, points: Array) -> Mapped:
         """From V^c: into V, also for a copy (the map is single valued, and the original stays besides).
 
-        Lost are the points of V outside V^c, which the moved content covers, and for a delete those of V^c.
+        Lost are the points of V outside V^c, which the moved content covers, and for a delete those of V^c. A
+        paste leaves all where they are: it is shown with what is there.
         """
         mapped = Mapped.identity(points)
         if self.inner is None:
             mapped.lost[:] = self.source.contains(points)
+            return mapped
+        if self.pasted:
             return mapped
         inside, deformed, J = self.inner.inverse(points)
         mapped.put(inside, deformed, J)

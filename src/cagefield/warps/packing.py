@@ -10,7 +10,6 @@ trilinear shell.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -64,7 +63,12 @@ class PackedEdit(Protocol):
     def boxes(self) -> Array: ...
 
     @property
-    def layers(self) -> Sequence[object]: ...
+    def under(self) -> object | None: ...
+
+    @property
+    def part(self) -> object | None: ...
+
+    def unread(self) -> EditError: ...
 
 
 @kept
@@ -94,6 +98,8 @@ def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
     if isinstance(warp, DiscreteWarp):
         row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
         row[UNDER] = EMPTY
+        if warp.pasted and edit.part is None:
+            raise edit.unread()
         if warp.inner is not None:
             _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
         _record(row, 1, (warp.region or warp.source).corners)

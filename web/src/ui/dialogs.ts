@@ -15,6 +15,7 @@ const FORMS: [ExportSplats["form"], string][] = [
 export interface Dialogs {
   element: HTMLElement;
   saveAs: () => void;
+  paste: () => void;
   download: () => void;
   render: (what: "test_views" | "camera_path") => void;
 }
@@ -45,6 +46,22 @@ export function dialogs(app: App): Dialogs {
         app.send({ type: "save_as", path: path.value, overwrite: overwrite.checked });
       });
       path.select();
+    },
+    paste() {
+      void app.ask({ what: "sources" }).then((answer) => {
+        if (answer === null || answer.failed) return;
+        const splats = app.store.now.hello?.splats === true;
+        if (answer.sources.length === 0) {
+          const what = splats ? "no other scene of splats and no splat file" : "no other scene of voxels";
+          app.say(`${what} lies beside this scene; put one there, or start the editor with --root`, "warning");
+          return;
+        }
+        const source = h("select", { name: "source" }, ...answer.sources.map((path) => h("option", { value: path }, path)));
+        ask("Paste from another scene", "Paste", [h("label", { class: "field" }, h("span", {}, splats ? "Scene or file" : "Scene"), source)], () => {
+          app.expectEdit();
+          app.send({ type: "paste_scene", source: source.value });
+        });
+      });
     },
     download() {
       const form = h("select", {}, ...FORMS.map(([value, label]) => h("option", { value }, label)));

@@ -1,14 +1,15 @@
 /** The list of edits: name, colour, shown or not, locked or not, order; and what can be done to the selected one. */
-import { ChevronDown, ChevronUp, Copy, Eye, EyeOff, FlipHorizontal, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
+import { ChevronDown, ChevronUp, ClipboardPaste, Copy, Eye, EyeOff, FlipHorizontal, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import type { EditState } from "../protocol";
 import { selected } from "../store";
+import type { Dialogs } from "./dialogs";
 import { h, icon, iconButton, section } from "./dom";
 
 const KIND: Record<EditState["kind"], string> = { continuous: "continuous", move: "move", copy: "copy", delete: "delete" };
 
-export function editsList(app: App, actions: Actions): HTMLElement {
+export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "paste">): HTMLElement {
   const list = h("ul", { class: "edits" });
   const empty = h("p", { class: "empty" }, "Double-click the picture to put a pair of cages around what is there.");
   const needSelected: HTMLButtonElement[] = [];
@@ -33,6 +34,7 @@ export function editsList(app: App, actions: Actions): HTMLElement {
     "div",
     { class: "bar" },
     iconButton(Plus, "New edit in the middle of the view; or double-click the picture", () => actions.place(), "add"),
+    iconButton(ClipboardPaste, "Paste from another scene… (Shift+V)", () => dialogs.paste(), "paste-scene"),
     button(Copy, "Duplicate (Ctrl+D)", () => actions.duplicate(), "duplicate"),
     mirrors,
     button(ChevronUp, "Earlier in the stack", () => reorder(-1), "up"),
@@ -67,7 +69,7 @@ export function editsList(app: App, actions: Actions): HTMLElement {
 
 /** All that a row shows, but for whether it is the selected one's. */
 function shown(edit: EditState, index: number): string {
-  return JSON.stringify([index, edit.id, edit.name, edit.colour, edit.kind, edit.enabled, edit.locked, edit.problem]);
+  return JSON.stringify([index, edit.id, edit.name, edit.colour, edit.kind, edit.enabled, edit.locked, edit.problem, edit.source]);
 }
 
 function row(app: App, edit: EditState, index: number): HTMLElement {
@@ -85,7 +87,7 @@ function row(app: App, edit: EditState, index: number): HTMLElement {
     swatch,
     name,
     problem,
-    h("span", { class: "kind" }, KIND[edit.kind]),
+    h("span", { class: "kind", title: edit.source === null ? "" : `from ${edit.source}` }, edit.source === null ? KIND[edit.kind] : "paste"),
     iconButton(edit.enabled ? Eye : EyeOff, edit.enabled ? "Hide (H)" : "Show (H)", () => change({ enabled: !edit.enabled }), "eye"),
     iconButton(edit.locked ? Lock : LockOpen, edit.locked ? "Unlock" : "Lock", () => change({ locked: !edit.locked }), "lock"),
   );

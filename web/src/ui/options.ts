@@ -25,7 +25,7 @@ export function options(app: App, actions: Actions): HTMLElement {
   const operations = h("ol", { class: "operations" });
   const pane = new Pane({ container: host });
   const model = {
-    kind: "continuous", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relights: true,
+    kind: "continuous", from: "", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relights: true,
     margin: 0.2, preserve: false,
     position: point(0, 0, 0), turn: point(0, 0, 0), scale: point(1, 1, 1),
   }; // prettier-ignore
@@ -71,7 +71,9 @@ export function options(app: App, actions: Actions): HTMLElement {
   });
 
   const kind = pane.addFolder({ title: "Kind" });
-  kind.addBinding(model, "kind", { label: "Kind", options: KINDS }).on("change", ({ value }) => change({ kind: value as EditState["kind"] }));
+  const kinds = kind.addBinding(model, "kind", { label: "Kind", options: KINDS });
+  kinds.on("change", ({ value }) => change({ kind: value as EditState["kind"] }));
+  const from = kind.addBinding(model, "from", { label: "Pasted from", readonly: true });
   const continuous = [
     kind.addBinding(model, "shell", { label: "Shell", options: SHELLS }).on("change", ({ value }) => change({ shell: value as EditState["shell"] })),
     kind.addBinding(model, "falloff", { label: "Falloff", options: FALLOFFS }).on("change", ({ value }) => change({ falloff: value as EditState["falloff"] })),
@@ -107,7 +109,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (edit === null) return;
     const { pivot } = leading(app.shown(edit), target(now));
     Object.assign(model, {
-      kind: edit.kind, shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
+      kind: edit.kind, from: edit.source?.split(/[\\/]/).at(-1) ?? "", shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
       error: latticeError(edit), fills: edit.fill !== "none", relights: edit.relight !== "none", preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
     }); // prettier-ignore
     if (marginOf !== edit.id) {
@@ -118,6 +120,8 @@ export function options(app: App, actions: Actions): HTMLElement {
     for (const binding of continuous) binding.hidden = edit.kind !== "continuous";
     falloff.hidden = width.hidden = edit.kind !== "continuous" || edit.shell !== "flow";
     error.hidden = lattice.hidden || edit.lattice === 0;
+    kinds.hidden = edit.source !== null;
+    from.hidden = edit.source === null;
     relights.hidden = !relightable(now);
     fills.hidden = !fillable(now);
     for (const binding of [shell, lattice, fills, relights]) binding.disabled = edit.locked;

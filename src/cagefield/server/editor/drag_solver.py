@@ -16,6 +16,7 @@ from cagefield.edits.limits import largest_safe
 from cagefield.edits.operations import Operation, Triple
 from cagefield.errors import CagefieldError, EditError
 from cagefield.server.editor.document import Entry
+from cagefield.server.editor.pasting import cropped, why_not_cropped
 from cagefield.server.editor.validity import INSIDE_OUT, cause, problem
 
 _ROUNDING = 1e-3
@@ -117,6 +118,8 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
             return False
         return not was_fine or problem(moved) is None
 
+    if edit.source is not None and (refusal := why_not_cropped(edit, operation)) is not None:
+        return Moved(edit, 0.0, refusal)
     part = largest_safe(safe)
     if part >= 1.0:
         return Moved(at(1.0), problem=None if was_fine else problem(at(1.0)))
@@ -128,6 +131,8 @@ def _cages_alone(edit: Edit, target: Target, operation: Operation) -> Moved:
 
 
 def _set_cages(edit: Edit, target: Target, operation: Operation) -> Edit:
+    if edit.source is not None:
+        return cropped(edit, operation.apply(edit.deformed))
     inner = edit.inner if target == "outer" else operation.apply(edit.inner)
     outer = edit.outer
     if outer is not None and target == "outer":

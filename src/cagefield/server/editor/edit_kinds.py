@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 from cagefield.edits import Edit
+from cagefield.errors import EditError
 from cagefield.server.editor.cage_placement import MARGIN, outer_around
 from cagefield.server.editor.document import Entry, Spare
 
@@ -26,6 +27,8 @@ def with_kind(entry: Entry, kind: Kind) -> Entry:
     edit, spare = entry.edit, entry.spare
     if kind == kind_of(edit):
         return entry
+    if edit.source is not None:
+        raise EditError(f'edit "{edit.name}" is pasted, and stays a copy; remove it to take it away')
     kept = Spare(
         edit.operations or spare.operations,
         edit.falloff if _fades(edit) else spare.falloff,

@@ -16,13 +16,15 @@ from pathlib import Path
 
 from cagefield import json_text
 from cagefield.atomic_files import replaced_file
-from cagefield.edits import dump_edits, parse_edits
+from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.files import save_edits
 from cagefield.errors import CagefieldError, SceneError
+from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
+from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
 
@@ -63,7 +65,10 @@ class SceneStore:
         if (self.path / CAMERA_PATH).is_file():
             keys, loop = load_keys(self.path / CAMERA_PATH)
         return Document.of(
-            self.scene.edits, preserve_opacity=self.scene.preserve_opacity, keys=keys, loop=loop
+            absolute(self.scene.edits, self.origin),
+            preserve_opacity=self.scene.preserve_opacity,
+            keys=keys,
+            loop=loop,
         )
 
     def recovered(self) -> Document | None:
@@ -122,6 +127,25 @@ class SceneStore:
             )
         return place
 
+    # ---- other scenes ----
+
+    def written(self, edits: EditStack) -> EditStack:
+        """The edits as a file in the scene's folder has them."""
+        return written(edits, self.path, self.root)
+
+    def admitted(self, edit: Edit) -> Edit:
+        """An edit that a page brings. Raises SceneError where it pastes from outside of `root`."""
+        return admitted(edit, self.path, self.root)
+
+    def source_of(self, name: str) -> Path:
+        """The path of one of them, or of any other in `root`. Raises SceneError for what lies outside."""
+        return source_in(name, self.root, self.root)
+
+    def sources(self) -> list[str]:
+        """What pages may paste, as paths in `root`."""
+        splats = isinstance(self.scene.field, SplatField)
+        return sources_under(self.root, (self.origin, self.path), splats=splats)
+
     @property
     def autosave_path(self) -> Path:
         """The hidden file beside the scene."""
@@ -161,12 +185,12 @@ class SceneStore:
             )
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
-        save_edits(document.stack, self.path / _EDITS)
+        save_edits(self.written(document.stack), self.path / _EDITS)
         self._written = self._fingerprint()  # ours, should the rest not be possible
         if document.keys or (self.path / CAMERA_PATH).exists():
             with replaced_file(self.path / CAMERA_PATH) as draft:
                 draft.write_text(camera_path, encoding="utf-8")
-        self._scene(document).save_manifest(self.path)
+        self._scene(document, self.path).save_manifest(self.path)
         self._done(session)
 
     def save_as(self, session: Session, path: str, overwrite: bool) -> None:
@@ -193,7 +217,7 @@ class SceneStore:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         try:
-            self._scene(document).save(target, overwrite)
+            self._scene(document, target).save(target, overwrite)
         except SceneError as error:
             raise SceneError(
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
@@ -212,9 +236,10 @@ class SceneStore:
         self._kept = None
         self.autosave(session)
 
-    def _scene(self, document: Document) -> Scene:
+    def _scene(self, document: Document, folder: Path) -> Scene:
+        edits = written(document.stack, folder, self.root)
         return dataclasses.replace(
-            self.scene, edits=document.stack, preserve_opacity=document.preserve_opacity
+            self.scene, edits=edits, preserve_opacity=document.preserve_opacity, folder=folder
         )
 
     def _fingerprint(self) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from cagefield.cages import Cage
-from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
+from cagefield.edits import Edit, parse_edits
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import CameraError, EditError
@@ -26,6 +26,7 @@ from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.labels import fresh_name, named, of, option_word
 from cagefield.server.editor.mirror import mirrored
+from cagefield.server.editor.pasting import cropped
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.editor.path_preview import Preview
 from cagefield.server.editor.validity import problem
@@ -38,9 +39,19 @@ LATTICE = 64
 class Session:
     """The document with its history, the selection, and the drags that go on."""
 
-    def __init__(self, document: Document, bounds: Array, voxel: float) -> None:
-        """`bounds` [2,3] and `voxel` are the field's, world units."""
+    def __init__(
+        self,
+        document: Document,
+        bounds: Array,
+        voxel: float,
+        source_problem: Callable[[Edit], str | None] = lambda edit: None,
+    ) -> None:
+        """`bounds` [2,3] and `voxel` are the field's, world units.
+
+        `source_problem` says why the scene that an edit pastes from cannot be had, or None.
+        """
         self.history = History.begin(document)
+        self._source_problem = source_problem
         self.bounds = bounds
         self.voxel = voxel
         self.selected: int | None = document.entries[-1].id if document.entries else None
@@ -78,7 +89,8 @@ class Session:
         """Why an edit cannot be shown, or None; remembered for the edits that were asked about last."""
         if edit in self._problems:
             return self._problems[edit]
-        return self._problems.put(edit, problem(edit) if edit.changes_anything else None)
+        found = problem(edit) if edit.changes_anything else None
+        return self._problems.put(edit, found or self._source_problem(edit))
 
     def drawn(self) -> tuple[Edit, ...]:
         """The edits that the picture shows: enabled, changing something, and possible; or the preview's."""
@@ -179,7 +191,8 @@ class Session:
     def set_cage(self, number: int, which: str, cage: Cage) -> None:
         """The "inner" or "outer" cage by its corners; the field does not move."""
         entry = self._unlocked(number)
-        edit = entry.edit.replace(**{which: cage})
+        pasted = entry.edit.source is not None and which == "inner"
+        edit = cropped(entry.edit, cage) if pasted else entry.edit.replace(**{which: cage})
         self._put(f"Set {which} cage{of(entry)}", replace(entry, edit=edit))
 
     def place(self, point: Array, view_height: float) -> int:
@@ -188,9 +201,16 @@ class Session:
         edit = Edit(inner, outer, name=fresh_name(self.document, "edit"), lattice=LATTICE)
         return self._add("Place cages", edit)
 
+    def paste(self, edit: Edit) -> int:
+        """The number of a new edit that pastes from another scene, selected."""
+        edit = edit.replace(name=fresh_name(self.document, edit.name or "paste"))
+        return self._add("Paste from another scene", edit)
+
     def fit_inner(self, number: int, inner: Cage) -> None:
         """The inner cage as it was fitted to its content."""
         entry = self._unlocked(number)
+        if entry.edit.source is not None:
+            inner = Cage(inner.corners, pivot=entry.edit.inner.pivot)
         self._put(f"Fit inner cage{of(entry)}", replace(entry, edit=entry.edit.replace(inner=inner)))
 
     def outer_margin(self, number: int, margin: float) -> None:
@@ -251,6 +271,8 @@ class Session:
     def mirror(self, number: int, axis: int) -> int:
         """The number of a mirrored copy of an edit, across the plane through the field's middle."""
         entry = self.document.entry(number)
+        if entry.edit.source is not None:
+            raise EditError(f'edit "{entry.edit.name}" is pasted; what is pasted cannot be mirrored')
         edit = mirrored(entry.edit, axis, float(self.bounds[:, axis].mean()))
         edit = edit.replace(name=fresh_name(self.document, entry.edit.name or "edit"))
         return self._add(f"Mirror{of(entry)}", edit, at=self.document.place(number) + 1)
@@ -286,14 +308,13 @@ class Session:
 
     # ---- texts, path, history ----
 
-    def edit_text(self, number: int) -> str:
-        """An edit as the text of an edit file, to be copied."""
-        return dump_edits(EditStack([self.document.entry(number).edit]))
-
-    def load_edits(self, text: str, append: bool) -> int:
+    def load_edits(
+        self, text: str, append: bool, admitted: Callable[[Edit], Edit] = lambda edit: edit
+    ) -> int:
         """How many edits a text held; they replace the stack, or are appended to it.
 
-        Raises EditFileError for a text that holds no edits, CameraError for a camera path's.
+        `admitted` gives each the form that it has here, and raises where a page may not bring it. Raises
+        EditFileError for a text that holds no edits, CameraError for a camera path's.
         """
         if is_path(text):
             raise CameraError(
@@ -301,7 +322,7 @@ class Session:
                 "then start the editor again"
             )
         form = "json" if text.lstrip().startswith("{") else "yaml"
-        edits = list(parse_edits(text, format=form, source="the text", check=False))
+        edits = [admitted(e) for e in parse_edits(text, format=form, source="the text", check=False)]
         document = self.document if append else replace(self.document, entries=())
         for edit in edits:
             document = document.insert(self._entry(edit, document))

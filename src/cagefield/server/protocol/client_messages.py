@@ -147,6 +147,16 @@ class Place(Message):
     y: Annotated[float, Field(ge=0, le=1)] | None = None
 
 
+class PasteScene(Message):
+    """A new edit: all of another scene, or of a file of splats, upright on the surface amid the picture.
+
+    The path is one of the answer to `ask` for "sources", or any other under the server's root.
+    """
+
+    type: Literal["paste_scene"] = "paste_scene"
+    source: Annotated[str, Field(min_length=1, max_length=1000)]
+
+
 class FitInner(Message):
     """Shrinks the inner cage to the dense region inside it."""
 
@@ -240,12 +250,13 @@ class LoadEdits(Message):
 class Ask(Message):
     """A question: "surface" at a pixel (for focus), "edit_text" of an edit (for copying), its "grid"; "path".
 
-    The "path" is the camera path between its keyframes, as its video goes.
+    The "path" is the camera path between its keyframes, as its video goes; "sources" are the scenes and files
+    that can be pasted.
     """
 
     type: Literal["ask"] = "ask"
     request: int
-    what: Literal["surface", "edit_text", "grid", "path"]
+    what: Literal["surface", "edit_text", "grid", "path", "sources"]
     x: Annotated[float, Field(ge=0, le=1)] = 0.5
     y: Annotated[float, Field(ge=0, le=1)] = 0.5
     edit: EditId | None = None
@@ -287,8 +298,8 @@ class CancelJob(Message):
 
 PageMessage: TypeAlias = Annotated[
     CameraMessage | DisplayMessage | PresentedMessage | Drawing | DragBegin | DragMove | DragEnd | DragCancel
-    | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | FitInner | OuterMargin | Change | SceneChange
-    | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
+    | PlayBegin | Play | PlayEnd | Apply | SetCage | Place | PasteScene | FitInner | OuterMargin | Change
+    | SceneChange | Command | Mirror | Reorder | GoTo | SaveAs | LoadEdits | Ask | SetPath | RenderJob
     | ExportSplats | CancelJob,
     Field(discriminator="type"),
 ]  # fmt: skip

@@ -16,6 +16,7 @@ from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
 from cagefield.server.editor.edit_kinds import kind_of
+from cagefield.server.editor.pasting import cage_in_scene
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, operation_messages, server_messages
 from cagefield.server.protocol.common import Corners, Vec3
@@ -96,6 +97,7 @@ def edit_state(
         enabled=edit.enabled,
         locked=entry.locked,
         kind=kind_of(edit),
+        source=edit.source,
         shell=cast(Any, edit.shell),
         falloff=cast(Any, edit.falloff),
         width=edit.width,
@@ -103,11 +105,11 @@ def edit_state(
         relight=edit.relight,
         lattice=edit.lattice or 0,
         lattice_error=error,
-        inner=corners(edit.inner),
+        inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
         outer=None if edit.outer is None else corners(edit.outer),
         pivot=vec3(edit.deformed.pivot),
-        inner_pivot=vec3(edit.inner.pivot),
+        inner_pivot=vec3(cage_in_scene(edit).pivot),
         outer_pivot=None if edit.outer is None else vec3(edit.outer.pivot),
         operations=[f"{operation.noun} {operation}" for operation in edit.operations],
         problem=problem,
@@ -153,7 +155,7 @@ def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
         seq=seq,
         part=moved.part,
         why=moved.why,
-        inner=corners(edit.inner),
+        inner=corners(cage_in_scene(edit)),
         deformed=corners(edit.deformed),
         outer=None if edit.outer is None else corners(edit.outer),
     )

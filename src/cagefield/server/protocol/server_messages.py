@@ -55,6 +55,8 @@ class EditState(Message):
     enabled: bool
     locked: bool
     kind: Kind
+    source: str | None
+    """Of a paste, the scene folder or file that it comes from; its inner cage is where it stands."""
     shell: ShellName
     falloff: FalloffName
     width: float
@@ -125,7 +127,7 @@ class Still(Message):
 
 
 class Answer(Message):
-    """The answer to an `ask`: a point and its normal, a text, a grid, or the path; or nothing."""
+    """The answer to an `ask`: a point and its normal, a text, a grid, the path, or sources; or nothing."""
 
     type: Literal["answer"] = "answer"
     request: int
@@ -136,6 +138,8 @@ class Answer(Message):
     """Polylines of a regular grid through the shell, as the edit bends them; the outer cage's frame."""
     stills: list[Still] = Field(default_factory=list)
     """The path's cameras, evenly spread over its time, from its beginning to its end."""
+    sources: list[str] = Field(default_factory=list)
+    """Scene folders and files of splats under the server's root that can be pasted."""
     failed: bool = False
     """True where it could not be found out; a notice says why."""
 

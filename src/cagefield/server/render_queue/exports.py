@@ -126,7 +126,7 @@ def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bo
     """Writes the splats of a scene's folder under other edits than its own; returns how many there are."""
     import dataclasses
 
-    from cagefield.exporting import baked, scene_up, upright
+    from cagefield.exporting import baked, upright
     from cagefield.formats.splat_files import write_splats
     from cagefield.scene import Scene
 
@@ -134,7 +134,7 @@ def write_edited(scene: str, edits: tuple[EditValues, ...], preserve_opacity: bo
     stack = EditStack(Edit(**values) for values in edits)
     splats = baked(dataclasses.replace(opened, edits=stack, preserve_opacity=preserve_opacity))
     Path(out).parent.mkdir(parents=True, exist_ok=True)
-    write_splats(upright(splats, scene_up(opened)), out)
+    write_splats(upright(splats, opened.up), out)
     return len(splats)
 
 

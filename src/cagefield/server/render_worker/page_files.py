@@ -76,7 +76,12 @@ class PageFiles:
     def _splat_edits(
         self, field: SplatField, shown: Sequence[Edit], task: PageEditsTask, stop: Stop
     ) -> EditsDone | Stopped:
-        """All that edits change of splats, whatever the page has; none is split while something moves."""
+        """All that edits change of splats, whatever the page has; none is split while something moves.
+
+        Raises CagefieldError for pastes, whose colours a page that has loaded its splats does not have.
+        """
+        if any(edit.source is not None for edit in shown):
+            raise CagefieldError("the server draws what is pasted between scenes of splats")
         began, proceed = time.perf_counter(), giving_up(stop)
         try:
             patcher = self._renderers.scene.patcher

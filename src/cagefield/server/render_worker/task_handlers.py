@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.edits import Edit, EditStack
+from cagefield.edits import Edit
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
@@ -26,6 +26,7 @@ from cagefield.server.render_worker.tasks import (
     FitTask,
     FrameTask,
     GridTask,
+    LookTask,
     PageEditsTask,
     PageFieldTask,
     PictureTask,
@@ -74,12 +75,14 @@ class TaskHandlers:
 
     def _answer(
         self,
-        task: SurfaceTask | FitTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
+        task: SurfaceTask | FitTask | LookTask | WarmTask | GridTask | EndJobTask | PageFieldTask,
     ) -> Any:
         if isinstance(task, SurfaceTask):
             return self._surface(task)
         if isinstance(task, FitTask):
             return self._fit(task)
+        if isinstance(task, LookTask):
+            return self._look(task)
         if isinstance(task, WarmTask):
             return self._renderers.warm(task.stage)
         if isinstance(task, EndJobTask):
@@ -131,13 +134,23 @@ class TaskHandlers:
     def _fit(self, task: FitTask) -> list[bool]:
         """Which of the cage's `probes` are dense."""
         field = self._renderers.scene.field
+        if task.source is not None:
+            content = self._renderers.scene.sources.read(task.source)
+            field, edits = content.field, content.edits
+        else:
+            below = self._renderers.edits(task.shown.edits)
+            edits = self._renderers.scene.patcher.patched(below, moving=True, preserve_opacity=False)
         if isinstance(field, SplatField):
-            edits = EditStack(self._renderers.edits(task.shown.edits))
             return dense(task.cage, deformed_splats(field, edits)).tolist()
         from cagefield.rendering.edited_field import EditedField
 
         points = probes(task.cage).astype(np.float32)
-        edits = self._renderers.scene.patcher.patched(self._renderers.edits(task.shown.edits), moving=True)
         edited = EditedField(field, edits, field.bounds, preserve_opacity=False)
         sigma, _ = edited(points, np.tile(np.array([1.0, 0.0, 0.0], np.float32), (len(points), 1)))
         return (sigma * field.sample_spacing > DENSE).tolist()
+
+    def _look(self, task: LookTask) -> tuple[list[list[float]], list[float], list[float]]:
+        """(box, up direction) of what is to be pasted, and this scene's up direction."""
+        scene = self._renderers.scene
+        look = scene.sources.look(task.source, scene.field)
+        return look.box.tolist(), look.up.tolist(), scene.up.tolist()

@@ -78,11 +78,23 @@ class SurfaceTask:
 
 @dataclass(frozen=True)
 class FitTask:
-    """The part of a cage that holds something dense, under the edits below it."""
+    """The part of a cage that holds something dense, under the edits below it.
+
+    Where a `source` is given the cage is in that scene.
+    """
 
     number: int
     shown: Shown
     cage: Cage
+    source: str | None = None
+
+
+@dataclass(frozen=True)
+class LookTask:
+    """What a scene or a file holds that is to be pasted: its box, its up direction, and this scene's."""
+
+    number: int
+    source: str
 
 
 @dataclass(frozen=True)
@@ -162,6 +174,7 @@ Task: TypeAlias = (
     | StillTask
     | SurfaceTask
     | FitTask
+    | LookTask
     | WarmTask
     | ErrorTask
     | GridTask

@@ -71,8 +71,9 @@ def application(
         await attend(websocket, editor.coordinator, editor.hello)
 
     async def edits(_: Request) -> Response:
-        document = editor.coordinator.session.document
-        return _download(dump_edits(document.stack), "edits.yaml", "application/yaml")
+        coordinator = editor.coordinator
+        edits = coordinator.store.written(coordinator.session.document.stack)
+        return _download(dump_edits(edits), "edits.yaml", "application/yaml")
 
     async def open_file(request: Request) -> Response:
         length = request.headers.get("content-length", "")

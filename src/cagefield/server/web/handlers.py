@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 import numpy as np
 
 from cagefield.cages import Cage
+from cagefield.edits import EditStack, dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.pasting import pasted
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.protocol.conversion import (
@@ -23,7 +26,8 @@ from cagefield.server.protocol.conversion import (
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.pictures import Display
-from cagefield.server.render_worker.tasks import FitTask, GridTask, Shown, SurfaceTask, values_of
+from cagefield.server.render_worker.tasks import FitTask, GridTask, LookTask, Shown, SurfaceTask, values_of
+from cagefield.typing import Array
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
 Method = TypeVar("Method", bound=Handler)
@@ -97,7 +101,12 @@ class MessageHandlers:
         if message.what == "edit_text":
             if message.edit is None:
                 raise CagefieldError("choose an edit to copy")
-            return server_messages.Answer(request=message.request, text=self._session.edit_text(message.edit))
+            edit = self._session.document.entry(message.edit).edit
+            text = dump_edits(self._coordinator.store.written(EditStack([edit])))
+            return server_messages.Answer(request=message.request, text=text)
+        if message.what == "sources":
+            sources = await asyncio.to_thread(self._coordinator.store.sources)
+            return server_messages.Answer(request=message.request, sources=sources)
         if message.what == "grid":
             return server_messages.Answer(request=message.request, grid=await self._grid(message.edit))
         if message.what == "path":
@@ -200,24 +209,43 @@ class MessageHandlers:
 
     @_handles(client_messages.Place)
     async def _place(self, message: client_messages.Place) -> None:
+        anywhere = message.x is None or message.y is None
+        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
+        point, height = await self._seen(x, y, anywhere=anywhere)
+        self._session.place(point, height)
+        self._coordinator.changed()
+
+    async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
+        """The point [3] of the surface seen at a pixel, and the height of what the picture shows there.
+
+        Where none is seen, `anywhere` takes the middle of the field.
+        """
         camera = self._page.camera
         if camera is None:
             raise CagefieldError("the page has sent no camera yet; try again")
-        anywhere = message.x is None or message.y is None
-        x, y = (0.5, 0.5) if message.x is None or message.y is None else (message.x, message.y)
         found = await self._surface(x, y)
         if found is None and not anywhere:
             raise CagefieldError("there is no surface under the mouse; double-click on the object")
         point = np.array(found[0]) if found is not None else self._session.bounds.mean(axis=0)
-        distance = float(np.linalg.norm(point - camera.origin))
-        self._session.place(point, view_height(camera, distance))
+        return point, view_height(camera, float(np.linalg.norm(point - camera.origin)))
+
+    @_handles(client_messages.PasteScene)
+    async def _paste_scene(self, message: client_messages.PasteScene) -> None:
+        path = self._coordinator.store.source_of(message.source)
+        box, up, own_up = await self._coordinator.ask(lambda number: LookTask(number, str(path)))
+        point, height = await self._seen(0.5, 0.5, anywhere=True)
+        edit = pasted(
+            str(path), path.stem[:100], np.array(box), np.array(up), point, np.array(own_up), height
+        )
+        self._session.paste(edit)
         self._coordinator.changed()
 
     @_handles(client_messages.FitInner)
     async def _fit_inner(self, message: client_messages.FitInner) -> None:
-        cage: Cage = self._session.document.entry(message.edit).edit.inner
+        edit = self._session.document.entry(message.edit).edit
+        cage: Cage = edit.inner
         below = Shown(values_of(self._session.below(message.edit)))
-        dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage))
+        dense = await self._coordinator.ask(lambda number: FitTask(number, below, cage, edit.source))
         if self._session.document.entry(message.edit).edit.inner == cage:
             self._session.fit_inner(message.edit, fitted(cage, np.array(dense)))
         self._coordinator.changed()
@@ -281,7 +309,7 @@ class MessageHandlers:
 
     @_handles(client_messages.LoadEdits)
     def _load_edits(self, message: client_messages.LoadEdits) -> None:
-        self._session.load_edits(message.text, message.append)
+        self._session.load_edits(message.text, message.append, self._coordinator.store.admitted)
         self._coordinator.changed()
 
     @_handles(client_messages.SetPath)

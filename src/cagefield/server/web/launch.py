@@ -21,6 +21,7 @@ from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
 from cagefield.scene import Scene
 from cagefield.scene_files import FIELD, is_scene
+from cagefield.server.editor.pasted_sources import source_problem
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
@@ -53,7 +54,7 @@ def open_cached(
     scene = Scene.open(path)
     store = SceneStore(scene, path, source, root)
     store.lock()
-    session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
+    session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing, source_problem)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()
     if recovered is not None:

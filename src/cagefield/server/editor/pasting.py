@@ -1,0 +1,59 @@
+"""Pastes in the editor: what of the other scene is shown is set where it stands in this one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit
+from cagefield.edits.operations import Operation
+from cagefield.edits.placing import placed_paste
+from cagefield.errors import CageError, EditError
+from cagefield.typing import Array
+from cagefield.warps.inner_map import HexahedronMap
+
+SHARE_OF_VIEW = 0.5
+"""Longest edge of what is pasted, as a share of the picture's height at the surface it stands on."""
+
+BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
+TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"
+
+
+def pasted(
+    source: str, name: str, box: Array, source_up: Array, at: Array, up: Array, view_height: float
+) -> Edit:
+    """The paste of a whole scene, whose box [2,3] and up direction are given, upright on a point [3]."""
+    size = SHARE_OF_VIEW * view_height
+    return placed_paste(source, box, at, up=up, source_up=source_up, size=size, name=name)
+
+
+def cage_in_scene(edit: Edit) -> Cage:
+    """The cage that Set mode shows and moves: of a paste, where it stands."""
+    return edit.inner if edit.source is None else edit.deformed
+
+
+def cropped(edit: Edit, cage: Cage) -> Edit:
+    """The paste with another cage, given where it stands, around content that stays where it is.
+
+    Raises EditError where its operations do not allow that.
+    """
+    phi = HexahedronMap(edit.inner, edit.deformed).affine
+    if phi is None:
+        raise EditError(BENT)
+    A, b = phi
+    there = edit.replace(inner=Cage(cage.corners @ A.T + b, pivot=edit.inner.pivot))
+    size = float(np.ptp(cage.corners, axis=0).max())
+    if np.abs(there.deformed.corners - cage.corners).max() > 1e-6 * size:
+        raise EditError(TURNED)
+    return there
+
+
+def why_not_cropped(edit: Edit, operation: Operation) -> str | None:
+    """Why an operation of Set mode cannot be done to a paste's cage, not even a little of it; or None."""
+    try:
+        cropped(edit, operation.part(0.01).apply(edit.deformed))
+    except EditError as error:
+        return str(error)
+    except CageError:
+        return None
+    return None
