@@ -122,7 +122,14 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
     check_whole(folder)
     try:
         model = pycolmap.Reconstruction(folder)
-        return model, [model.image(image_id) for image_id in model.reg_image_ids()]
+        images = [model.image(image_id) for image_id in model.reg_image_ids()]
+        for image in images:
+            image.name.encode()  # its bytes may be no UTF-8
+        return model, images
+    except UnicodeError:
+        raise DatasetError(
+            f"{folder}: names of its images are no UTF-8 text; rename the photos and export the model again"
+        ) from None
     except Exception as error:  # pycolmap raises whatever C++ threw
         reason = " ".join(str(error).split())
         raise DatasetError(f"{folder}: pycolmap cannot read the model ({reason}); export it again") from error

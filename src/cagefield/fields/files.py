@@ -40,10 +40,10 @@ def read_tensors(
         metadata = file.metadata() or {}
         tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     if metadata.get("kind") != kind:
-        raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {kind!r}")
+        raise FieldError(f"{path}: kind is {metadata.get('kind')!r:.60}, expected {kind!r}")
     if metadata.get("version") != version:
         raise FieldError(
-            f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
+            f"{path}: field format {metadata.get('version')!r:.60}, this cagefield reads "
             f"{version!r}; update cagefield"
         )
     return metadata, tensors

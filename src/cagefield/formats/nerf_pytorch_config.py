@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from cagefield import yaml_text
 from cagefield.errors import FieldError
 
 NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
@@ -63,15 +62,15 @@ def read_config(path: Path | str) -> Settings:
         raise FieldError(f"{path}: no such config; give args.txt, config.txt or config.yml of the training")
     try:
         text = path.read_text(encoding="utf-8")
-        document = yaml.safe_load(text) if path.suffix in (".yml", ".yaml") else None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        document = yaml_text.loads(text) if path.suffix in (".yml", ".yaml") else None
+    except (OSError, UnicodeDecodeError, yaml_text.YamlError) as error:
         reason = " ".join(str(error).split())[:120].strip()
         raise FieldError(f"{path}: not a readable config ({reason}); {_CURE}") from error
     try:
         return _krrish94(document) if isinstance(document, dict) else _yenchenlin(text)
     except FieldError as error:
         raise FieldError(f"{path}: {error}") from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise FieldError(f"{path}: not a nerf-pytorch config ({reason}); {_CURE}") from error
 

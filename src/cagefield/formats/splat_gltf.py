@@ -152,7 +152,9 @@ def _is_linear(path: Path, primitive: dict[str, Any]) -> bool:
             stacklevel=2,
         )
     elif space != SRGB:
-        warnings.warn(f"{path}: its colour space {space!r} is not known and taken as {SRGB}", stacklevel=2)
+        warnings.warn(
+            f"{path}: its colour space {space!r:.60} is not known and taken as {SRGB}", stacklevel=2
+        )
     return bool(space == LINEAR)
 
 

@@ -55,9 +55,9 @@ def read_tensors_of(path: Path) -> dict[str, Any]:
 
 def _check_unpacked(path: Path) -> None:
     """Refuses an archive that is much larger than its file: `torch.save` does not compress."""
-    if not zipfile.is_zipfile(path):
-        return
     try:
+        if not zipfile.is_zipfile(path):
+            return
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
