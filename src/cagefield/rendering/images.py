@@ -24,11 +24,11 @@ MOST_PIXELS = 100 << 20
 """Pixels of a picture that is read: a file of kilobytes may have any number of them."""
 
 _DENSEST, _ALWAYS = 1100, 1 << 20
-"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; a million are read of any file."""
+"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; a million are always read."""
 
 DAMAGED = (
-    OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError, RuntimeError,
-    ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
+    OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
+    RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
 )  # fmt: skip
 """What pillow raises of damaged pictures."""
 

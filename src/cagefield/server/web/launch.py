@@ -117,11 +117,12 @@ def bound_socket(host: str, port: int) -> socket.socket:
     """
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "no name that can be looked up"
         raise CagefieldError(
-            f"--host {host} is no address ({error.strerror}); give one of this machine's"
+            f"--host {host:.80} is no address ({reason}); give one of this machine's"
         ) from None
-    reason: str | None = None
+    reason = None
     for family, _, _, _, address in found:
         listening = socket.socket(family)
         try:
