@@ -1,4 +1,4 @@
-"""YAML as strangers may write it: limits on nesting and values, aliases followed, before anything is built."""
+"""YAML as strangers may write it: limits on nesting and values, before anything is built."""
 
 from __future__ import annotations
 

@@ -51,9 +51,7 @@ class Demo:
         for name, value, high in (("views", self.views, 10_000), ("size", self.size, 4096),
                                   ("frames", self.frames, 10_000)):  # fmt: skip
             check_number(f"--{name}", value, 1, high)
-        VoxelConfig(
-            steps=self.steps, resolution=self.resolution, sh_degree=1
-        )  # refused at once
+        VoxelConfig(steps=self.steps, resolution=self.resolution, sh_degree=1)  # refused at once
         check_folder(self.out, self.overwrite, "before_after.png")
         began = time.perf_counter()
         with replaced_folder(self.out.resolve(), _OWN) as folder:

@@ -14,9 +14,10 @@ from typing import Any, Protocol
 from cagefield.errors import CagefieldError, line_of
 
 CHECKPOINT_SECONDS = 60.0
-"""Seconds of training between two checkpoints; the first come after FIRST_CHECKPOINT, and then twice as much."""
+"""Seconds of training between two checkpoints, at most."""
 
 FIRST_CHECKPOINT = 5.0
+"""Seconds to the first one; as many to the next, then twice as many each time."""
 
 
 class Run(Protocol):
@@ -52,9 +53,8 @@ def run_to_end(
 ) -> bool:
     """True when the run was finished, False when Ctrl-C ended it early.
 
-    Its state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at its end, early or
-    not; `resume` continues from
-    there: a run that was finished is so at once. Where it cannot be written (a full disk) a warning says so,
+    Its state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at its end,
+    early or not; `resume` continues from there: a run that was finished is so at once. Where it cannot be written (a full disk) a warning says so,
     the last one is kept, and the run goes on.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
@@ -87,7 +87,7 @@ def run_to_end(
 
 
 def _until_next(saved: float) -> float:
-    """Seconds of training from one checkpoint to the next: what a kill costs is no more than what there was."""
+    """Seconds of training to the next checkpoint: a kill costs half of a short training, or a minute."""
     return min(CHECKPOINT_SECONDS, max(FIRST_CHECKPOINT, saved))
 
 
