@@ -12,15 +12,23 @@ _MOST_DIGITS = 300
 
 
 def loads(
-    text: str | bytes, object_pairs_hook: Callable[[list[tuple[str, Any]]], dict[str, Any]] | None = None
+    text: str | bytes,
+    object_pairs_hook: Callable[[list[tuple[str, Any]]], dict[str, Any]] | None = None,
+    *,
+    finite: bool = True,
 ) -> Any:
-    """The value of a JSON text; `object_pairs_hook` as in `json.loads`.
+    """The value of a JSON text; `object_pairs_hook` as in `json.loads`, with finite=False 1e999 is infinite.
 
     Raises ValueError (json.JSONDecodeError where it is no JSON) for a text that is nested too deeply, and for
     a number that no float holds.
     """
     try:
-        value = json.loads(text, parse_int=_integer, parse_float=_float, object_pairs_hook=object_pairs_hook)
+        value = json.loads(
+            text,
+            parse_int=_integer,
+            parse_float=_float if finite else float,
+            object_pairs_hook=object_pairs_hook,
+        )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     _check_depth(value)

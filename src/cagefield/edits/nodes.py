@@ -170,7 +170,7 @@ def read_json(text: str, source: str) -> Node:
         return found
 
     try:
-        value = json_text.loads(text, object_pairs_hook=unique)
+        value = json_text.loads(text, unique, finite=False)
     except json.JSONDecodeError as error:
         raise Node(None, source, error.lineno, "").error(f"not valid JSON: {error.msg}") from None
     except EditFileError:

@@ -54,7 +54,8 @@ def run_to_end(
     """True when the run was finished, False when Ctrl-C ended it early.
 
     Its state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at its end,
-    early or not; `resume` continues from there: a run that was finished is so at once. Where it cannot be written (a full disk) a warning says so,
+    early or not; `resume` continues from there: a run that was finished is so at once. Where it cannot be
+    written (a full disk) a warning says so,
     the last one is kept, and the run goes on.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 

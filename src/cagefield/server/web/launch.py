@@ -59,6 +59,8 @@ def open_cached(
     if recovered is not None:
         session.restore(recovered)
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
+    elif store.damaged is not None:
+        coordinator.greeting = store.damaged
     name = path.resolve().name if source is None else source.name
     return coordinator, hello_of(scene, name, str(path.resolve()))
 
