@@ -98,7 +98,7 @@ def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any,
     try:
         return background_rgb(document.get("background")), document.get("gains", ()), opacity
     except (CagefieldError, TypeError, ValueError) as error:
-        raise SceneError(f"{path}: {error}") from None
+        raise SceneError(f"{path}: {error!s:.200}") from None
 
 
 def read_field(path: Path) -> VoxelField | SplatField:
@@ -123,7 +123,7 @@ def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
             try:
                 read.append(Camera.from_dict(member))
             except (CagefieldError, KeyError, TypeError, AttributeError) as error:
-                raise SceneError(f"{path}: {split}[{index}] is no camera: {error}") from error
+                raise SceneError(f"{path}: {split}[{index}] is no camera: {error!s:.200}") from error
         cameras[split] = tuple(read)
     return cameras
 

@@ -172,7 +172,7 @@ def hostile(chance: random.Random) -> Any:
     if made == 3:
         return chance.choice((None, True, False, [], {}, [[]], {"": {}}, [None] * 3))
     if made == 4:
-        return [0] * chance.choice((1, 1000, 100_000))
+        return [0] * chance.choice((1, 1000, 20_000))
     return chance.choice((0, -1, 1, 0.5, 2**31, 2**53, 10**18, 10**30, 1e308, -1e308, 1e-300, 4096))
 
 

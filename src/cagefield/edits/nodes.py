@@ -19,7 +19,7 @@ _LONGEST_PATH = 120
 """Characters of a key path in a message."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Node:
     """A value, with its file, line (0 where unknown) and key path.
 

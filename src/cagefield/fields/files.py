@@ -55,11 +55,15 @@ def _opened(path: str | Path) -> Iterator[Any]:
     from safetensors import SafetensorError, safe_open
 
     try:
+        with open(path, "rb"):  # safetensors calls a file that may not be read one that is not there
+            pass
         with safe_open(str(path), framework="numpy") as file:
             yield file
+    except PermissionError as error:
+        raise FieldError(f"{path}: it may not be read ({error.strerror}); make it readable") from error
     except (SafetensorError, OSError) as error:
         raise FieldError(
-            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+            f"{path}: not a readable field file ({str(error):.160}); it may be truncated, write it again"
         ) from error
 
 
