@@ -132,7 +132,9 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
         ) from None
     except Exception as error:  # pycolmap raises whatever C++ threw
         reason = " ".join(str(error).split())
-        raise DatasetError(f"{folder}: pycolmap cannot read the model ({reason}); export it again") from error
+        raise DatasetError(
+            f"{folder}: pycolmap cannot read the model ({reason:.200}); export it again"
+        ) from error
 
 
 def _upwards(folder: Path) -> Sequence[Path]:

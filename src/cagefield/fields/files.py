@@ -63,7 +63,7 @@ def _opened(path: str | Path) -> Iterator[Any]:
         raise FieldError(f"{path}: it may not be read ({error.strerror}); make it readable") from error
     except (SafetensorError, OSError) as error:
         raise FieldError(
-            f"{path}: not a readable field file ({str(error):.160}); it may be truncated, write it again"
+            f"{path}: not a readable field file ({error!s:.160}); it may be truncated, write it again"
         ) from error
 
 

@@ -39,7 +39,7 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
             f"{path}: the checkpoint of another kind of training; give the field that it was started with"
         ) from error
     except Exception as error:  # zipfile raises its own classes on damaged archives
-        raise CagefieldError(f"{path}: not a readable checkpoint ({error}); start anew") from error
+        raise CagefieldError(f"{path}: not a readable checkpoint ({error!s:.160}); start anew") from error
     if written_for != signature:
         raise CagefieldError(f"{path}: written for other photos or settings; start anew")
     return scalars, arrays
