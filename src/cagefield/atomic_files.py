@@ -6,7 +6,6 @@ import errno
 import glob
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,16 +21,18 @@ def check_writable(path: Path, *, inside: bool = False) -> None:
     called before work whose result has to go there. What ended programs left there is removed.
     """
     path = path.absolute()
-    remove_leftovers(path, inside=inside)
     folders = (path, *path.parents) if inside else path.parents
     folder = next((each for each in folders if each.exists()), Path("/"))
+    remove_leftovers(path, inside=inside)
+    remove_leftovers(folder / path.name)
+    probe = folder / hidden_name(path, "part")
     with _naming(path, folder):
-        handle, name = tempfile.mkstemp(prefix=".cagefield-", dir=folder)
+        handle = os.open(probe, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
         try:
             os.write(handle, b"?")
         finally:
             os.close(handle)
-            os.unlink(name)
+            os.unlink(probe)
 
 
 @contextmanager

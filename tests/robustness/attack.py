@@ -1,4 +1,4 @@
-"""Attacks a reader from outside: its own process, limits on time and memory, and a count of what came of it."""
+"""Attacks a reader from outside: its own process, limits on time and memory, and a count."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The process that is attacked: reads one damaged input after the other and says what came of each.
 
-python attacked_reader.py FOLDER SEED READER FIRST LAST [READER FIRST LAST ...]: makes a reader's honest seed in
-FOLDER/NUMBER, and for every number from FIRST to LAST damages it, reads it, and prints one line of JSON. The input
-that is read lies in that folder.
+python attacked_reader.py FOLDER SEED READER FIRST LAST [READER FIRST LAST ...]: makes a reader's honest
+seed in FOLDER/NUMBER, and for every number from FIRST to LAST damages it, reads it, and prints one line of
+JSON. The input that is read lies in that folder.
 """
 
 from __future__ import annotations

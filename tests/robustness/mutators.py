@@ -20,18 +20,72 @@ from typing import Any
 import zstandard
 
 NUMBERS = (
-    "1e999", "-1e999", "9" * 400, "-" + "9" * 5000, "NaN", "Infinity", "-Infinity", "0", "-1", "1e308", "5e-324",
-    "1e39", "2147483648", "4294967295", "9223372036854775808", "0.5", "-0.0", "1e-400", "16777217", "1000000",
-)  # fmt: skip
+    "1e999",
+    "-1e999",
+    "9" * 400,
+    "-" + "9" * 5000,
+    "NaN",
+    "Infinity",
+    "-Infinity",
+    "0",
+    "-1",
+    "1e308",
+    "5e-324",
+    "1e39",
+    "2147483648",
+    "4294967295",
+    "9223372036854775808",
+    "0.5",
+    "-0.0",
+    "1e-400",
+    "16777217",
+    "1000000",
+)
 WORDS = (
-    "\\ud800", "\\u0000", "\\udfff\\ud800", "\u202e\u0301" * 20, "x" * 10_000, "", "..", "../../etc/passwd", "/",
-    "\U0001f9ff", "\\uFFFF", "%s%n", "~", "\u00e9\u0301", "a\\nb", "con", "\ufeff",
-)  # fmt: skip
+    "\\ud800",
+    "\\u0000",
+    "\\udfff\\ud800",
+    "\u202e\u0301" * 20,
+    "x" * 10_000,
+    "",
+    "..",
+    "../../etc/passwd",
+    "/",
+    "\U0001f9ff",
+    "\\uFFFF",
+    "%s%n",
+    "~",
+    "\u00e9\u0301",
+    "a\\nb",
+    "con",
+    "\ufeff",
+)
 YAML = (
-    "!!int ''", "!!float x", "!!binary '*'", "!!timestamp x", "!!python/object/apply:os.system [id]", "*a", "&a [*a]",
-    "!!set {a, b}", "<<: 3", "? [a]", "|", ".inf", ".nan", "1:60:60", "0b2", "0x", "1_0", "2001-99-99", "!!omap [1]",
-    "!!null x", "!!bool 2", "%TAG", "- -", "\t",
-)  # fmt: skip
+    "!!int ''",
+    "!!float x",
+    "!!binary '*'",
+    "!!timestamp x",
+    "!!python/object/apply:os.system [id]",
+    "*a",
+    "&a [*a]",
+    "!!set {a, b}",
+    "<<: 3",
+    "? [a]",
+    "|",
+    ".inf",
+    ".nan",
+    "1:60:60",
+    "0b2",
+    "0x",
+    "1_0",
+    "2001-99-99",
+    "!!omap [1]",
+    "!!null x",
+    "!!bool 2",
+    "%TAG",
+    "- -",
+    "\t",
+)
 DEEP = (30, 100, 2_000, 100_000)
 INTEGERS = (0, 1, 2, 255, 65535, 2**31 - 1, 2**31, 2**32 - 1, 2**40, 2**62, 2**63 - 1, 2**64 - 1)
 FLOATS = (0.0, -1.0, float("nan"), float("inf"), 3.4e38, 1e-45, 1e300)
@@ -210,7 +264,7 @@ def dumped(tree: Any) -> bytes:
 
 
 def tree_changed(content: bytes, chance: random.Random) -> bytes:
-    """A value of JSON replaced by a hostile one, by another of its values, left out, or moved to another key."""
+    """A value of JSON replaced by a hostile one or another one, left out, or under another key."""
     tree = [json.loads(content)]
     places: list[tuple[Any, Any]] = []
 
@@ -306,7 +360,7 @@ _ZSTD_BOMB = b""
 
 
 def spz_stream(content: bytes, chance: random.Random) -> bytes:
-    """A stream of SPZ 4 damaged and packed again, or a bomb in its place; the table of contents fits, or not."""
+    """A stream of SPZ 4 damaged and packed again, or a bomb in its place; the sizes in the table fit, or not."""
     global _ZSTD_BOMB
     streams, contents = content[15], struct.unpack_from("<I", content, 16)[0]
     table = [struct.unpack_from("<QQ", content, contents + 16 * n) for n in range(streams)]

@@ -43,7 +43,7 @@ Read = Callable[[Path], Any]
 
 @dataclass(frozen=True)
 class Reader:
-    """`make` writes an honest seed into a folder, `read` reads that; `damaged` are its files and their kinds."""
+    """`make` writes an honest seed into a folder, `read` reads it; `damaged`: its files and their kinds."""
 
     make: Callable[[Path], None]
     read: Read
@@ -54,14 +54,22 @@ def _edits() -> EditStack:
     inner = Cage.box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.0, 0.1, 0.2))
     moved = Edit(
         inner,
-        operations=(Translate((0.1, 0.0, 0.0)), Rotate((0.0, 0.0, 10.0)), Scale((1.1, 1.0, 1.0)),
-                    MoveCorner(3, (0.02, 0.0, 0.0))),
-        outer=inner.grown((0.4, 0.4, 0.4)), name="arm up", lattice=16,
-    )  # fmt: skip
+        operations=(
+            Translate((0.1, 0.0, 0.0)),
+            Rotate((0.0, 0.0, 10.0)),
+            Scale((1.1, 1.0, 1.0)),
+            MoveCorner(3, (0.02, 0.0, 0.0)),
+        ),
+        outer=inner.grown((0.4, 0.4, 0.4)),
+        name="arm up",
+        lattice=16,
+    )
     other = Edit(
-        Cage.box((0.3, 0.3, 0.0), (0.2, 0.2, 0.2)), operations=(Translate((0.0, 0.3, 0.0)),),
-        adjustment="discrete", keep_source=True,
-    )  # fmt: skip
+        Cage.box((0.3, 0.3, 0.0), (0.2, 0.2, 0.2)),
+        operations=(Translate((0.0, 0.3, 0.0)),),
+        adjustment="discrete",
+        keep_source=True,
+    )
     gone = Edit(Cage.box((-0.3, 0.3, 0.0), (0.2, 0.2, 0.2)), deleted=True, adjustment="discrete")
     return EditStack([moved, other, gone])
 
@@ -261,8 +269,13 @@ def _make_colmap(text: bool) -> Callable[[Path], None]:
         import pycolmap
 
         model = pycolmap.Reconstruction()
-        camera = pycolmap.Camera(model="OPENCV", width=24, height=16, camera_id=1,
-                                 params=[30.0, 30.0, 12.0, 8.0, 0.01, 0.0, 0.0, 0.0])  # fmt: skip
+        camera = pycolmap.Camera(
+            model="OPENCV",
+            width=24,
+            height=16,
+            camera_id=1,
+            params=[30.0, 30.0, 12.0, 8.0, 0.01, 0.0, 0.0, 0.0],
+        )
         model.add_camera_with_trivial_rig(camera)
         (folder / "capture" / "images").mkdir(parents=True)
         for index, seen in enumerate(ball_scene().cameras["train"]):
@@ -336,7 +349,15 @@ def _make_messages(folder: Path) -> None:
         {"type": "set_cage", "edit": 1, "cage": "inner", "corners": corners},
         {"type": "place", "x": 0.5, "y": 0.5},
         {"type": "outer_margin", "edit": 1, "margin": 0.5},
-        {"type": "change", "edit": 1, "name": "x", "enabled": True, "lattice": 16, "shell": "flow", "width": 0.5},
+        {
+            "type": "change",
+            "edit": 1,
+            "name": "x",
+            "enabled": True,
+            "lattice": 16,
+            "shell": "flow",
+            "width": 0.5,
+        },
         {"type": "scene_change", "preserve_opacity": False},
         *({"type": "command", "name": n, "edit": 1} for n in ("undo", "redo", "duplicate", "select", "save")),
         {"type": "command", "name": "remove_last_operation", "edit": 1},
@@ -354,7 +375,7 @@ def _make_messages(folder: Path) -> None:
         {"type": "play_end", "play": 1},
         {"type": "render", "what": "camera_path", "out": "a.mp4", "width": 64, "height": 64, "fps": 4.0},
         {"type": "cancel_job", "job": 1},
-    ]  # fmt: skip
+    ]
     for number, message in enumerate(messages):
         (folder / f"message{number:02}.json").write_text(json.dumps(message))
 
@@ -409,58 +430,109 @@ _BEGUN_BY = {
 """Messages of a drag, and of a preview, need one that begins it."""
 
 READERS: dict[str, Reader] = {
-    "edits.yaml": Reader(_written("e.yaml", lambda file: file.write_text(dump_edits(_edits()))),
-                         _read_edits("e.yaml"), {"e.yaml": "yaml"}),
-    "edits.json": Reader(_written("e.json", lambda file: file.write_text(dump_edits(_edits(), format="json"))),
-                         _read_edits("e.json"), {"e.json": "json"}),
-    "scene folder": Reader(_make_scene, _read_scene, {
-        "scene/scene.json": "json", "scene/cameras.json": "json", "scene/edits.yaml": "yaml",
-        "scene/camera_path.json": "json"}),
+    "edits.yaml": Reader(
+        _written("e.yaml", lambda file: file.write_text(dump_edits(_edits()))),
+        _read_edits("e.yaml"),
+        {"e.yaml": "yaml"},
+    ),
+    "edits.json": Reader(
+        _written("e.json", lambda file: file.write_text(dump_edits(_edits(), format="json"))),
+        _read_edits("e.json"),
+        {"e.json": "json"},
+    ),
+    "scene folder": Reader(
+        _make_scene,
+        _read_scene,
+        {
+            "scene/scene.json": "json",
+            "scene/cameras.json": "json",
+            "scene/edits.yaml": "yaml",
+            "scene/camera_path.json": "json",
+        },
+    ),
     "voxel field": Reader(_make_scene, _read_scene, {"scene/field.safetensors": "safetensors"}),
     "splat field": Reader(
-        lambda folder: Scene(ball_of_splats(), cameras=ball_scene().cameras).save(folder / "scene"), _read_scene,
-        {"scene/field.safetensors": "safetensors"}),
-    "nerf field": Reader(_written("n.safetensors", lambda file: save_nerf(small_field(), file)),
-                         lambda folder: load_nerf(folder / "n.safetensors"), {"n.safetensors": "safetensors"}),
+        lambda folder: Scene(ball_of_splats(), cameras=ball_scene().cameras).save(folder / "scene"),
+        _read_scene,
+        {"scene/field.safetensors": "safetensors"},
+    ),
+    "nerf field": Reader(
+        _written("n.safetensors", lambda file: save_nerf(small_field(), file)),
+        lambda folder: load_nerf(folder / "n.safetensors"),
+        {"n.safetensors": "safetensors"},
+    ),
     "autosave": Reader(_make_autosave, _read_autosave, {"scene/../.scene.cagefield-autosave.json": "json"}),
-    "camera path": Reader(_make_path, _read_path, {"path.json": "json", "dataparser_transforms.json": "json"}),
+    "camera path": Reader(
+        _make_path, _read_path, {"path.json": "json", "dataparser_transforms.json": "json"}
+    ),
     "keyframes": Reader(_make_path, lambda folder: load_keys(folder / "path.json"), {"path.json": "json"}),
     "nerf .tar, new": Reader(_torch_file(_YENCHENLIN, False), _read_networks, {"a.tar": "zip"}),
     "nerf .ckpt, new": Reader(_torch_file(_KRRISH94, False), _read_networks, {"a.tar": "zip"}),
     "nerf .ckpt, old": Reader(_torch_file(_KRRISH94, True), _read_networks, {"a.tar": "bytes"}),
-    "nerf config": Reader(_written("args.txt", lambda file: file.write_text(_CONFIG)),
-                          lambda folder: read_config(folder / "args.txt"), {"args.txt": "text"}),
-    "nerf config.yml": Reader(_written("config.yml", lambda file: file.write_text(_CONFIG_YML)),
-                              lambda folder: read_config(folder / "config.yml"), {"config.yml": "yaml"}),
-    "training": Reader(_make_training, lambda folder: read_checkpoint(folder / "a.training", "x"),
-                       {"a.training": "zip"}),
+    "nerf config": Reader(
+        _written("args.txt", lambda file: file.write_text(_CONFIG)),
+        lambda folder: read_config(folder / "args.txt"),
+        {"args.txt": "text"},
+    ),
+    "nerf config.yml": Reader(
+        _written("config.yml", lambda file: file.write_text(_CONFIG_YML)),
+        lambda folder: read_config(folder / "config.yml"),
+        {"config.yml": "yaml"},
+    ),
+    "training": Reader(
+        _make_training, lambda folder: read_checkpoint(folder / "a.training", "x"), {"a.training": "zip"}
+    ),
     "transforms.json": Reader(_make_transforms, _read_capture, {"capture/transforms.json": "json"}),
-    "COLMAP, binary": Reader(_make_colmap(False), _read_capture, {
-        f"capture/sparse/0/{name}.bin": "bytes" for name in ("cameras", "images", "points3D", "rigs", "frames")}),
-    "COLMAP, text": Reader(_make_colmap(True), _read_capture, {
-        f"capture/sparse/0/{name}.txt": "text" for name in ("cameras", "images", "points3D", "rigs", "frames")}),
+    "COLMAP, binary": Reader(
+        _make_colmap(False),
+        _read_capture,
+        {
+            f"capture/sparse/0/{name}.bin": "bytes"
+            for name in ("cameras", "images", "points3D", "rigs", "frames")
+        },
+    ),
+    "COLMAP, text": Reader(
+        _make_colmap(True),
+        _read_capture,
+        {
+            f"capture/sparse/0/{name}.txt": "text"
+            for name in ("cameras", "images", "points3D", "rigs", "frames")
+        },
+    ),
     "LLFF": Reader(_make_llff, _read_capture, {"capture/poses_bounds.npy": "npy"}),
-    "points.ply": Reader(_make_points, lambda folder: read_points(folder / "points.ply"), {"points.ply": "ply"}),
+    "points.ply": Reader(
+        _make_points, lambda folder: read_points(folder / "points.ply"), {"points.ply": "ply"}
+    ),
     "png": Reader(_make_picture(".png"), _read_picture(".png"), {"a.png": "png"}),
-    **{ending[1:]: Reader(_make_picture(ending), _read_picture(ending), {f"a{ending}": "bytes"})
-       for ending in (".jpg", ".webp", ".tif", ".bmp")},
+    **{
+        ending[1:]: Reader(_make_picture(ending), _read_picture(ending), {f"a{ending}": "bytes"})
+        for ending in (".jpg", ".webp", ".tif", ".bmp")
+    },
     "ply": _splat_reader(".ply", "ply"),
     "text ply": _splat_reader("-text.ply", "ply"),
     "compressed.ply": _splat_reader(".compressed.ply", "ply"),
-    "spz 1": Reader(_make_old_spz(1), lambda folder: import_splats(read_splats(folder / "a.spz")), {"a.spz": "gzip"}),
-    "spz 2": Reader(_make_old_spz(2), lambda folder: import_splats(read_splats(folder / "a.spz")), {"a.spz": "gzip"}),
+    "spz 1": Reader(
+        _make_old_spz(1), lambda folder: import_splats(read_splats(folder / "a.spz")), {"a.spz": "gzip"}
+    ),
+    "spz 2": Reader(
+        _make_old_spz(2), lambda folder: import_splats(read_splats(folder / "a.spz")), {"a.spz": "gzip"}
+    ),
     "spz 3": _splat_reader(".spz", "gzip"),
     "spz 4": _splat_reader("-4.spz", "spz4"),
     "splat": _splat_reader(".splat", "bytes"),
     "ksplat": _splat_reader(".ksplat", "bytes"),
     "sog": _splat_reader(".sog", "zip"),
-    "sog folder": Reader(_make_sog_folder, lambda folder: read_splats(folder / "sog"), {
-        "sog/meta.json": "json", "sog/means_l.webp": "bytes", "sog/shN_labels.webp": "bytes"}),
+    "sog folder": Reader(
+        _make_sog_folder,
+        lambda folder: read_splats(folder / "sog"),
+        {"sog/meta.json": "json", "sog/means_l.webp": "bytes", "sog/shN_labels.webp": "bytes"},
+    ),
     "glb": _splat_reader(".glb", "glb"),
     "splatfacto .ckpt": _splat_reader(".ckpt", "zip"),
-    "messages": Reader(_make_messages, _read_messages, {
-        f"message{number:02}.json": "json" for number in range(_MESSAGES)}),
-}  # fmt: skip
+    "messages": Reader(
+        _make_messages, _read_messages, {f"message{number:02}.json": "json" for number in range(_MESSAGES)}
+    ),
+}
 """The readers, by what they read."""
 
 NEED_TORCH = ("nerf .tar, new", "nerf .ckpt, new", "nerf .ckpt, old", "splatfacto .ckpt")
