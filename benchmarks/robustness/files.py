@@ -2,9 +2,9 @@
 
 python benchmarks/robustness/files.py [--inputs 10000] [--readers NAME ...] [--out FILE.md]
 
-Each reader has a process of its own that tells of every input (`tests/robustness`), so that an input that ends
-it, or that it never ends, is counted and the next one tried. Inputs with faults are kept in --kept. About an
-hour of one processor for 10,000 of each.
+Each reader has a process of its own that tells of every input (`tests/robustness`), so that an input that
+ends it, or that it never ends, is counted and the next one tried. Inputs with faults are kept in --kept.
+About an hour of one processor for 10,000 of each.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ def _table(found: dict[str, Outcome], inputs: int) -> str:
     head = [*(name.replace("_", " ") for name in _COLUMNS), "most memory, MiB", "slowest, s"]
     return f"""# Damaged files and messages
 
-{inputs} inputs for each reader, damaged as `tests/robustness/mutators.py` does it. Refused: one line that says
-what is wrong. Read: what is left makes sense. Crashed: any other exception, or the end of the process. Hung: over
-{HANG:g} s of a processor, or a minute without an answer. Over memory: above twice what the honest file takes and
-{SLACK >> 20} MiB.
+{inputs} inputs for each reader, damaged as `tests/robustness/mutators.py` does it. Refused: one line that
+says what is wrong. Read: what is left makes sense. Crashed: any other exception, or the end of the process.
+Hung: over {HANG:g} s of a processor, or a minute without an answer. Over memory: above twice what the honest
+file takes and {SLACK >> 20} MiB.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 

@@ -6,12 +6,15 @@ A process is forked for each kill, so that what it imports is imported once. Pyt
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import shutil
 import signal
 import struct
+import subprocess
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -43,6 +46,9 @@ EDITS = """edits:
     inner: {center: [0, 0, 0], size: 1}
     operations: [{translate: [1, 0, 0]}]
 """
+PATIENCE = 120.0
+"""Seconds after which work that does not end is killed."""
+
 Say = Callable[[int], None]
 
 
@@ -81,16 +87,32 @@ def forked(
     reading, writing = os.pipe()
     process = os.fork()
     if process == 0:
-        _run(work, folder, at, reading, writing)
+        os.close(reading)
+        _run(work, folder, at, writing)
     os.close(writing)
-    if after is not None:
-        time.sleep(after)
-        os.kill(process, signal.SIGKILL)
+    return _waited(process, reading, after)
+
+
+def started(name: str, folder: Path, at: int, after: float | None = None) -> tuple[bool, int, int]:
+    """The same of a command with kernels, whose threads no forked process has: in a new one."""
+    reading, writing = os.pipe()
+    arguments = [sys.executable, __file__, name, str(folder), str(at), str(writing)]
+    paths = os.pathsep.join((*sys.path, str(Path(__file__).resolve().parent.parent)))
+    process = subprocess.Popen(arguments, pass_fds=[writing], env=os.environ | {"PYTHONPATH": paths})
+    os.close(writing)
+    return _waited(process.pid, reading, after)
+
+
+def _waited(process: int, reading: int, after: float | None) -> tuple[bool, int, int]:
+    timer = threading.Timer(PATIENCE if after is None else after, _kill, (process,))
+    timer.start()
     said = bytearray()
     while part := os.read(reading, 1 << 16):
         said += part
     os.close(reading)
     _, status = os.waitpid(process, 0)
+    timer.cancel()
+    timer.join()
     numbers = list(struct.iter_unpack("<bq", said[: len(said) // 9 * 9]))
     if not os.WIFSIGNALED(status) and os.waitstatus_to_exitcode(status) != 0:
         raise RuntimeError(f"the work failed; its error is on stderr ({status})")
@@ -99,11 +121,15 @@ def forked(
     return os.WIFSIGNALED(status), calls, last
 
 
-def _run(work: Callable[[Say], None], folder: Path, at: int, reading: int, writing: int) -> None:
+def _kill(process: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
+
+
+def _run(work: Callable[[Say], None], folder: Path, at: int, writing: int) -> None:
     """In the process that is killed: never returns."""
     code = 1
     try:
-        os.close(reading)
         calls, root = 0, str(folder.resolve())
 
         def hook(event: str, arguments: tuple[Any, ...]) -> None:
@@ -362,7 +388,7 @@ def kill(
 ) -> bool:
     """One kill in an empty folder; False where the command came to its end before. Counts what is wrong."""
     command.make(folder)
-    was_killed, _, said = forked(lambda say: command.work(folder, say), folder, at, after)
+    was_killed, _, said = _process(command, name, folder, at, after)
     if not was_killed:
         return False
     where = f"{name}, call {at}" if after is None else f"{name}, after {after:.3f} s"
@@ -371,7 +397,7 @@ def kill(
         warnings.simplefilter("ignore")
         problem = command.check(folder, said)
         if problem is None:
-            forked(lambda say: command.work(folder, say), folder, 0)
+            _process(command, name, folder, 0)
             again = command.check(folder, 1 if command.work is not _session else 2 * SESSION_STEPS)
             problem = None if again is None else f"{again} (after the next start)"
     if problem is not None:
@@ -399,12 +425,21 @@ def _warm() -> None:
     parse(["info", "scene"])
 
 
-def calls_of(command: Command, folder: Path) -> tuple[int, float]:
+def _process(
+    command: Command, name: str, folder: Path, at: int, after: float | None = None
+) -> tuple[bool, int, int]:
+    if name in SLOW_COMMANDS:
+        return started(name, folder, at, after)
+    return forked(lambda say: command.work(folder, say), folder, at, after)
+
+
+def calls_of(name: str, folder: Path) -> tuple[int, float]:
     """(calls that the command makes, seconds that it takes) in an empty folder."""
     _warm()
+    command = {**COMMANDS, **SLOW_COMMANDS}[name]
     command.make(folder)
     begun = time.monotonic()
-    _, calls, _ = forked(lambda say: command.work(folder, say), folder, 0)
+    _, calls, _ = _process(command, name, folder, 0)
     return calls, time.monotonic() - begun
 
 
@@ -412,3 +447,9 @@ def moments(count: int, seconds: float, seed: int) -> list[float]:
     """Random moments while a command runs."""
     chance = random.Random(seed)
     return [chance.uniform(0.0, seconds) for _ in range(count)]
+
+
+if __name__ == "__main__":
+    _name, _folder, _at, _writing = sys.argv[1:]
+    _work = {**COMMANDS, **SLOW_COMMANDS}[_name].work
+    _run(lambda say: _work(Path(_folder), say), Path(_folder), int(_at), int(_writing))

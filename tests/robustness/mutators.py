@@ -360,7 +360,7 @@ _ZSTD_BOMB = b""
 
 
 def spz_stream(content: bytes, chance: random.Random) -> bytes:
-    """A stream of SPZ 4 damaged and packed again, or a bomb in its place; the sizes in the table fit, or not."""
+    """A stream of SPZ 4 damaged and packed again, or a bomb in its place; its size fits, or not."""
     global _ZSTD_BOMB
     streams, contents = content[15], struct.unpack_from("<I", content, 16)[0]
     table = [struct.unpack_from("<QQ", content, contents + 16 * n) for n in range(streams)]

@@ -22,7 +22,7 @@ pytestmark = [
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
     command, found = COMMANDS[name], Killed()
-    calls, _ = calls_of(command, tmp_path)
+    calls, _ = calls_of(name, tmp_path)
     assert calls >= least
     for at in range(1 + step // 2, calls + 1, step):
         (tmp_path / str(at)).mkdir()
