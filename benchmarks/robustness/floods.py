@@ -67,12 +67,12 @@ def main() -> None:
 def _table(rows: list[str], options: argparse.Namespace) -> str:
     return f"""# Floods
 
-{options.floods} pages or programs flood one editor; another page asks a question every {EVERY:g} s. Seconds from its
-question to the answer, how many took more than a second, and how much memory the editor's process grew by.
+{options.floods} pages or programs flood one editor; another page asks a question every {EVERY:g} s. Seconds
+from its question to the answer, how many took more than a second, and by how much the editor's process grew.
 
 {cpu_model()}, {devices.threads()} cores, on which the floods and other work ran too.
 
-    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods} --out FILE.md
+    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods}
 
 | flood | questions | median, s | 95 %, s | longest, s | above 1 s | memory, MiB |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |

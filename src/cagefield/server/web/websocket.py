@@ -29,6 +29,9 @@ MOST_PAGES = 64
 TO_TAKE = 60.0
 """Seconds in which a page must take a message that is sent to it."""
 
+PAUSE = 0.002
+"""Seconds after a message over the rate in which none of its page is read."""
+
 QUICK = 0.02
 """Seconds of a message after which its page waits as long again: the others have their turn."""
 
@@ -58,7 +61,7 @@ async def attend(
         asyncio.ensure_future(work)
         for work in (
             _read(socket, page, receive_queue),
-            _do(MessageHandlers(coordinator, page, may_edit), page, receive_queue),
+            _do(MessageHandlers(coordinator, page, may_edit), page, receive_queue, coordinator.loading),
             _send(socket, page),
         )
     ]
@@ -101,6 +104,7 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
             if refused > MOST_REFUSED:
                 await socket.close(TOO_MANY, "too many messages")
                 return
+            await asyncio.sleep(PAUSE)
             continue
         if text is None:
             page.notice("error", "a message must be text, one JSON object")
@@ -112,20 +116,23 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
             page.notice("error", refusal(error))
 
 
-async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue) -> None:
+async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue, turn: asyncio.Lock) -> None:
     waiting: set[asyncio.Task[None]] = set()
     try:
         while True:
             message = await receive_queue.get()
-            begun = time.monotonic()
-            with errors_reported_to(page):
-                rest = handlers.handle(message)
-                if rest is not None:
-                    task = asyncio.ensure_future(_finish(rest, page))
-                    waiting.add(task)
-                    task.add_done_callback(waiting.discard)
-            took = time.monotonic() - begun
-            await asyncio.sleep(took if took > QUICK else 0)
+            # Edit files may take a second each: one at a time of all pages, and as long again for others.
+            heavy = isinstance(message, client_messages.LoadEdits)
+            async with turn if heavy else contextlib.nullcontext():
+                begun = time.monotonic()
+                with errors_reported_to(page):
+                    rest = handlers.handle(message)
+                    if rest is not None:
+                        task = asyncio.ensure_future(_finish(rest, page))
+                        waiting.add(task)
+                        task.add_done_callback(waiting.discard)
+                took = time.monotonic() - begun
+                await asyncio.sleep(took if took > QUICK else 0)
     finally:
         for task in waiting:
             task.cancel()
