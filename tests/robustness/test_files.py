@@ -40,6 +40,34 @@ def test_damaged_files(name: str, outcomes: dict[str, Outcome]) -> None:
     assert found.tried == INPUTS == found.refused + found.read
 
 
+FOUND = {
+    "transforms.json": (715,),
+    "LLFF": (70, 141),
+    "compressed.ply": (199, 227, 893),
+    "nerf config.yml": (765,),
+    "COLMAP, binary": (91, 606),
+    "COLMAP, text": (342, 890),
+    "training": (838,),
+}
+"""Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_what_was_found_stays_cured(tmp_path: Path, name: str) -> None:
+    reader = READERS[name]
+    reader.make(tmp_path)
+    honest = {place: (tmp_path / place).read_bytes() for place in reader.damaged}
+    for number in FOUND[name]:
+        chance = random.Random(f" {name} {number}")
+        place = chance.choice(list(honest))
+        (tmp_path / place).write_bytes(mutators.mutate(reader.damaged[place], honest[place], chance))
+        try:
+            reader.read(tmp_path)
+        except CagefieldError as error:
+            assert len(str(error)) < 1000 and "\n" not in str(error)
+        (tmp_path / place).write_bytes(honest[place])
+
+
 def test_most_damages_are_seen(outcomes: dict[str, Outcome]) -> None:
     """The inputs are no copies of the honest files."""
     assert sum(found.refused for found in outcomes.values()) > sum(found.read for found in outcomes.values())

@@ -24,6 +24,8 @@ from cagefield.lenses import Lens
 
 FloatArray = npt.NDArray[np.float64]
 
+_LONGEST_NAME = 500
+
 MODEL_FILES = ("cameras.bin", "cameras.txt")
 
 _MODEL_FOLDERS = ("sparse/0", "sparse", "colmap/sparse/0", ".")
@@ -125,6 +127,8 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
         images = [model.image(image_id) for image_id in model.reg_image_ids()]
         for image in images:
             image.name.encode()  # its bytes may be no UTF-8
+            if len(image.name) > _LONGEST_NAME:
+                raise ValueError(f"the name of an image has {len(image.name)} characters")
         return model, images
     except UnicodeError:
         raise DatasetError(

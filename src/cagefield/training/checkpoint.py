@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,10 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
         CagefieldError: no such file, a damaged one, or one of another training.
     """
     try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > path.stat().st_size:  # none is packed
+            raise ValueError(f"it says that it unpacks to {unpacked} bytes")
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         scalars, written_for = json_text.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))

@@ -29,9 +29,6 @@ MOST_PAGES = 64
 TO_TAKE = 60.0
 """Seconds in which a page must take a message that is sent to it."""
 
-PAUSE = 0.002
-"""Seconds after a message over the rate in which none of its page is read."""
-
 QUICK = 0.02
 """Seconds of a message after which its page waits as long again: the others have their turn."""
 
@@ -104,7 +101,6 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
             if refused > MOST_REFUSED:
                 await socket.close(TOO_MANY, "too many messages")
                 return
-            await asyncio.sleep(PAUSE)
             continue
         if text is None:
             page.notice("error", "a message must be text, one JSON object")
