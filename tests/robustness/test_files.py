@@ -48,6 +48,7 @@ FOUND = {
     "COLMAP, binary": (91, 606),
     "COLMAP, text": (342, 890),
     "training": (838,),
+    "tif": (489,),
 }
 """Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
 

@@ -23,8 +23,8 @@ from cagefield.typing import UInt8
 MOST_PIXELS = 100 << 20
 """Pixels of a picture that is read: a file of kilobytes may have any number of them."""
 
-_DENSEST, _ALWAYS = 1100, 1 << 20
-"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; a million are always read."""
+_DENSEST, _ALWAYS = 1100, 1 << 18
+"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
 DAMAGED = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
