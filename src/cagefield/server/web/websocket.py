@@ -8,6 +8,7 @@ import logging
 import time
 from collections.abc import Coroutine, Iterator
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -39,6 +40,12 @@ _log = logging.getLogger(__name__)
 
 MOST_REFUSED = 2000
 """Messages over the rate after which the socket is closed."""
+
+
+OF_ALL = 1200.0
+"""Messages a second of all pages together; more wait in their lines."""
+
+_of_all: WeakKeyDictionary[asyncio.AbstractEventLoop, Allowance] = WeakKeyDictionary()
 
 
 async def attend(
@@ -83,6 +90,7 @@ def _is_parting(socket: WebSocket, error: Exception) -> bool:
 
 async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> None:
     burst = 4.0 * BYTES_PER_SECOND
+    every = _of_all.setdefault(asyncio.get_running_loop(), Allowance(OF_ALL, OF_ALL, OF_ALL))
     allowance, bytes_allowed, refused = Allowance(), Allowance(BYTES_PER_SECOND, burst, burst), 0
     while True:
         received = await socket.receive()
@@ -93,6 +101,8 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
         if size > common.MOST_BYTES:
             await socket.close(TOO_BIG, "message too big")
             return
+        while not every.take(time.monotonic()):
+            await asyncio.sleep(0.01)  # the line holds back what more comes
         now = time.monotonic()
         if not (allowance.take(now) and bytes_allowed.take(now, size)):
             refused += 1
