@@ -49,6 +49,8 @@ FOUND = {
     "COLMAP, text": (342, 890),
     "training": (838,),
     "tif": (489,),
+    "sog": (295,),
+    "glb": (284,),
 }
 """Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
 

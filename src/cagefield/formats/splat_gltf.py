@@ -53,7 +53,7 @@ def open_splat_gltf(path: Path) -> SplatSource:
     except FieldError:
         raise
     except KeyError as error:
-        raise _damaged(path, f"it has no {error.args[0]}") from None
+        raise _damaged(path, f"it has no {error.args[0]!s:.60}") from None
     except (
         ValueError,
         TypeError,

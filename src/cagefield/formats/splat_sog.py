@@ -88,12 +88,13 @@ def _open(path: Path, content: Images) -> SplatSource:
     except FieldError:
         raise
     except KeyError as error:
-        raise _damaged(path, f"it has no {error.args[0]}") from None
+        raise _damaged(path, f"it has no {error.args[0]!s:.60}") from None
     except (
         ValueError,
         TypeError,
         IndexError,
         OSError,
+        EOFError,
         AttributeError,
         OverflowError,
         RecursionError,
