@@ -75,7 +75,7 @@ def editor_server(scene: Path, *options: str, errors: IO[str] | None = None) -> 
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
-        match = re.search(r"http://\S+", line)
+        match = re.search(r"https?://\S+", line)
         assert match, line
         yield EditorServer(process, match.group(0))
     finally:

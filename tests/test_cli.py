@@ -341,7 +341,7 @@ def test_make_scene_refuses_unknown_names_and_other_folders(
     assert "no built-in scene 'castle'; choose one of digger" in refused(
         capsys, "make-scene", "castle", "-o", tmp_path / "photos"
     )
-    assert "size must be at least 1" in refused(
+    assert "--size is 0; give a whole number from 1" in refused(
         capsys, "make-scene", "plant", "-o", tmp_path / "photos", "--size", 0
     )
     (tmp_path / "holidays").mkdir()

@@ -27,7 +27,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[Guard]:
     """The guards of the editors that would have been served; nothing is."""
     guards: list[Guard] = []
 
-    def serve(coordinator: object, hello: object, guard: Guard, listening: socket.socket) -> None:
+    def serve(coordinator: object, hello: object, guard: Guard, listening: socket.socket, *_: object) -> None:
         listening.close()
         guards.append(guard)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield import json_text
+from cagefield import devices, json_text
 from cagefield.camera_paths import load_camera_path
 from cagefield.datasets import load_dataset
 from cagefield.edits import EditStack, parse_edits
@@ -23,6 +23,7 @@ from cagefield.rendering.images import read_image
 from cagefield.scene_files import is_scene, read_cameras
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.session import Session
+from cagefield.warps.edit_lattice import nodes_of
 
 
 def grid(folder: Path, side: int, stored: int) -> Path:
@@ -154,3 +155,17 @@ def test_json_that_is_honest_is_read() -> None:
     assert json_text.loads('{"a": [1, -2.5, 1e300, "x", null, true]}') == {
         "a": [1, -2.5, 1e300, "x", None, True]
     }
+
+
+def test_a_lattice_that_would_take_most_of_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    free = devices.free_memory()
+    assert free is None or free > 1 << 20
+    monkeypatch.setattr(devices, "free_memory", lambda: 3 * 10**9)
+    (edit,) = parse_edits(
+        '{"edits": [{"inner": {"center": [0, 0, 0], "size": 1}, "outer": {"margin": 0.5}, "lattice": 512,'
+        ' "operations": [{"translate": [0.1, 0, 0]}]}]}',
+        format="json",
+    )
+    with pytest.raises(EditError, match=r"512 nodes per axis takes 4\.3 GB, of the 3\.0 GB that are free"):
+        nodes_of(edit)
+    assert len(nodes_of(edit.replace(lattice=8))) == 512

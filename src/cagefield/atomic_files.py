@@ -6,31 +6,33 @@ import errno
 import glob
 import os
 import shutil
-import tempfile
-import uuid
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from cagefield.exchange import exchanged
+from cagefield.leftovers import hidden_name, is_ours, remove_leftovers
 
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
     """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
 
     With `inside` it is a folder, and files may be made in it. Raises OSError, that names `path`, where not:
-    called before work whose result has to go there.
+    called before work whose result has to go there. What ended programs left there is removed.
     """
     path = path.absolute()
     folders = (path, *path.parents) if inside else path.parents
     folder = next((each for each in folders if each.exists()), Path("/"))
+    remove_leftovers(path, inside=inside)
+    remove_leftovers(folder / path.name)
+    probe = folder / hidden_name(path, "part")
     with _naming(path, folder):
-        handle, name = tempfile.mkstemp(prefix=".cagefield-", dir=folder)
+        handle = os.open(probe, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
         try:
             os.write(handle, b"?")
         finally:
             os.close(handle)
-            os.unlink(name)
+            os.unlink(probe)
 
 
 @contextmanager
@@ -42,10 +44,9 @@ def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
     """
     if parents:
         path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(hidden_name(path, "part"))
     with _naming(path, path.parent):
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+        os.close(os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
     try:
         with _naming(path, temporary):
             yield temporary
@@ -82,8 +83,10 @@ def merged_folder(target: Path) -> Iterator[Path]:
     if not target.exists() or not any(target.iterdir()):
         yield target
         return
+    remove_leftovers(target, inside=True)
+    draft = target / hidden_name(target, "new")
     with _naming(target, target):
-        draft = Path(tempfile.mkdtemp(prefix=".new-", dir=target))
+        draft.mkdir()
     try:
         with _naming(target, draft):
             yield draft
@@ -103,9 +106,8 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
     renames left. An OSError about the new folder, or about none (a full disk), names `target`.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
-    draft, retired = (
-        target.with_name(f".{target.name}.{role}-{uuid.uuid4().hex[:8]}") for role in ("new", "old")
-    )
+    remove_leftovers(target)
+    draft, retired = (target.with_name(hidden_name(target, role)) for role in ("new", "old"))
     with _naming(target, draft):
         draft.mkdir()
     try:
@@ -128,7 +130,7 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
                 retired.rename(target)
         raise
     if retired.exists():
-        for entry in _others(retired, own):
+        for entry in _others(retired, own):  # made since others were linked
             if not (target / entry.name).exists():
                 entry.rename(target / entry.name)
         shutil.rmtree(retired, ignore_errors=True)
@@ -144,7 +146,7 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
     left = [
         folder
         for folder in target.parent.glob(f".{glob.escape(target.name)}.old-*")
-        if folder.is_dir() and is_whole(folder)
+        if folder.is_dir() and not is_ours(folder) and is_whole(folder)
     ]
     if not left:
         return None

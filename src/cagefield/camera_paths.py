@@ -55,7 +55,7 @@ def load_camera_path(path: Path | str, dataparser_transforms: Path | str | None 
         )
     kind = document.get("camera_type", "perspective")
     if kind != "perspective":
-        raise CameraError(f"{path}: camera_type {kind!r} is not supported; set it to 'perspective'")
+        raise CameraError(f"{path}: camera_type {kind!r:.60} is not supported; set it to 'perspective'")
     width, height = (_positive_integer(document, key, path) for key in ("render_width", "render_height"))
     to_dataset = _similarity_inverse(dataparser_transforms)
     cameras = tuple(
@@ -119,7 +119,7 @@ def _path_camera(entry: object, where: str, width: int, height: int, to_dataset:
     fov = entry.get("fov")
     if not _is_number(fov) or not 0.1 <= fov <= 179.0:
         raise CameraError(
-            f'{where}: "fov" is {fov!r}; give the vertical field of view in degrees, from 0.1 to 179'
+            f'{where}: "fov" is {fov!r:.40}; give the vertical field of view in degrees, from 0.1 to 179'
         )
     focal = 0.5 * height / math.tan(0.5 * math.radians(fov))
     pose = to_dataset @ c2w
@@ -145,7 +145,7 @@ def _similarity_inverse(path: Path | str | None) -> Floats:
         ) from None
     scale = document.get("scale")
     if not _is_number(scale) or scale <= 0 or not np.isfinite(transform).all():
-        raise CameraError(f'{path}: "scale" must be above 0 and "transform" finite, got scale {scale!r}')
+        raise CameraError(f'{path}: "scale" must be above 0 and "transform" finite, got scale {scale!r:.40}')
     forward = np.vstack([scale * transform, [0.0, 0.0, 0.0, 1.0]])
     if abs(np.linalg.det(forward[:3, :3])) < 1e-12 * scale**3:
         raise CameraError(f'{path}: "transform" is singular; use the file that nerfstudio wrote')
@@ -158,7 +158,7 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
         if value is None:
             continue
         if not _is_number(value) or value <= 0:
-            raise CameraError(f"{path}: {key!r} is {value!r}; give a number above 0")
+            raise CameraError(f"{path}: {key!r} is {value!r:.40}; give a number above 0")
         return float(value) if key == "fps" else count / float(value)
     return 24.0
 
@@ -231,7 +231,9 @@ def _read_json(path: Path, what: str) -> dict[str, object]:
 def _positive_integer(document: Mapping[str, object], key: str, path: Path) -> int:
     value = document.get(key)
     if not _is_number(value) or value != int(value) or not 1 <= value <= 16384:
-        raise CameraError(f'{path}: "{key}" is {value!r}; give a whole number of pixels between 1 and 16384')
+        raise CameraError(
+            f'{path}: "{key}" is {value!r:.40}; give a whole number of pixels between 1 and 16384'
+        )
     return int(value)
 
 

@@ -6,7 +6,9 @@ Warnings are shown alike.
 from __future__ import annotations
 
 import contextlib
+import errno
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator
 
@@ -47,9 +49,14 @@ class DeviceError(CagefieldError):
     """A compute device that is not there."""
 
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
 def line_of(error: OSError) -> str:
     """What the system refused, as one line: the files that it is about, and why."""
     names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
+    if not names and error.errno in _FULL:
+        names = f"the folder for temporary files, {tempfile.gettempdir()} ($TMPDIR), or the one of the result"
     return f"{names}: {error.strerror or error}" if names else str(error.strerror or error)
 
 

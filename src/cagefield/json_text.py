@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 _DEEPEST = 64
@@ -10,14 +11,24 @@ _MOST_DIGITS = 300
 """Of whole numbers: more are no float."""
 
 
-def loads(text: str | bytes) -> Any:
-    """The value of a JSON text.
+def loads(
+    text: str | bytes,
+    object_pairs_hook: Callable[[list[tuple[str, Any]]], dict[str, Any]] | None = None,
+    *,
+    finite: bool = True,
+) -> Any:
+    """The value of a JSON text; `object_pairs_hook` as in `json.loads`, with finite=False 1e999 is infinite.
 
     Raises ValueError (json.JSONDecodeError where it is no JSON) for a text that is nested too deeply, and for
     a number that no float holds.
     """
     try:
-        value = json.loads(text, parse_int=_integer, parse_float=_float)
+        value = json.loads(
+            text,
+            parse_int=_integer,
+            parse_float=_float if finite else float,
+            object_pairs_hook=object_pairs_hook,
+        )
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     _check_depth(value)

@@ -144,6 +144,8 @@ def _text(path: Path, file: BinaryIO, element: _Element) -> Callable[[int, int],
         done += len(lines)
 
     def rows(first: int, last: int) -> Columns:
+        if not names:
+            return {}
         spool.seek(first * row.itemsize)
         read = spool.read(max(0, min(last, element.count) - first) * row.itemsize)
         values = np.frombuffer(read, np.float64).reshape(-1, len(names))

@@ -83,22 +83,22 @@ def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any,
     document = _read_json(path)
     if document.get("format") != FORMAT:
         raise SceneError(
-            f'{path}: format is {document.get("format")!r}, expected "{FORMAT}"; give a scene folder'
+            f'{path}: format is {document.get("format")!r:.60}, expected "{FORMAT}"; give a scene folder'
         )
     version = document.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise SceneError(f"{path}: version is {version!r}, expected a whole number from 1 to {VERSION}")
+        raise SceneError(f"{path}: version is {version!r:.40}, expected a whole number from 1 to {VERSION}")
     if version > VERSION:
         raise SceneError(
             f"{path}: version is {version}, this cagefield reads up to {VERSION}; upgrade cagefield"
         )
     opacity = document.get("preserve_opacity", True)
     if not isinstance(opacity, bool):
-        raise SceneError(f"{path}: preserve_opacity is {opacity!r}; it must be true or false")
+        raise SceneError(f"{path}: preserve_opacity is {opacity!r:.40}; it must be true or false")
     try:
         return background_rgb(document.get("background")), document.get("gains", ()), opacity
     except (CagefieldError, TypeError, ValueError) as error:
-        raise SceneError(f"{path}: {error}") from None
+        raise SceneError(f"{path}: {error!s:.200}") from None
 
 
 def read_field(path: Path) -> VoxelField | SplatField:
@@ -123,7 +123,7 @@ def read_cameras(path: Path) -> dict[str, tuple[Camera, ...]]:
             try:
                 read.append(Camera.from_dict(member))
             except (CagefieldError, KeyError, TypeError, AttributeError) as error:
-                raise SceneError(f"{path}: {split}[{index}] is no camera: {error}") from error
+                raise SceneError(f"{path}: {split}[{index}] is no camera: {error!s:.200}") from error
         cameras[split] = tuple(read)
     return cameras
 

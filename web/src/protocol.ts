@@ -452,6 +452,7 @@ export interface Hello {
   up: Vec3;
   start: CameraMessage;
   cameras: number[][];
+  read_only: boolean;
 }
 /**
  * How far a background job is; of one whose file is to be downloaded, `page` asked for it.

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
         def run(self) -> None: ...
 
 
+_LONGEST = 1200
+"""Characters of a complaint: what users gave stands in it."""
+
 _DESCRIPTION = """Edit the geometry of a captured radiance field with two nested cages.
 
 `cagefield demo` shows the whole chain on a built-in scene; `cagefield --version` prints the version."""
@@ -119,5 +122,7 @@ def _without_box(text: str) -> str:
 
 def _refuse(message: str) -> int:
     """Exit code 2, after one line on stderr."""
-    print("cagefield: " + " ".join(message.split()), file=sys.stderr)
+    line = " ".join(message.split())
+    line = line if len(line) <= _LONGEST else f"{line[: _LONGEST - 200]} ... {line[-200:]}"
+    print("cagefield: " + line, file=sys.stderr)
     return 2

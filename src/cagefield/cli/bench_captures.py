@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from cagefield.cli.options import Device, Flag, Output, check_file, progress_bar
+from cagefield.cli.options import SEEDS, Device, Flag, Output, check_file, check_number, progress_bar
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
@@ -86,6 +86,7 @@ class BenchCaptures:
             raise CagefieldError("--holdout 0 keeps no photo to measure on; give 2 or more")
         for path in (self.out, self._beside()) if self.edits else (self.out,):
             check_file(path, self.overwrite)
+        check_number("--seed", self.seed, *SEEDS)
         budget = Budget(self.minutes, self.steps, self.splats, self.resolution, self.sh_degree, self.seed)
         devices.start(self.device)
         scores: list[CaptureScore] = []

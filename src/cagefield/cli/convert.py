@@ -7,6 +7,7 @@ from pathlib import Path
 
 import tyro
 
+from cagefield.atomic_files import check_writable
 from cagefield.cli.options import Axes, Flag, SpzVersion, progress_bar
 from cagefield.errors import CagefieldError
 
@@ -40,6 +41,7 @@ class Convert:
             raise CagefieldError(f"{self.out} exists; add --overwrite to replace it")
         if self.out.exists() and self.out.samefile(self.file):
             raise CagefieldError(f"{self.out} is the file to be converted; write to another one")
+        check_writable(self.out)
         with progress_bar("Converting") as move:
             count, degree = convert_splats(
                 self.file,

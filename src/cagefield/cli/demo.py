@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cagefield.cli.options import Device, Flag, Output, check_folder, progress_bar, track
+from cagefield.cli.options import Device, Flag, Output, check_folder, check_number, progress_bar, track
 
 if TYPE_CHECKING:
     from cagefield.scene import Scene
@@ -46,7 +46,12 @@ class Demo:
     def run(self) -> None:
         """Runs the chain and says where the results are."""
         from cagefield.atomic_files import replaced_folder
+        from cagefield.training.voxel_config import VoxelConfig
 
+        for name, value, high in (("views", self.views, 10_000), ("size", self.size, 4096),
+                                  ("frames", self.frames, 10_000)):  # fmt: skip
+            check_number(f"--{name}", value, 1, high)
+        VoxelConfig(steps=self.steps, resolution=self.resolution, sh_degree=1)  # refused at once
         check_folder(self.out, self.overwrite, "before_after.png")
         began = time.perf_counter()
         with replaced_folder(self.out.resolve(), _OWN) as folder:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import tyro
 
-from cagefield.cli.options import Flag, Output, check_folder, progress_bar
+from cagefield.cli.options import SEEDS, Flag, Output, check_folder, check_number, progress_bar
 from cagefield.errors import CagefieldError
 
 _MARK = "transforms_train.json"
@@ -41,6 +41,10 @@ class MakeScene:
 
     def run(self) -> None:
         """Renders the photos and says where they are."""
+        check_number("--seed", self.seed, *SEEDS)
+        for name, value, high in (("views", self.views, 100_000), ("test-views", self.test_views, 100_000),
+                                  ("size", self.size, 8192)):  # fmt: skip
+            check_number(f"--{name}", value, 1, high)
         from cagefield.datasets.procedural import CAPTURES
 
         parts = self._capture() if self.name in CAPTURES else self._scene()

@@ -30,6 +30,17 @@ Flag = tyro.conf.FlagCreatePairsOff[bool]
 T = TypeVar("T")
 
 
+SEEDS = (0, 2**32 - 1)
+"""What NumPy and the kernels take."""
+
+
+def check_number(name: str, value: int | None, low: int, high: int) -> None:
+    """Passes a whole number from low to high, and None. Raises CagefieldError, that names the option."""
+    if value is not None and not low <= value <= high:
+        shown = value if abs(value) < 10**20 else "a number of more than 20 digits"
+        raise CagefieldError(f"{name} is {shown}; give a whole number from {low} to {high}")
+
+
 @dataclass(frozen=True)
 class TrainingOptions:
     """How a field is trained."""
@@ -50,6 +61,7 @@ class TrainingOptions:
         """The configuration of the voxels' trainer."""
         from cagefield.training.voxel_config import VoxelConfig
 
+        check_number("--seed", self.seed, *SEEDS)
         return VoxelConfig(
             steps=VoxelConfig.steps if self.steps is None else self.steps,
             minutes=self.minutes if self.steps is None else None,
@@ -62,6 +74,7 @@ class TrainingOptions:
         """The configuration of the splats' trainer; at most so many `splats`, None for its own choice."""
         from cagefield.training.splat_config import SplatConfig
 
+        check_number("--seed", self.seed, *SEEDS)
         return SplatConfig(
             steps=SplatConfig.steps if self.steps is None else self.steps,
             minutes=self.minutes if self.steps is None else None,

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from cagefield.cli.options import Flag, Output, check_folder, progress_bar
-from cagefield.errors import CagefieldError, DatasetError
+from cagefield.cli.options import Flag, Output, check_folder, check_number, progress_bar
+from cagefield.errors import DatasetError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset, View
@@ -43,8 +43,7 @@ class Poses:
         """Makes the data set; prints what became of the photos."""
         from cagefield.datasets.structure_from_motion import RECORD
 
-        if self.frames < 3:
-            raise CagefieldError(f"--frames is {self.frames}; it must be at least 3")
+        check_number("--frames", self.frames, 3, 10_000)
         check_folder(self.out, self.overwrite, RECORD)
         print(make(self.photos, self.out, self.frames))
         self._warn_of_fold()

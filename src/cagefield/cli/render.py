@@ -102,8 +102,10 @@ class Render:
         print(f"{count} in {self.out}")
 
     def _check_options(self) -> None:
-        if self.turntable < 0:
-            raise CagefieldError(f"--turntable is {self.turntable}; give the number of pictures, 1 or more")
+        if not 0 <= self.turntable <= 100_000:
+            raise CagefieldError(
+                f"--turntable is {self.turntable!s:.20}; give the number of pictures, 1 to 100000"
+            )
         if self.turntable and self.camera_path:
             raise CagefieldError("--turntable and --camera-path exclude each other; give one of them")
         if self.dataparser_transforms and not self.camera_path:

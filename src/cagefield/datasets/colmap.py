@@ -24,6 +24,8 @@ from cagefield.lenses import Lens
 
 FloatArray = npt.NDArray[np.float64]
 
+_LONGEST_NAME = 500
+
 MODEL_FILES = ("cameras.bin", "cameras.txt")
 
 _MODEL_FOLDERS = ("sparse/0", "sparse", "colmap/sparse/0", ".")
@@ -122,10 +124,21 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
     check_whole(folder)
     try:
         model = pycolmap.Reconstruction(folder)
-        return model, [model.image(image_id) for image_id in model.reg_image_ids()]
+        images = [model.image(image_id) for image_id in model.reg_image_ids()]
+        for image in images:
+            image.name.encode()  # its bytes may be no UTF-8
+            if len(image.name) > _LONGEST_NAME:
+                raise ValueError(f"the name of an image has {len(image.name)} characters")
+        return model, images
+    except UnicodeError:
+        raise DatasetError(
+            f"{folder}: names of its images are no UTF-8 text; rename the photos and export the model again"
+        ) from None
     except Exception as error:  # pycolmap raises whatever C++ threw
         reason = " ".join(str(error).split())
-        raise DatasetError(f"{folder}: pycolmap cannot read the model ({reason}); export it again") from error
+        raise DatasetError(
+            f"{folder}: pycolmap cannot read the model ({reason:.200}); export it again"
+        ) from error
 
 
 def _upwards(folder: Path) -> Sequence[Path]:

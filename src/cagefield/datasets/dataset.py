@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
 from cagefield.datasets.raw_photos import find_raw_photos, is_video
@@ -32,6 +34,15 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
     """
     check_holdout(holdout)
     path = Path(path).expanduser()
+    try:
+        return _load(path, downscale, holdout)
+    except (np.linalg.LinAlgError, OverflowError) as error:
+        raise DatasetError(
+            f"{path}: the poses of its cameras make no sense ({error}); export them again"
+        ) from None
+
+
+def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
     if not path.exists():
         raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
     if path.is_file():

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import check_pixels
+from cagefield.rendering.images import DAMAGED, check_pixels
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
@@ -65,7 +65,7 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     with _opened(path) as image:
         try:
             pixels = image.convert("RGBA" if _has_alpha(image) else "RGB")
-        except (OSError, SyntaxError, ValueError) as error:
+        except DAMAGED as error:
             raise DatasetError(f"{path}: the image cannot be decoded ({error}); replace the file") from error
     if factor == 1:
         return np.array(pixels)
@@ -118,8 +118,8 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
 def _opened(path: Path) -> Image.Image:
     try:
         image = Image.open(path)
-        check_pixels(image)
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        check_pixels(image, path.stat().st_size)
+    except DAMAGED as error:
         raise DatasetError(
             f"{path}: not a readable image ({error}); replace the file or remove its frame"
         ) from error

@@ -125,7 +125,7 @@ class _TransformsFile:
                 raise DatasetError(f"{where} must be an object with file_path and transform_matrix")
             file_path = frame.get("file_path")
             if not isinstance(file_path, str) or not file_path:
-                raise DatasetError(f"{where}: key 'file_path' must name the photo, got {file_path!r}")
+                raise DatasetError(f"{where}: key 'file_path' must name the photo, got {file_path!r:.80}")
             name = _view_name(file_path)
             photo = find_photo(self.path.parent / name)
             if photo is None:
@@ -176,7 +176,7 @@ class _TransformsFile:
         if name is None:
             return None
         if not isinstance(name, str) or not name:
-            raise DatasetError(f"{self.path}: key 'ply_file_path' must name a PLY file, got {name!r}")
+            raise DatasetError(f"{self.path}: key 'ply_file_path' must name a PLY file, got {name!r:.80}")
         try:
             found = read_points(self.path.parent / _view_name(name))
         except DatasetError as error:
@@ -216,7 +216,7 @@ def _number(where: str, source: dict[str, Any], key: str) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise DatasetError(f"{where}: key {key!r} must be a finite number, got {value!r}")
+        raise DatasetError(f"{where}: key {key!r} must be a finite number, got {value!r:.40}")
     return float(value)
 
 
@@ -295,9 +295,9 @@ def _focal_lengths(
 
 def _lens(where: str, merged: dict[str, Any]) -> tuple[Lens, tuple[float, ...]]:
     name = merged.get("camera_model", "OPENCV")
-    if name not in _LENSES:
+    if not isinstance(name, str) or name not in _LENSES:
         raise DatasetError(
-            f"{where}: camera_model {name!r} cannot be read, only {', '.join(_LENSES)}; "
+            f"{where}: camera_model {name!r:.40} cannot be read, only {', '.join(_LENSES)}; "
             "undistort the photos first"
         )
     for key in ("lens_mode", "ftheta_p0", "latlong", "equirectangular"):
@@ -348,7 +348,7 @@ def _box(where: str, value: object) -> npt.NDArray[np.float64]:
     except (TypeError, ValueError):
         box = np.full((2, 3), np.nan)
     if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
-        raise DatasetError(f"{where}: key 'aabb' must be [[min x, y, z], [max x, y, z]], got {value}")
+        raise DatasetError(f"{where}: key 'aabb' must be [[min x, y, z], [max x, y, z]], got {value!r:.80}")
     return box
 
 

@@ -5,23 +5,21 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
 
+from cagefield import json_text, yaml_text
 from cagefield.errors import EditFileError
+from cagefield.yaml_text import DEEPEST, MOST_VALUES
 
-_MOST_VALUES = 250_000
-"""Values of a file, aliases followed: seconds to be read."""
-_DEEPEST = 20
-_HALF = re.compile(r"\\(u|U0000)[dD][89a-fA-F]")
-_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_LONGEST_PATH = 120
+"""Characters of a key path in a message."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Node:
     """A value, with its file, line (0 where unknown) and key path.
 
@@ -38,7 +36,8 @@ class Node:
     def error(self, message: str) -> EditFileError:
         """An `EditFileError` that says where this value stands."""
         where = f"{self.source}, line {self.line}" if self.line else self.source
-        return EditFileError(f"{where}: {self.path}: {message}" if self.path else f"{where}: {message}")
+        path = self.path if len(self.path) <= _LONGEST_PATH else f"...{self.path[-_LONGEST_PATH:]}"
+        return EditFileError(f"{where}: {path}: {message}" if path else f"{where}: {message}")
 
     @property
     def is_list(self) -> bool:
@@ -150,42 +149,13 @@ def read_yaml(text: str, source: str, *, halves: bool = False) -> Node:
 
     With `halves` it may have escapes of half characters, such as "\ud800".
     """
-    # The fast loader refuses them.
-    loader = yaml.SafeLoader if halves and _HALF.search(text) else _Loader
     try:
-        _check_extent(text, source, loader)
-        root = yaml.compose(text, Loader=loader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        # The fast loader counts the end of the text as a line of its own.
-        line = min(mark.line + 1, len(text.splitlines())) if mark else 0
-        problem = error.problem or error.context
-        raise Node(None, source, line, "").error(f"not valid YAML: {problem}") from None
-    except (yaml.YAMLError, UnicodeError) as error:
-        raise Node(None, source, 0, "").error(f"not valid YAML: {' '.join(str(error).split())}") from None
-    except RecursionError:
-        raise Node(None, source, 0, "").error("nested too deeply") from None
+        root = yaml_text.compose(text, halves=halves)
+    except yaml_text.YamlError as error:
+        raise Node(None, source, error.line, "").error(str(error)) from None
     if root is None:
         raise Node(None, source, 0, "").error('the file is empty; it needs "edits:" and a list')
-    return _from_yaml(root, source, "", (), [_MOST_VALUES])
-
-
-def _check_extent(text: str, source: str, loader: Any) -> None:
-    """Refuses what is nested too deeply or holds too many values, before anything is built of it."""
-    depth = values = 0
-    for event in yaml.parse(text, Loader=loader):
-        if isinstance(event, yaml.CollectionStartEvent):
-            depth += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            depth -= 1
-        if isinstance(event, yaml.NodeEvent):
-            values += 1
-        mark = event.start_mark
-        place = Node(None, source, mark.line + 1 if mark else 0, "")
-        if depth > _DEEPEST + 1:
-            raise place.error("nested too deeply")
-        if values > 2 * _MOST_VALUES:  # keys are events too
-            raise place.error(f"more than {_MOST_VALUES} values")
+    return _from_yaml(root, source, "")
 
 
 def read_json(text: str, source: str) -> Node:
@@ -200,16 +170,14 @@ def read_json(text: str, source: str) -> Node:
         return found
 
     try:
-        value = json.loads(text, object_pairs_hook=unique)
+        value = json_text.loads(text, unique, finite=False)
     except json.JSONDecodeError as error:
         raise Node(None, source, error.lineno, "").error(f"not valid JSON: {error.msg}") from None
     except EditFileError:
         raise
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # nested too deeply, a number of thousands of digits
         raise Node(None, source, 0, "").error(f"cannot be read: {error}") from None
-    except RecursionError:
-        raise Node(None, source, 0, "").error("nested too deeply") from None
-    return _from_json(value, source, "", 0, [_MOST_VALUES])
+    return _from_json(value, source, "", 0, [MOST_VALUES])
 
 
 def write_yaml(content: Any) -> str:
@@ -237,16 +205,9 @@ _Dumper.add_representer(list, _short_lists)
 _Dumper.add_representer(dict, _short_mappings)
 
 
-def _from_yaml(
-    node: yaml.Node, source: str, path: str, above: tuple[yaml.Node, ...], budget: list[int]
-) -> Node:
-    """The node and everything below it; `budget` counts down, so that aliases cannot multiply without end."""
+def _from_yaml(node: yaml.Node, source: str, path: str) -> Node:
+    """The node and everything below it."""
     line = node.start_mark.line + 1
-    budget[0] -= 1
-    if budget[0] < 0:
-        raise Node(None, source, line, path).error(f"more than {_MOST_VALUES} values")
-    if any(node is parent for parent in above) or len(above) > _DEEPEST:
-        raise Node(None, source, line, path).error("nested too deeply")
     if isinstance(node, yaml.MappingNode):
         mapping: dict[Any, Node] = {}
         for key_node, value_node in node.value:
@@ -256,13 +217,10 @@ def _from_yaml(
             if key in mapping:
                 raise Node(None, source, at, here).error(f"key {_quoted(key)} is given twice; remove one")
             # An error about a value is where its key stands, not where a block under it starts.
-            mapping[key] = replace(_from_yaml(value_node, source, here, (*above, node), budget), line=at)
+            mapping[key] = replace(_from_yaml(value_node, source, here), line=at)
         return Node(mapping, source, line, path)
     if isinstance(node, yaml.SequenceNode):
-        items = [
-            _from_yaml(item, source, f"{path}[{n}]", (*above, node), budget)
-            for n, item in enumerate(node.value)
-        ]
+        items = [_from_yaml(item, source, f"{path}[{n}]") for n, item in enumerate(node.value)]
         return Node(items, source, line, path)
     raw = str(node.value) if isinstance(node, yaml.ScalarNode) and not node.style else None
     return Node(_scalar(node, Node(None, source, line, path)), source, line, path, raw)
@@ -270,10 +228,9 @@ def _from_yaml(
 
 def _scalar(node: yaml.Node, place: Node) -> Any:
     try:
-        value = yaml.constructor.SafeConstructor().construct_object(node)
-    except Exception as error:  # constructors of tags raise anything on values that are not theirs
-        problem = getattr(error, "problem", None) or str(error) or type(error).__name__
-        raise place.error(f"cannot be read: {problem}") from None
+        value = yaml_text.scalar(node)
+    except yaml_text.YamlError as error:
+        raise place.error(str(error)) from None
     if isinstance(value, str) and isinstance(node, yaml.ScalarNode) and not node.style:
         # YAML 1.1 takes 1e-3 for text; a person means a number.
         try:
@@ -288,9 +245,9 @@ def _scalar(node: yaml.Node, place: Node) -> Any:
 def _from_json(value: Any, source: str, path: str, depth: int, budget: list[int]) -> Node:
     budget[0] -= 1
     if budget[0] < 0:
-        raise Node(None, source, 0, path).error(f"more than {_MOST_VALUES} values")
-    if depth > _DEEPEST:
-        raise Node(None, source, 0, path[:80]).error("nested too deeply")
+        raise Node(None, source, 0, path).error(f"more than {MOST_VALUES} values")
+    if depth > DEEPEST:
+        raise Node(None, source, 0, path).error("nested too deeply")
     if isinstance(value, dict):
         children = {
             key: _from_json(item, source, f"{path}.{key}" if path else key, depth + 1, budget)

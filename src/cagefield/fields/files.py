@@ -40,10 +40,10 @@ def read_tensors(
         metadata = file.metadata() or {}
         tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     if metadata.get("kind") != kind:
-        raise FieldError(f"{path}: kind is {metadata.get('kind')!r}, expected {kind!r}")
+        raise FieldError(f"{path}: kind is {metadata.get('kind')!r:.60}, expected {kind!r}")
     if metadata.get("version") != version:
         raise FieldError(
-            f"{path}: field format {metadata.get('version')!r}, this cagefield reads "
+            f"{path}: field format {metadata.get('version')!r:.60}, this cagefield reads "
             f"{version!r}; update cagefield"
         )
     return metadata, tensors
@@ -55,11 +55,15 @@ def _opened(path: str | Path) -> Iterator[Any]:
     from safetensors import SafetensorError, safe_open
 
     try:
+        with open(path, "rb"):  # safetensors calls a file that may not be read one that is not there
+            pass
         with safe_open(str(path), framework="numpy") as file:
             yield file
+    except PermissionError as error:
+        raise FieldError(f"{path}: it may not be read ({error.strerror}); make it readable") from error
     except (SafetensorError, OSError) as error:
         raise FieldError(
-            f"{path}: not a readable field file ({error}); it may be truncated, write it again"
+            f"{path}: not a readable field file ({error!s:.160}); it may be truncated, write it again"
         ) from error
 
 

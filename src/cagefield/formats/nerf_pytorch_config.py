@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from cagefield import yaml_text
 from cagefield.errors import FieldError
 
 NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
@@ -63,16 +62,16 @@ def read_config(path: Path | str) -> Settings:
         raise FieldError(f"{path}: no such config; give args.txt, config.txt or config.yml of the training")
     try:
         text = path.read_text(encoding="utf-8")
-        document = yaml.safe_load(text) if path.suffix in (".yml", ".yaml") else None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        document = yaml_text.loads(text) if path.suffix in (".yml", ".yaml") else None
+    except (OSError, UnicodeDecodeError, yaml_text.YamlError) as error:
         reason = " ".join(str(error).split())[:120].strip()
         raise FieldError(f"{path}: not a readable config ({reason}); {_CURE}") from error
     try:
         return _krrish94(document) if isinstance(document, dict) else _yenchenlin(text)
     except FieldError as error:
-        raise FieldError(f"{path}: {error}") from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        reason = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise FieldError(f"{path}: {error!s:.300}") from None
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        reason = f"{error!s:.60} is missing" if isinstance(error, KeyError) else f"{error!s:.160}"
         raise FieldError(f"{path}: not a nerf-pytorch config ({reason}); {_CURE}") from error
 
 
@@ -88,7 +87,7 @@ def _yenchenlin(text: str) -> Settings:
         raise FieldError(f"not a nerf-pytorch config: it has none of {', '.join(sorted(_OWN))}; {_CURE}")
     if values.get("i_embed", "0") not in ("0", "-1"):
         raise FieldError(
-            f"i_embed = {values['i_embed']}; only positional encodings (0) or none (-1) are read"
+            f"i_embed = {values['i_embed']:.40}; only positional encodings (0) or none (-1) are read"
         )
 
     def flag(name: str) -> bool:
@@ -117,7 +116,7 @@ def _krrish94(document: dict[str, Any]) -> Settings:
     for part in document.get("models", {}).values():
         for key in ("log_sampling_xyz", "log_sampling_dir"):
             if part.get(key, True) is not True:
-                raise FieldError(f"{key} is {part[key]}; only octaves (true) are read")
+                raise FieldError(f"{key} is {part[key]!r:.40}; only octaves (true) are read")
     near, far = float(data["near"]), float(data["far"])
     if not 0.0 <= near < far:
         raise FieldError(f"near is {near:g} and far {far:g}; they must satisfy 0 <= near < far")

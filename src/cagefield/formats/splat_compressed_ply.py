@@ -167,7 +167,7 @@ def _unpacked(vertex: Columns, chunk: Columns, harmonics: Columns, degree: int) 
     position, rotation, scale, colour = (vertex[name].astype(np.uint32) for name in _PACKED)
     row = np.arange(len(position)) // CHUNK
     rgba = _bits(colour, (24, 8), (16, 8), (8, 8), (0, 8))
-    rgb = _between(chunk, "", "rgb", row, rgba[:, :3]) if "min_r" in chunk else rgba[:, :3]
+    rgb = _between(chunk, "", "rgb", row, rgba[:, :3]) if set(_LIMITS[12:]) <= chunk.keys() else rgba[:, :3]
     rest = {
         name: 8.0 * (np.where(values == 255, 1.0, np.where(values == 0, 0.0, (values + 0.5) / 256.0)) - 0.5)
         for name, values in ((name, values.astype(np.float64)) for name, values in harmonics.items())

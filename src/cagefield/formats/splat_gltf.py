@@ -53,7 +53,7 @@ def open_splat_gltf(path: Path) -> SplatSource:
     except FieldError:
         raise
     except KeyError as error:
-        raise _damaged(path, f"it has no {error.args[0]}") from None
+        raise _damaged(path, f"it has no {error.args[0]!s:.60}") from None
     except (
         ValueError,
         TypeError,
@@ -152,7 +152,9 @@ def _is_linear(path: Path, primitive: dict[str, Any]) -> bool:
             stacklevel=2,
         )
     elif space != SRGB:
-        warnings.warn(f"{path}: its colour space {space!r} is not known and taken as {SRGB}", stacklevel=2)
+        warnings.warn(
+            f"{path}: its colour space {space!r:.60} is not known and taken as {SRGB}", stacklevel=2
+        )
     return bool(space == LINEAR)
 
 

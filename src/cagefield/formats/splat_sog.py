@@ -38,6 +38,9 @@ PALETTE_WIDTH = 64
 """Centroids side by side."""
 
 _MOST_META = 1 << 24
+_DENSEST, _ALWAYS = 4, 1 << 16
+"""Splats for each byte of the images, at most: honest files take 8 bytes or more for each."""
+
 _MOST_CENTROIDS = (1 << 16) * 24
 """Pixels of a palette: labels have 16 bits, a centroid at most 24 harmonics above degree 0."""
 
@@ -85,12 +88,13 @@ def _open(path: Path, content: Images) -> SplatSource:
     except FieldError:
         raise
     except KeyError as error:
-        raise _damaged(path, f"it has no {error.args[0]}") from None
+        raise _damaged(path, f"it has no {error.args[0]!s:.60}") from None
     except (
         ValueError,
         TypeError,
         IndexError,
         OSError,
+        EOFError,
         AttributeError,
         OverflowError,
         RecursionError,
@@ -109,11 +113,15 @@ def _source(path: Path, meta: dict[str, Any], content: Images) -> SplatSource:
     count = int(meta["means"]["shape"][0] if old else meta["count"])
     if count < 1:
         raise ValueError(f"it says that it holds {count} splats")
+    means = meta["means"]["files"]
+    size = sum(len(content(name)) for name in means)
+    if count > max(_ALWAYS, _DENSEST * size):
+        raise ValueError(f"it says that it holds {count} splats, their places have {size} bytes")
 
     def image(name: str, channels: int) -> NDArray[np.uint8]:
         return _pixels(content(name), name, channels, count)
 
-    low, high = (image(name, 3)[:count] for name in meta["means"]["files"])
+    low, high = (image(name, 3)[:count] for name in means)
     quats = image(meta["quats"]["files"][0], 4)[:count]
     scales = image(meta["scales"]["files"][0], 3)[:count]
     sh0 = image(meta["sh0"]["files"][0], 4)[:count]

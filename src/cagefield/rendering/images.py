@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import struct
+import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
@@ -21,16 +23,28 @@ from cagefield.typing import UInt8
 MOST_PIXELS = 100 << 20
 """Pixels of a picture that is read: a file of kilobytes may have any number of them."""
 
+_DENSEST, _ALWAYS = 1100, 1 << 18
+"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
-def check_pixels(image: Image.Image) -> None:
+DAMAGED = (
+    OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
+    RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
+)  # fmt: skip
+"""What pillow raises of damaged pictures."""
+
+
+def check_pixels(image: Image.Image, size: int | None = None) -> None:
     """Passes where an opened picture, of which only the header is read, has at most MOST_PIXELS.
 
-    Raises ValueError.
+    `size` bytes of its file can hold so many, too. Raises ValueError.
     """
-    if image.width * image.height > MOST_PIXELS:
+    count = image.width * image.height
+    if count > MOST_PIXELS:
         raise ValueError(
             f"{image.width} x {image.height} pixels, at most {MOST_PIXELS >> 20} million are read; shrink it"
         )
+    if size is not None and count > max(_ALWAYS, _DENSEST * size):
+        raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
 def read_image(path: str | os.PathLike[str]) -> UInt8:
@@ -43,7 +57,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
     try:
         with Image.open(path) as file:
             image: Image.Image = file
-            check_pixels(image)
+            check_pixels(image, path.stat().st_size)
             image.load()
             if image.mode.startswith("I"):
                 image = Image.fromarray((np.asarray(image) / 257.0 + 0.5).astype(np.uint8))
@@ -51,7 +65,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
             return np.array(image.convert("RGBA" if transparent else "RGB"))
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: there is no such image") from error
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except DAMAGED as error:
         raise DatasetError(f"{path}: not a readable image ({error})") from error
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,10 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
         CagefieldError: no such file, a damaged one, or one of another training.
     """
     try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > path.stat().st_size:  # none is packed
+            raise ValueError(f"it says that it unpacks to {unpacked} bytes")
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         scalars, written_for = json_text.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))
@@ -39,7 +44,7 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
             f"{path}: the checkpoint of another kind of training; give the field that it was started with"
         ) from error
     except Exception as error:  # zipfile raises its own classes on damaged archives
-        raise CagefieldError(f"{path}: not a readable checkpoint ({error}); start anew") from error
+        raise CagefieldError(f"{path}: not a readable checkpoint ({error!s:.160}); start anew") from error
     if written_for != signature:
         raise CagefieldError(f"{path}: written for other photos or settings; start anew")
     return scalars, arrays

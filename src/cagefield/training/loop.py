@@ -14,7 +14,10 @@ from typing import Any, Protocol
 from cagefield.errors import CagefieldError, line_of
 
 CHECKPOINT_SECONDS = 60.0
-"""Seconds of training between two checkpoints."""
+"""Seconds of training between two checkpoints, at most."""
+
+FIRST_CHECKPOINT = 5.0
+"""Seconds to the first one; as many to the next, then twice as many each time."""
 
 
 class Run(Protocol):
@@ -50,8 +53,9 @@ def run_to_end(
 ) -> bool:
     """True when the run was finished, False when Ctrl-C ended it early.
 
-    Its state is written to `checkpoint` every minute and at its end, early or not; `resume` continues from
-    there: a run that was finished is so at once. Where it cannot be written (a full disk) a warning says so,
+    Its state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at its end,
+    early or not; `resume` continues from there: a run that was finished is so at once. Where it cannot be
+    written (a full disk) a warning says so,
     the last one is kept, and the run goes on.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
@@ -74,13 +78,18 @@ def run_to_end(
             if on_progress is not None:
                 on_progress(run.progress())
             after_step(before)
-            if checkpoint is not None and run.seconds - saved > CHECKPOINT_SECONDS:
+            if checkpoint is not None and run.seconds - saved > _until_next(saved):
                 saved = run.seconds
                 if _stored(run, checkpoint):
                     stored = run.step
         if checkpoint is not None and run.step != stored:
             _stored(run, checkpoint)
     return run.done >= 1.0
+
+
+def _until_next(saved: float) -> float:
+    """Seconds of training to the next checkpoint: a kill costs half of a short training, or a minute."""
+    return min(CHECKPOINT_SECONDS, max(FIRST_CHECKPOINT, saved))
 
 
 def _stored(run: Run, checkpoint: Path) -> bool:

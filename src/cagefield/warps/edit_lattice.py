@@ -18,6 +18,11 @@ from cagefield.warps.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
 from cagefield.warps.trilinear_shell import TrilinearShell
 from cagefield.warps.weak_memo import kept
 
+NODE_BYTES = 32
+"""Bytes of a node: 12 as it is sampled, 12 in the stack, and the padding of what kernels hold."""
+
+_ALWAYS = 64
+
 LATTICE_STRAIN = 1.0
 """Strain of a step (see `FlowShell`) for a lattice of up to 32^3 nodes; finer ones take (R / 32)^-1/2 of it.
 
@@ -43,8 +48,12 @@ def lattice_of(edit: PackedEdit) -> Lattice:
 
 @kept
 def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
-    """The nodes [R^3,3] of a continuous edit's lattice, x fastest; raises as `lattice_of` does."""
+    """The nodes [R^3,3] of a continuous edit's lattice, x fastest; raises as `lattice_of` does.
+
+    `EditError` too where they and what is made of them would take most of the memory that is free.
+    """
     warp, resolution = _warp_and_resolution(edit)
+    _check_memory(resolution)
     devices.start()
     if isinstance(warp.shell, FlowShell):
         strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
@@ -60,6 +69,15 @@ def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
     params[0, [RESOLUTION, SIMPLE]] = 0.0
     sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
     return nodes
+
+
+def _check_memory(resolution: int) -> None:
+    needed, free = NODE_BYTES * resolution**3, devices.free_memory()
+    if resolution > _ALWAYS and free is not None and needed > free // 2:
+        raise EditError(
+            f"a lattice of {resolution} nodes per axis takes {needed / 1e9:.1f} GB, of the "
+            f"{free / 1e9:.1f} GB that are free at most half is taken; give it a lower resolution"
+        )
 
 
 def _warp_and_resolution(edit: PackedEdit) -> tuple[ContinuousWarp, int]:

@@ -32,21 +32,26 @@ export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveA
     file.value = "";
   };
   const save = iconButton(Save, "Save (Ctrl+S)", () => actions.save(), "save");
+  const saveAs = iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as");
+  const load = iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load");
   const splats = iconButton(FileDown, "Download the edited splats…", () => dialogs.download(), "download");
   const panel = iconButton(PanelRight, "Panel (N)", () => actions.toggle("panel"), "panel-toggle");
   app.store.watch(["state", "hello", "view", "split", "grid", "panel", "mode"], (now) => {
     name.textContent = now.hello?.name ?? "";
     unsaved.classList.toggle("shown", now.state?.saved === false);
     save.classList.toggle("due", now.state?.saved === false);
-    undo.disabled = (now.state?.entry ?? 0) <= 0;
-    redo.disabled = now.state === null || now.state.entry >= now.state.history.length - 1;
+    const looking = now.hello?.read_only === true;
+    for (const button of [save, saveAs, load]) button.hidden = looking;
+    undo.disabled = looking || (now.state?.entry ?? 0) <= 0;
+    redo.disabled = looking || now.state === null || now.state.entry >= now.state.history.length - 1;
     for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
-    splats.hidden = now.hello?.splats !== true;
+    splats.hidden = looking || now.hello?.splats !== true;
     split.classList.toggle("on", now.split !== null);
     grid.classList.toggle("on", now.grid);
     panel.classList.toggle("on", now.panel);
-    mode.textContent = now.mode === "set" ? "Set cages" : "Edit field";
-    mode.dataset.mode = now.mode;
+    mode.textContent = looking ? "Read only" : now.mode === "set" ? "Set cages" : "Edit field";
+    mode.title = looking ? "This link may look but not change anything" : "";
+    mode.dataset.mode = looking ? "look" : now.mode;
   });
   const screenshot = iconLink(Camera, "Screenshot of the field", "screenshot.png", "screenshot.png");
   app.store.watch(["hello"], ({ hello }) => {
@@ -70,8 +75,8 @@ export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveA
       "div",
       { class: "group" },
       save,
-      iconButton(SaveAll, "Save as… (Ctrl+Shift+S)", () => dialogs.saveAs(), "save-as"),
-      iconButton(FolderOpen, "Load an edit file, or open splats…", () => file.click(), "load"),
+      saveAs,
+      load,
       iconLink(Download, "Download the edit file", `edits.yaml${location.search}`, "edits.yaml"),
       splats,
       screenshot,

@@ -22,6 +22,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
+from cagefield.leftovers import remove_leftovers
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
@@ -52,6 +53,8 @@ class SceneStore:
         self._lock: SceneLock | None = None
         self.trouble: str | None = None
         """Why the last autosave failed, or None."""
+        self.damaged: str | None = None
+        """What became of an autosave that could not be read, or None."""
         self._written = self._fingerprint()
         self._warned = ""
         self._kept: Document | None = None
@@ -86,11 +89,11 @@ class SceneStore:
             with contextlib.suppress(OSError):
                 self.autosave_path.replace(aside)
             reason = " ".join(str(error).split())[:120]
-            warnings.warn(
+            self.damaged = (
                 f"unsaved changes in {self.autosave_path} cannot be read ({reason}); "
-                f"they are kept as {aside.name}",
-                stacklevel=2,
+                f"they are kept as {aside.name}"
             )
+            warnings.warn(self.damaged, stacklevel=2)
             return None
         return None if document == self.document() else document
 
@@ -100,8 +103,12 @@ class SceneStore:
         return self.path if self.source is None else self.source.with_name(f"{stem_of(self.source)}-scene")
 
     def lock(self) -> None:
-        """Keeps other programs from editing the scene. Raises SceneError where one does."""
+        """Keeps other programs from editing the scene, and removes what ended ones left half-written.
+
+        Raises SceneError where another one does edit it.
+        """
         self._lock = SceneLock(self.path)
+        remove_leftovers(self.path, inside=True)
 
     def close(self) -> None:
         """Lets other programs edit the scene."""

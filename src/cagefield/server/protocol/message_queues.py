@@ -13,6 +13,12 @@ from cagefield.server.protocol import client_messages, server_messages
 MOST_WAITING = 200
 """Messages that wait for a page that takes none; older ones are dropped."""
 
+MOST_BYTES_WAITING = 32 << 20
+"""Bytes that wait for a page; with more it has to come again."""
+
+MOST_RECEIVED = 64
+"""Messages of a page that wait to be done; no more are read meanwhile."""
+
 
 class SendQueue:
     """Messages to a page in order; those that a newer one supersedes are not sent."""
@@ -20,6 +26,7 @@ class SendQueue:
     def __init__(self) -> None:
         self.waiting: deque[tuple[str | None, str | bytes | None]] = deque()
         self._some = asyncio.Event()
+        self._ended = False
 
     def __len__(self) -> int:
         return len(self.waiting)
@@ -31,17 +38,26 @@ class SendQueue:
             self.waiting = deque(item for item in self.waiting if item[0] != superseded)
         elif len(self.waiting) >= MOST_WAITING:
             self.waiting.popleft()
-        self.waiting.append((message.redundancy_key(), _text(message)))
-        self._some.set()
+        self._append(message.redundancy_key(), _text(message))
 
     def put_picture(self, content: bytes) -> None:
         """One picture more; there are never more than two on their way."""
-        self.waiting.append((None, content))
-        self._some.set()
+        self._append(None, content)
 
     def end(self) -> None:
         """Nothing comes after what waits."""
-        self.waiting.append((None, None))
+        self._append(None, None)
+        self._ended = True
+
+    def _append(self, key: str | None, content: str | bytes | None) -> None:
+        if self._ended:
+            return
+        size = sum(len(item[1] or "") for item in self.waiting) + len(content or "")
+        if size > MOST_BYTES_WAITING and self.waiting:
+            self.waiting.clear()
+            key = content = None
+            self._ended = True
+        self.waiting.append((key, content))
         self._some.set()
 
     async def get(self) -> str | bytes | None:
@@ -57,7 +73,7 @@ class ReceiveQueue:
 
     def __init__(self) -> None:
         self.waiting: deque[client_messages.PageMessage] = deque()
-        self._some = asyncio.Event()
+        self._some, self._room = asyncio.Event(), asyncio.Event()
 
     def put(self, message: client_messages.PageMessage) -> None:
         """One message more."""
@@ -76,7 +92,14 @@ class ReceiveQueue:
         while not self.waiting:
             self._some.clear()
             await self._some.wait()
+        self._room.set()
         return self.waiting.popleft()
+
+    async def room(self) -> None:
+        """Returns when there is room for one more message."""
+        while len(self.waiting) >= MOST_RECEIVED:
+            self._room.clear()
+            await self._room.wait()
 
 
 def _text(message: server_messages.ServerMessage) -> str:

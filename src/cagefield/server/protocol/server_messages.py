@@ -44,6 +44,8 @@ class Hello(Message):
     start: CameraMessage
     cameras: list[Pose]
     """Test cameras, or the training ones, to jump to."""
+    read_only: bool = False
+    """True where the page may look and not change anything: its link is one for that."""
 
 
 class EditState(Message):

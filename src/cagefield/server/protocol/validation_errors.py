@@ -25,7 +25,7 @@ def refusal(error: ValidationError) -> str:
     if where and where[0] == "set_path":
         return f"the camera path is not taken: {_of_path(where[1:])}"
     said = f"{'.'.join(map(str, where))}: {problem['msg']}" if where else str(problem["msg"])
-    return f"malformed message: {said}; reload the page"
+    return f"malformed message: {said:.200}; reload the page"
 
 
 def _of_path(where: Sequence[int | str]) -> str:

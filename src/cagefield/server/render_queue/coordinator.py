@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -69,6 +70,8 @@ class Coordinator:
         self.store = store
         self.device = device
         self.pages: dict[int, Page] = {}
+        self.loading = asyncio.Lock()
+        """Held while an edit file of a page is read."""
         shown = store.scene.field
         self.spread = spread(shown) if isinstance(shown, SplatField) else 0.0
         """How far beside where an edit maps points its content shows, world units."""

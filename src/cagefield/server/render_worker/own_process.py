@@ -9,7 +9,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from cagefield.errors import CagefieldError, warnings_in_one_line
+from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
+from cagefield.server.render_worker.lifeline import end_with_parent
 
 
 async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
@@ -38,12 +39,13 @@ async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
 @warnings_in_one_line()
 def _serve(connection: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     try:
         result = work(*args)
     except CagefieldError as error:
         result = CagefieldError(str(error))
     except OSError as error:
-        result = CagefieldError(f"{error.filename or 'the file'}: {error.strerror or error}")
+        result = CagefieldError(line_of(error))
     except Exception as error:
         result = CagefieldError(f"that failed: {type(error).__name__}: {error}")
     connection.send(result)

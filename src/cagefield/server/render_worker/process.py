@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
+from cagefield.server.render_worker.lifeline import end_with_parent
 from cagefield.server.render_worker.tasks import Failed, Ready, Result, Task
 
 TO_END = 10.0
@@ -28,6 +29,7 @@ _LOST = (EOFError, OSError)
 def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
     """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
     from cagefield import devices
     from cagefield.scene import Scene
     from cagefield.server.render_worker.renderer_cache import RendererCache

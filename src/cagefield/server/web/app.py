@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from urllib.parse import urlencode
@@ -22,7 +23,7 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.dispatcher import TooManyError
 from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
-from cagefield.server.web.security import Guard
+from cagefield.server.web.security import Attempts, Guard
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
 
@@ -68,7 +69,8 @@ def application(
         editor.close()
 
     async def socket(websocket: WebSocket) -> None:
-        await attend(websocket, editor.coordinator, editor.hello)
+        may_edit = websocket.scope["cagefield.role"] == "edit"
+        await attend(websocket, editor.coordinator, editor.hello, may_edit)
 
     async def edits(_: Request) -> Response:
         coordinator = editor.coordinator
@@ -181,13 +183,20 @@ class _Guarded:
     """Lets through what the guard lets through, and adds the headers of every answer."""
 
     def __init__(self, app: ASGIApp, guard: Guard) -> None:
-        self._app, self._guard = app, guard
+        self._app, self._guard, self._attempts = app, guard, Attempts()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         connection = HTTPConnection(scope)
+        address, now = (scope.get("client") or ("", 0))[0], time.monotonic()
+        given = self._guard.given(connection.headers, connection.cookies, connection.query_params)
+        role = self._guard.role(given)
+        too_many = self._guard.can_be_guessed and self._attempts.is_locked(address, now)
+        if role is None and given:
+            too_many = not self._attempts.wrong(address, now) or too_many
+        scope["cagefield.role"] = role
         refusal = self._guard.refusal(
             connection.headers,
             connection.cookies,
@@ -195,6 +204,11 @@ class _Guarded:
             needs_origin=scope["type"] == "websocket" or scope["method"] not in _READING,
             has_data=scope["type"] == "websocket" or scope["path"] not in _PAGE,
         )
+        status = 403
+        if too_many:
+            status, refusal = 429, "too many wrong tokens; wait some seconds"
+        elif refusal is None and role == "look" and scope.get("method", "GET") not in _READING:
+            refusal = "this link may look but not change anything"
         if scope["type"] == "websocket":
             if refusal is None:
                 await self._app(scope, receive, send)
@@ -204,23 +218,28 @@ class _Guarded:
             return
         respond = _with_headers(send)
         if refusal is not None:
-            await PlainTextResponse(refusal + "\n", 403)(scope, receive, respond)
+            await PlainTextResponse(refusal + "\n", status)(scope, receive, respond)
         elif (
             self._guard.token is not None
             and "token" in connection.query_params
             and scope["method"] in _READING
         ):
-            await self._keep_token(scope, receive, respond)
+            await self._keep_token(given, scope, receive, respond)
         else:
             await self._app(scope, receive, respond)
 
-    async def _keep_token(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _keep_token(self, token: str, scope: Scope, receive: Receive, send: Send) -> None:
         """The token moves from the address to a cookie; what else the address says stays."""
         others = [(k, v) for k, v in HTTPConnection(scope).query_params.multi_items() if k != "token"]
         path = "/" + scope["path"].lstrip("/\\")  # two of them would be another site
         response = RedirectResponse(path + (f"?{urlencode(others)}" if others else ""), 303)
         response.set_cookie(
-            self._guard.cookie, self._guard.token or "", httponly=True, samesite="strict", max_age=30 * 86400
+            self._guard.cookie,
+            token,
+            httponly=True,
+            samesite="strict",
+            max_age=30 * 86400,
+            secure=scope.get("scheme") == "https",
         )
         await response(scope, receive, send)
 

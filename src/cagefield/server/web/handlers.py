@@ -56,11 +56,22 @@ _EDIT_COMMANDS: dict[str, Callable[[Session, int], int | None]] = {
 }
 
 
+_LOOKING = (
+    common.CameraMessage,
+    client_messages.DisplayMessage,
+    client_messages.PresentedMessage,
+    client_messages.Drawing,
+    client_messages.Ask,
+)
+"""What changes nothing that other pages see, and no file: all that pages of read-only links may say."""
+
+
 class MessageHandlers:
     """Does what one page's messages say. Raises CagefieldError where a message cannot be followed."""
 
-    def __init__(self, coordinator: Coordinator, page: Page) -> None:
-        self._coordinator, self._page = coordinator, page
+    def __init__(self, coordinator: Coordinator, page: Page, may_edit: bool = True) -> None:
+        """A page that may not edit may send what `_LOOKING` has, and nothing else."""
+        self._coordinator, self._page, self._may_edit = coordinator, page, may_edit
         self._session = coordinator.session
 
     def handle(self, message: client_messages.PageMessage) -> Coroutine[Any, Any, None] | None:
@@ -68,6 +79,8 @@ class MessageHandlers:
 
         Returns the rest where it has to wait for the rendering process; other messages need not wait.
         """
+        if not self._may_edit and not isinstance(message, _LOOKING):
+            raise CagefieldError("this link may look but not change anything; ask for the one that may")
         return _HANDLERS[type(message)](self, message)
 
     # ---- seeing ----

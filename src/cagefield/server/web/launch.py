@@ -7,6 +7,8 @@ import hashlib
 import math
 import os
 import socket
+import ssl
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,7 @@ from cagefield.server.protocol.conversion import vec3
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
 from cagefield.server.web.opening import scene_of_file
+from cagefield.server.web.patience import PatientHttp
 from cagefield.server.web.security import Guard
 
 
@@ -60,6 +63,8 @@ def open_cached(
     if recovered is not None:
         session.restore(recovered)
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
+    elif store.damaged is not None:
+        coordinator.greeting = store.damaged
     name = path.resolve().name if source is None else source.name
     return coordinator, hello_of(scene, name, str(path.resolve()))
 
@@ -69,6 +74,7 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
     cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds
+    fov = math.degrees(2.0 * math.atan(0.5 * first.height / first.fy))
     poses = [camera.c2w for camera in cameras]
     every = [camera.c2w for group in scene.cameras.values() for camera in group]
     return server_messages.Hello(
@@ -86,7 +92,7 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
             c2w=first.c2w.reshape(-1).tolist(),
             width=min(max(first.width, 16), 4096),
             height=min(max(first.height, 16), 4096),
-            fov_y_deg=math.degrees(2.0 * math.atan(0.5 * first.height / first.fy)),
+            fov_y_deg=min(max(fov, 0.11), 178.9),
         ),
         cameras=[pose.reshape(-1).tolist() for pose in poses],
     )
@@ -118,11 +124,12 @@ def bound_socket(host: str, port: int) -> socket.socket:
     """
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "no name that can be looked up"
         raise CagefieldError(
-            f"--host {host} is no address ({error.strerror}); give one of this machine's"
+            f"--host {host:.80} is no address ({reason}); give one of this machine's"
         ) from None
-    reason: str | None = None
+    reason = None
     for family, _, _, _, address in found:
         listening = socket.socket(family)
         try:
@@ -139,10 +146,41 @@ def bound_socket(host: str, port: int) -> socket.socket:
     )
 
 
+@dataclass(frozen=True)
+class Certificate:
+    """Files in PEM that let pages speak to the editor encrypted: the certificate with its chain, and its key.
+
+    Raises CagefieldError where they cannot be read or do not belong together.
+    """
+
+    file: Path
+    key: Path | None = None
+
+    def __post_init__(self) -> None:
+        def no_password() -> str:
+            raise CagefieldError(f"the key of {self.file} has a password; give one without")
+
+        try:
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.file, self.key, no_password)
+        except ssl.SSLError as error:
+            raise CagefieldError(
+                f"{self.file}: no certificate with its key ({error.reason or error}); give PEM files that "
+                "belong together (--certificate, --certificate-key)"
+            ) from None
+        except OSError as error:
+            where = self.file if self.key is None else f"{self.file} and {self.key}"
+            raise CagefieldError(f"{where}: cannot be read ({error.strerror})") from None
+
+
 def serve(
-    coordinator: Coordinator, hello: server_messages.Hello, guard: Guard, listening: socket.socket
+    coordinator: Coordinator,
+    hello: server_messages.Hello,
+    guard: Guard,
+    listening: socket.socket,
+    certificate: Certificate | None = None,
 ) -> None:
-    """Runs the web server to its end (Ctrl+C, or a signal to terminate)."""
+    """Runs the web server to its end (Ctrl+C, or a signal to terminate), over TLS with a certificate."""
+    _allow_many_connections()
     device = coordinator.device
 
     def reopen(scene: Path, source: Path) -> tuple[Coordinator, server_messages.Hello]:
@@ -151,10 +189,26 @@ def serve(
     config = uvicorn.Config(
         application(coordinator, hello, guard, reopen),
         log_level="warning",
+        http=PatientHttp,
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,
         server_header=False,
+        ssl_certfile=None if certificate is None else certificate.file,
+        ssl_keyfile=None if certificate is None or certificate.key is None else certificate.key,
     )
     with contextlib.suppress(KeyboardInterrupt):
         uvicorn.Server(config).run(sockets=[listening])
+
+
+def _allow_many_connections() -> None:
+    """As many open files as this user may have, up to some thousands: connections of others take them."""
+    try:
+        import resource
+    except ImportError:  # another system
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = 8192 if hard == resource.RLIM_INFINITY else min(8192, hard)
+    if soft < wanted:
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -16,10 +16,14 @@ import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 from urllib.parse import urlsplit
 
 _LEAST = 32
-"""Characters of a token that is taken from a file of ours."""
+"""Characters of a token that is taken from a file of ours: those nobody guesses."""
+
+Role = Literal["edit", "look"]
+"""What a token lets its holder do."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -29,13 +33,14 @@ def new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-def own_token() -> str:
+def own_token(role: Role = "edit") -> str:
     """The token of this user's editors on this machine: made once, and kept where no other user reads it.
 
     Pages that are open come again by themselves when an editor is started again. A new one each time where
     it cannot be kept.
     """
-    file = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "token"
+    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield"
+    file = folder / ("token" if role == "edit" else "token-to-look")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -68,11 +73,15 @@ def is_loopback(host: str) -> bool:
 
 @dataclass(frozen=True)
 class Guard:
-    """What is checked of every request. `token` None lets everybody in who passes the other checks."""
+    """What is checked of every request. `token` None lets everybody in who passes the other checks.
+
+    Who has `look_token` in its place may look but not change anything.
+    """
 
     host: str
     port: int
     token: str | None = None
+    look_token: str | None = None
 
     @property
     def cookie(self) -> str:
@@ -101,15 +110,29 @@ class Guard:
             return f"the page at {origin!r} may not talk to this editor; open the link that was printed"
         if has_data and headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
             return "another site's page asked for this; open the link that `cagefield view` printed"
-        if self.token is None:
-            return None
-        bearer = headers.get("authorization", "").removeprefix("Bearer ")
-        given = query.get("token") or cookies.get(self.cookie) or bearer
-        if not hmac.compare_digest(given.encode(), self.token.encode()):
+        if self.role(self.given(headers, cookies, query)) is None:
             return (
                 "the token is missing or wrong; open the link that `cagefield view` printed, ?token= included"
             )
         return None
+
+    def given(self, headers: Mapping[str, str], cookies: Mapping[str, str], query: Mapping[str, str]) -> str:
+        """The token that a request has, "" for none."""
+        bearer = headers.get("authorization", "").removeprefix("Bearer ")
+        return query.get("token") or cookies.get(self.cookie) or bearer
+
+    def role(self, given: str) -> Role | None:
+        """What the holder of a token may do; None for a wrong one."""
+        if self.token is None or hmac.compare_digest(given.encode(), self.token.encode()):
+            return "edit"
+        if self.look_token is not None and hmac.compare_digest(given.encode(), self.look_token.encode()):
+            return "look"
+        return None
+
+    @property
+    def can_be_guessed(self) -> bool:
+        """Whether a token is so short that it must not be tried often."""
+        return any(token is not None and len(token) < _LEAST for token in (self.token, self.look_token))
 
     def _is_ours(self, host: str) -> bool:
         try:
@@ -148,12 +171,35 @@ class Allowance:
     level: float = 800.0
     last: float | None = None
 
-    def take(self, now: float) -> bool:
-        """True where one more message may be heard at this time, seconds of any clock."""
+    def take(self, now: float, amount: float = 1.0) -> bool:
+        """True where one more message, or that much of it, may be heard now, in seconds of any clock."""
         if self.last is not None:
             self.level = min(self.burst, self.level + self.rate * (now - self.last))
         self.last = now
-        if self.level < 1.0:
+        if self.level < amount:
             return False
-        self.level -= 1.0
+        self.level -= amount
         return True
+
+
+class Attempts:
+    """Wrong tokens by address: a few at once, then one in five seconds."""
+
+    MOST_ADDRESSES = 10_000
+
+    def __init__(self) -> None:
+        self._buckets: dict[str, Allowance] = {}
+
+    def wrong(self, address: str, now: float) -> bool:
+        """One wrong token; False where there were too many."""
+        while len(self._buckets) >= self.MOST_ADDRESSES and address not in self._buckets:
+            self._buckets.pop(next(iter(self._buckets)))
+        return self._buckets.setdefault(address, Allowance(0.2, 20.0, 20.0)).take(now)
+
+    def is_locked(self, address: str, now: float) -> bool:
+        """Whether tokens of this address are not looked at for now."""
+        bucket = self._buckets.get(address)
+        if bucket is None:
+            return False
+        bucket.take(now, 0.0)  # it fills meanwhile
+        return bucket.level < 1.0

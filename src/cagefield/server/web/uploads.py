@@ -17,6 +17,9 @@ from cagefield.server.web.opening import scene_of_file
 MOST_UPLOAD = 4 << 30
 """Largest file in bytes that a page may send: 17 million splats with harmonics of degree 3 as a PLY."""
 
+STALLED = 30.0
+"""Seconds without a byte of a file that a page sends, after which it is given up."""
+
 Opened = tuple[Coordinator, server_messages.Hello]
 Reopen = Callable[[Path, Path], Opened]
 
@@ -85,9 +88,17 @@ async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) 
     """Writes what comes into a file. Raises TooLargeError, and CagefieldError where not all of it came."""
     if size is not None and size > MOST_UPLOAD:
         raise TooLargeError(_too_large(size))
-    received = 0
+    received, blocks = 0, content.__aiter__()
     with file.open("wb") as stream:
-        async for block in content:
+        while True:
+            try:
+                block = await asyncio.wait_for(blocks.__anext__(), STALLED)
+            except StopAsyncIteration:
+                break
+            except (TimeoutError, asyncio.TimeoutError):
+                raise CagefieldError(
+                    f"{file.name}: nothing more came for {STALLED:g} s; send it again"
+                ) from None
             received += len(block)
             if received > MOST_UPLOAD:
                 raise TooLargeError(_too_large(received))

@@ -8,6 +8,7 @@ import logging
 import time
 from collections.abc import Coroutine, Iterator
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -20,8 +21,20 @@ from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.web.handlers import MessageHandlers
 from cagefield.server.web.security import Allowance
 
-TOO_BIG, TOO_MANY, COME_AGAIN = 1009, 1008, 1012
-"""Close codes of RFC 6455 and its registry: message too big, policy violation, service restart."""
+TOO_BIG, TOO_MANY, COME_AGAIN, TRY_LATER = 1009, 1008, 1012, 1013
+"""Close codes of RFC 6455 and its registry: too big, policy violation, service restart, try again later."""
+
+MOST_PAGES = 64
+"""Open pages of an editor."""
+
+TO_TAKE = 60.0
+"""Seconds in which a page must take a message that is sent to it."""
+
+QUICK = 0.02
+"""Seconds of a message after which its page waits as long again: the others have their turn."""
+
+BYTES_PER_SECOND = 4 << 20
+"""Bytes of messages that a page may send on average; four times as many at once."""
 
 _log = logging.getLogger(__name__)
 
@@ -29,19 +42,30 @@ MOST_REFUSED = 2000
 """Messages over the rate after which the socket is closed."""
 
 
-async def attend(socket: WebSocket, coordinator: Coordinator, hello: server_messages.Hello) -> None:
-    """Serves one page until it is gone."""
+OF_ALL = 1200.0
+"""Messages a second of all pages together; more wait in their lines."""
+
+_of_all: WeakKeyDictionary[asyncio.AbstractEventLoop, Allowance] = WeakKeyDictionary()
+
+
+async def attend(
+    socket: WebSocket, coordinator: Coordinator, hello: server_messages.Hello, may_edit: bool = True
+) -> None:
+    """Serves one page until it is gone; one that may not edit may look."""
     try:
         await socket.accept()
+        if len(coordinator.pages) >= MOST_PAGES:
+            await socket.close(TRY_LATER, "too many pages are open; close some")
+            return
     except (WebSocketDisconnect, ConnectionError):
         return
-    page = coordinator.join(hello)
+    page = coordinator.join(hello.model_copy(update={"read_only": not may_edit}))
     receive_queue = ReceiveQueue()
     tasks = [
         asyncio.ensure_future(work)
         for work in (
             _read(socket, page, receive_queue),
-            _do(MessageHandlers(coordinator, page), page, receive_queue),
+            _do(MessageHandlers(coordinator, page, may_edit), page, receive_queue, coordinator.loading),
             _send(socket, page),
         )
     ]
@@ -65,19 +89,22 @@ def _is_parting(socket: WebSocket, error: Exception) -> bool:
 
 
 async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> None:
-    allowance, refused = Allowance(), 0
+    burst = 4.0 * BYTES_PER_SECOND
+    every = _of_all.setdefault(asyncio.get_running_loop(), Allowance(OF_ALL, OF_ALL, OF_ALL))
+    allowance, bytes_allowed, refused = Allowance(), Allowance(BYTES_PER_SECOND, burst, burst), 0
     while True:
         received = await socket.receive()
         if received["type"] == "websocket.disconnect":
             return
         text = received.get("text")
-        if text is None:
-            page.notice("error", "a message must be text, one JSON object")
-            continue
-        if len(text.encode()) > common.MOST_BYTES:
+        size = len(received.get("bytes") or b"" if text is None else text.encode())
+        if size > common.MOST_BYTES:
             await socket.close(TOO_BIG, "message too big")
             return
-        if not allowance.take(time.monotonic()):
+        while not every.take(time.monotonic()):
+            await asyncio.sleep(0.01)  # the line holds back what more comes
+        now = time.monotonic()
+        if not (allowance.take(now) and bytes_allowed.take(now, size)):
             refused += 1
             if refused == 1:
                 page.notice("error", "too many messages; some were passed over")
@@ -85,24 +112,33 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
                 await socket.close(TOO_MANY, "too many messages")
                 return
             continue
+        if text is None:
+            page.notice("error", "a message must be text, one JSON object")
+            continue
+        await receive_queue.room()
         try:
             receive_queue.put(client_messages.page_messages.validate_json(text))
         except ValidationError as error:
             page.notice("error", refusal(error))
 
 
-async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue) -> None:
+async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue, turn: asyncio.Lock) -> None:
     waiting: set[asyncio.Task[None]] = set()
     try:
         while True:
             message = await receive_queue.get()
-            with errors_reported_to(page):
-                rest = handlers.handle(message)
-                if rest is not None:
-                    task = asyncio.ensure_future(_finish(rest, page))
-                    waiting.add(task)
-                    task.add_done_callback(waiting.discard)
-            await asyncio.sleep(0)
+            # Edit files may take a second each: one at a time of all pages, and as long again for others.
+            heavy = isinstance(message, client_messages.LoadEdits)
+            async with turn if heavy else contextlib.nullcontext():
+                begun = time.monotonic()
+                with errors_reported_to(page):
+                    rest = handlers.handle(message)
+                    if rest is not None:
+                        task = asyncio.ensure_future(_finish(rest, page))
+                        waiting.add(task)
+                        task.add_done_callback(waiting.discard)
+                took = time.monotonic() - begun
+                await asyncio.sleep(took if took > QUICK else 0)
     finally:
         for task in waiting:
             task.cancel()
@@ -133,7 +169,8 @@ async def _send(socket: WebSocket, page: Page) -> None:
         if content is None:
             await socket.close(COME_AGAIN, "another scene was opened")
             return
-        if isinstance(content, bytes):
-            await socket.send_bytes(content)
-        else:
-            await socket.send_text(content)
+        send = socket.send_bytes(content) if isinstance(content, bytes) else socket.send_text(content)
+        try:
+            await asyncio.wait_for(send, TO_TAKE)
+        except (TimeoutError, asyncio.TimeoutError):
+            return  # nobody reads; a page that is there comes again

@@ -1,0 +1,81 @@
+"""Damages files of every format that is read, and pages' messages, and counts what came of them.
+
+python benchmarks/robustness/files.py [--inputs 10000] [--readers NAME ...] [--out FILE.md]
+
+Each reader has a process of its own that tells of every input (`tests/robustness`), so that an input that
+ends it, or that it never ends, is counted and the next one tried. Inputs with faults are kept in --kept.
+About an hour of one processor for 10,000 of each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+from cagefield import devices
+from cagefield.benchmarking.machine import cpu_model
+
+TESTS = Path(__file__).resolve().parents[2] / "tests"
+sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
+
+from attack import HANG, SLACK, Outcome, attack  # noqa: E402
+from readers import READERS  # noqa: E402
+
+_COLUMNS = ("tried", "refused", "read", "crashed", "hung", "over_memory")
+
+assert set(_COLUMNS) < {field.name for field in fields(Outcome)}
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inputs", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", default="")
+    parser.add_argument("--readers", nargs="*", default=list(READERS))
+    parser.add_argument("--kept", type=Path, default=None)
+    parser.add_argument("--out", type=Path, default=None)
+    options = parser.parse_args()
+    found: dict[str, Outcome] = {}
+    for name in options.readers:
+        last = options.first + options.inputs
+        found |= attack([name], options.first, last, options.seed, options.kept)
+        print(_row(name, found[name]), flush=True)
+        for fault in found[name].faults[:20]:
+            print(f"    {fault}", flush=True)
+    if options.out is not None:
+        options.out.write_text(_table(found, options.inputs))
+
+
+def _table(found: dict[str, Outcome], inputs: int) -> str:
+    whole = Outcome()
+    for one in found.values():
+        whole.add(one)
+    head = [*(name.replace("_", " ") for name in _COLUMNS), "most memory, MiB", "slowest, s"]
+    return f"""# Damaged files and messages
+
+{inputs} inputs for each reader, damaged as `tests/robustness/mutators.py` does it. Refused: one line that
+says what is wrong. Read: what is left makes sense. Crashed: any other exception, or the end of the process.
+Hung: over {HANG:g} s of a processor, or a minute without an answer. Over memory: above twice what the honest
+file takes and {SLACK >> 20} MiB.
+
+{cpu_model()}, {devices.threads()} cores, other work beside.
+
+    python benchmarks/robustness/files.py --inputs {inputs} --out benchmarks/results/robustness_files.md
+
+| reader | {" | ".join(head)} |
+| --- |{" ---: |" * len(head)}
+{chr(10).join(_row(name, one) for name, one in found.items())}
+{_row("**all**", whole)}
+"""
+
+
+def _row(name: str, one: Outcome) -> str:
+    counts = " | ".join(str(getattr(one, column)) for column in _COLUMNS)
+    return f"| {name} | {counts} | {one.most / (1 << 20):.1f} | {one.slowest:.2f} |"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""Floods an editor in every way, and measures how long another page waits for its answers meanwhile.
+
+python benchmarks/robustness/floods.py [--seconds 20] [--floods 4] [--out FILE.md]
+
+Four pages or programs flood at a time (`tests/robustness/floods.py`). The floods and the editor share this
+machine's processors, so the first row, of an editor that nobody floods, is what to compare with.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from cagefield import devices
+from cagefield.benchmarking.machine import cpu_model
+
+TESTS = Path(__file__).resolve().parents[2] / "tests"
+sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
+
+from floods import FLOODS, during, memory  # noqa: E402
+
+from editor_server import editor_server, page  # noqa: E402
+from scenes import ball_scene  # noqa: E402
+
+EVERY = 0.2
+"""Seconds between the questions of the page that is not part of the flood."""
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--floods", type=int, default=4)
+    parser.add_argument("--only", nargs="*", default=None)
+    parser.add_argument("--out", type=Path, default=None)
+    options = parser.parse_args()
+    rows = []
+    for name, flood in {"none": lambda server, over: None, **FLOODS}.items():
+        if options.only and name not in options.only:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            ball_scene().save(Path(folder) / "scene")
+            with editor_server(Path(folder) / "scene") as server:
+                before = memory(server.process.pid)
+                if name == "screenshots":
+                    with page(server) as (client, hello):
+                        client.look_from(hello)
+                        client.final()
+                        found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)
+                else:
+                    found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)
+                time.sleep(0.5)
+                grown = (found.most - before) >> 20
+        waits = np.array(found.seconds)
+        counts = f"{len(waits)} | {np.median(waits):.2f} | {np.quantile(waits, 0.95):.2f} | {waits.max():.2f}"
+        rows.append(f"| {name} | {counts} | {int((waits > 1.0).sum())} | {grown} |")
+        print(rows[-1], flush=True)
+    if options.out is not None:
+        options.out.write_text(_table(rows, options))
+
+
+def _table(rows: list[str], options: argparse.Namespace) -> str:
+    return f"""# Floods
+
+{options.floods} pages or programs flood one editor; another page asks a question every {EVERY:g} s. Seconds
+from its question to the answer, how many took more than a second, and by how much the editor's process grew.
+
+{cpu_model()}, {devices.threads()} cores, on which the floods and other work ran too.
+
+    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods}
+
+| flood | questions | median, s | 95 %, s | longest, s | above 1 s | memory, MiB |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: |
+{chr(10).join(rows)}
+"""
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,194 @@
+"""Damaged files of every format, and messages: refused in a line, or read; no traceback, no hang, no memory.
+
+`benchmarks/robustness/files.py` tries thousands of each.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import random
+from pathlib import Path
+
+import mutators
+import pytest
+from attack import Outcome, attack
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from readers import NEED_TORCH, READERS
+
+from cagefield import json_text, yaml_text
+from cagefield.edits import dump_edits, parse_edits
+from cagefield.errors import CagefieldError
+
+INPUTS = 8
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> dict[str, Outcome]:
+    """What came of some inputs of every reader, all in one process."""
+    missing = () if importlib.util.find_spec("torch") else NEED_TORCH
+    return attack([name for name in READERS if name not in missing], 0, INPUTS, "tests")
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_damaged_files(name: str, outcomes: dict[str, Outcome]) -> None:
+    if name not in outcomes:
+        pytest.skip("checkpoints are read by PyTorch, which is not installed (extra nerf)")
+    found = outcomes[name]
+    assert found.faults == []
+    assert found.tried == INPUTS == found.refused + found.read
+
+
+FOUND = {
+    "transforms.json": (715,),
+    "LLFF": (70, 141),
+    "compressed.ply": (199, 227, 893),
+    "nerf config.yml": (765,),
+    "COLMAP, binary": (91, 606),
+    "COLMAP, text": (342, 890),
+    "training": (838,),
+    "tif": (489,),
+    "sog": (295,),
+    "glb": (284,),
+}
+"""Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_what_was_found_stays_cured(tmp_path: Path, name: str) -> None:
+    reader = READERS[name]
+    reader.make(tmp_path)
+    honest = {place: (tmp_path / place).read_bytes() for place in reader.damaged}
+    for number in FOUND[name]:
+        chance = random.Random(f" {name} {number}")
+        place = chance.choice(list(honest))
+        (tmp_path / place).write_bytes(mutators.mutate(reader.damaged[place], honest[place], chance))
+        try:
+            reader.read(tmp_path)
+        except CagefieldError as error:
+            assert len(str(error)) < 1000 and "\n" not in str(error)
+        (tmp_path / place).write_bytes(honest[place])
+
+
+def test_most_damages_are_seen(outcomes: dict[str, Outcome]) -> None:
+    """The inputs are no copies of the honest files."""
+    assert sum(found.refused for found in outcomes.values()) > sum(found.read for found in outcomes.values())
+
+
+def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reader that crashes, one that ends its process, one that takes memory, and one that never ends."""
+    faulty = tmp_path / "readers.py"
+    faulty.write_text(
+        "import os, time\n"
+        "class Reader:\n"
+        "    damaged = {'a': 'bytes'}\n"
+        "    def make(self, folder):\n"
+        "        (folder / 'a').write_bytes(b'honest' * 20)\n"
+        "    def read(self, folder):\n"
+        "        self.calls = getattr(self, 'calls', 0) + 1\n"
+        "        if self.calls > 4: self.fault()\n"
+        "def reader(fault):\n"
+        "    made = Reader(); made.fault = fault; return made\n"
+        "def crash(): raise KeyError('x')\n"
+        "def burn():\n"
+        "    while True: pass\n"
+        "READERS = {'crash': reader(crash), 'death': reader(lambda: os._exit(3)),\n"
+        "           'memory': reader(lambda: bytearray(60 << 20)), 'burn': reader(burn)}\n"
+    )
+    import attack as attacking
+
+    program = (Path(__file__).parent / "attacked_reader.py").read_text()
+    (tmp_path / "attacked_reader.py").write_text(program)
+    (tmp_path / "mutators.py").write_text((Path(__file__).parent / "mutators.py").read_text())
+    monkeypatch.setattr(attacking, "__file__", str(tmp_path / "attack.py"))
+    monkeypatch.setattr(attacking, "HANG", 0.5)
+    found = attack(["crash", "death", "memory", "burn"], 0, 1)
+    assert {name: (one.tried, one.crashed, one.over_memory, one.hung) for name, one in found.items()} == {
+        "crash": (1, 1, 0, 0),
+        "death": (1, 1, 0, 0),
+        "memory": (1, 0, 1, 0),
+        "burn": (1, 0, 0, 1),
+    }
+    assert all(len(one.faults) == 1 for one in found.values())
+
+
+# ---- structure ----
+
+_NUMBERS = st.one_of(
+    st.floats(), st.integers(), st.sampled_from([1e308, -1e308, 10**400, 5e-324]), st.booleans(), st.none()
+)
+_VALUES = st.recursive(
+    st.one_of(_NUMBERS, st.text(max_size=8)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4), st.dictionaries(st.text(max_size=6), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+_VECTORS = st.lists(_NUMBERS, min_size=3, max_size=3)
+_CAGES = st.one_of(
+    st.fixed_dictionaries({"center": _VECTORS, "size": st.one_of(_NUMBERS, _VECTORS)}),
+    st.fixed_dictionaries({"corners": st.lists(_VECTORS, min_size=8, max_size=8)}),
+    _VALUES,
+)
+_EDITS = st.fixed_dictionaries(
+    {"inner": _CAGES},
+    optional={
+        "outer": st.one_of(_CAGES, st.fixed_dictionaries({"margin": _NUMBERS})),
+        "operations": st.lists(
+            st.one_of(
+                st.fixed_dictionaries({"translate": _VECTORS}),
+                st.fixed_dictionaries({"rotate_deg": _VECTORS}),
+                st.fixed_dictionaries({"scale": st.one_of(_NUMBERS, _VECTORS)}),
+                st.fixed_dictionaries(
+                    {"move_corner": st.fixed_dictionaries({"corner": _NUMBERS, "by": _VECTORS})}
+                ),
+                _VALUES,
+            ),
+            max_size=3,
+        ),
+        "name": st.text(max_size=12),
+        "lattice": _NUMBERS,
+        "width": _NUMBERS,
+        "adjustment": st.sampled_from(["continuous", "discrete", 1]),
+        "fill": _VALUES,
+    },
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(_EDITS, max_size=3))
+def test_edits_of_any_values_are_edits_or_refused(edits: list[object]) -> None:
+    text = json.dumps({"version": 1, "edits": edits})
+    try:
+        stack = parse_edits(text, format="json", check=False)
+    except CagefieldError as error:
+        assert "\n" not in str(error) and len(str(error)) < 1000
+        return
+    for format in ("json", "yaml"):
+        again = parse_edits(dump_edits(stack, format=format), format=format, check=False)
+        assert dump_edits(again) == dump_edits(stack)
+
+
+@settings(max_examples=60, deadline=None)
+@given(_VALUES)
+def test_json_and_yaml_are_read_alike(value: object) -> None:
+    text = json.dumps(value)
+    try:
+        read = json_text.loads(text)
+    except ValueError:
+        return
+    assert json.dumps(read) == text
+    if isinstance(value, (dict, list)) and text.isascii() and "\\u" not in text and "NaN" not in text:
+        try:
+            built = yaml_text.loads(text)
+        except yaml_text.YamlError:
+            return
+        assert type(built) is type(value) and len(built) == len(value)
+
+
+def test_every_mutator_damages() -> None:
+    chance = random.Random(0)
+    for kind in mutators.KINDS:
+        content = b'{"a": [1, 2.5, "x"]}\nb: 3\n'
+        assert any(mutators.mutate(kind, content, chance) != content for _ in range(5)), kind

@@ -1,0 +1,47 @@
+"""Killed at every call that changes something: nothing lost, a readable scene, nothing left over.
+
+`benchmarks/robustness/kills.py` does it with all commands, and at random moments.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from kills import COMMANDS, Killed, calls_of, kill
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="this system forks no processes"),
+    pytest.mark.filterwarnings("ignore"),  # of threads that numpy has, which the children do not use
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "least", "step"), [("edit --overwrite", 15, 3), ("changes and saves", 60, 9), ("save as", 15, 5)]
+)
+def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
+    command, found = COMMANDS[name], Killed()
+    calls, _ = calls_of(name, tmp_path)
+    assert calls >= least
+    for at in range(1 + step // 2, calls + 1, step):
+        (tmp_path / str(at)).mkdir()
+        assert kill(command, name, tmp_path / str(at), at, found)
+    assert found.faults == []
+    assert found.kills >= calls // step
+
+
+def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
+    """The checks themselves: a scene whose edit, or whose user's file, is gone, and hidden files."""
+    command = COMMANDS["edit --overwrite"]
+    command.make(tmp_path)
+    assert command.check(tmp_path, 0) is None
+    assert command.check(tmp_path, 1) == "lost: the edit"
+    (tmp_path / "scene" / "notes.txt").unlink()
+    assert command.check(tmp_path, 0) == "lost: the user's file"
+    (tmp_path / "scene" / "field.safetensors").write_bytes(b"half")
+    assert (command.check(tmp_path, 0) or "").startswith("unreadable")
+    session = COMMANDS["changes and saves"]
+    (tmp_path / "other").mkdir()
+    session.make(tmp_path / "other")
+    assert (session.check(tmp_path / "other", 4) or "").startswith("lost: change 2 was kept")
