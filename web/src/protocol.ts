@@ -143,7 +143,7 @@ export interface Change {
   falloff?: ("smooth" | "linear") | null;
   width?: number | null;
   fill?: ("surroundings" | "none") | null;
-  relight?: ("occlusion" | "none") | null;
+  relight?: ("occlusion" | "shadow" | "none") | null;
   /**
    * 0: exact
    */
@@ -420,7 +420,7 @@ export interface EditState {
   falloff: "smooth" | "linear";
   width: number;
   fill: "surroundings" | "none";
-  relight: "occlusion" | "none";
+  relight: "occlusion" | "shadow" | "none";
   lattice: number;
   lattice_error: [number, number] | null;
   inner: Corners;

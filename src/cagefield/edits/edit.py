@@ -67,7 +67,8 @@ class Edit:
       sheets is shown.
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
       leaves it as it was trained, a `Clone` copies a cage.
-    - relight: "occlusion" takes contact shadows along; "none" leaves them.
+    - relight: "occlusion" takes contact shadows along, "shadow" those of a dominant light too, where one is
+      found, a `CastShadow` those of a light that is set by hand; "none" leaves all.
     - feather: of a discrete edit of voxels, how many voxels along the faces of V blend into what is there.
     - source: None, or the scene folder or file of splats that a copy is taken from: a *paste*. `inner` is
       then a cage in that scene's space, which the operations take to where it stands in this one. Relative

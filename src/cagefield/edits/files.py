@@ -52,7 +52,7 @@ from cagefield.edits.edit import Edit, ImpossibleEditError
 from cagefield.edits.names import mended, problem_of_name
 from cagefield.edits.nodes import Node
 from cagefield.edits.operations import Operation, euler_degrees
-from cagefield.edits.options import FEATHER, Clone, problem_of_lattices
+from cagefield.edits.options import FEATHER, CastShadow, Clone, problem_of_lattices
 from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
@@ -173,7 +173,9 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
         options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
     if "fill" in keys:
         options["fill"] = _fill(keys["fill"])
-    for name in ("shell", "falloff", "relight"):
+    if "relight" in keys:
+        options["relight"] = _relight(keys["relight"])
+    for name in ("shell", "falloff"):
         if name in keys:
             options[name] = keys[name].text()
     if "name" in keys:
@@ -202,6 +204,13 @@ def _edit(node: Node, check: bool, mend: bool) -> Edit:
         except CagefieldError as error:
             raise node.error(str(error)) from None
     return edit
+
+
+def _relight(node: Node) -> Any:
+    """How an edit is relit: a word, or {shadow: direction to the light}."""
+    if node.is_mapping:
+        return CastShadow(node.mapping(required=("shadow",))["shadow"].vector())
+    return node.text()
 
 
 def _fill(node: Node) -> Any:
@@ -321,7 +330,9 @@ def _from_edit(edit: Edit) -> dict[str, Any]:
         content["fill"] = {"clone": _from_cage(edit.fill.source)}
     elif edit.fill != "surroundings":
         content["fill"] = edit.fill
-    if edit.relight != "occlusion":
+    if isinstance(edit.relight, CastShadow):
+        content["relight"] = {"shadow": list(edit.relight.direction)}
+    elif edit.relight != "occlusion":
         content["relight"] = edit.relight
     if edit.feather != FEATHER:
         content["feather"] = edit.feather

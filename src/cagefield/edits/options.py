@@ -20,16 +20,25 @@ class Clone:
 
 
 Fill: TypeAlias = Literal["surroundings", "none"] | Clone
-Relight: TypeAlias = Literal["occlusion", "none"]
+
+
+@dataclass(frozen=True)
+class CastShadow:
+    """A way to relight: contact shadows go along, and those of a light in the direction [3], by hand."""
+
+    direction: tuple[float, float, float]
+
+
+Relight: TypeAlias = Literal["occlusion", "shadow", "none"] | CastShadow
 
 FILLS: tuple[str, ...] = ("surroundings", "none")
-RELIGHTS: tuple[str, ...] = ("occlusion", "none")
+RELIGHTS: tuple[str, ...] = ("occlusion", "shadow", "none")
 
-FEATHER, MOST_FEATHER = 1.0, 8.0
+FEATHER, MOST_FEATHER = 2.0, 8.0
 """Voxels of a seam that blend, where nothing else is said, and at most.
 
-Of six moves and copies in three scenes, widths of 1, 2 and 3 lose .03 and .01 dB less and .01 more in the
-mean, on the pixels that they change, than a hard edge.
+Of eight moves and copies in four scenes, widths of 1, 2 and 3 lose .03, .09 and .11 dB less in the mean than
+a hard edge, on the pixels that they change.
 """
 
 LATTICE_RANGE = (2, 512)
@@ -58,7 +67,7 @@ def problem_of_options(
     deleted: bool,
     fading: tuple[str, float],
     lattice: int | None,
-    surroundings: tuple[str | Clone, str, float],
+    surroundings: tuple[str | Clone, str | CastShadow, float],
 ) -> str | None:
     """What is wrong with an edit's options, and the cure; None where they go together.
 
@@ -70,8 +79,14 @@ def problem_of_options(
     if shell not in SHELLS:
         return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
     for name, value, known in zip(("fill", "relight"), surroundings[:2], (FILLS, RELIGHTS), strict=True):
-        if value not in known and not (name == "fill" and isinstance(value, Clone)):
+        if value not in known and not isinstance(value, Clone if name == "fill" else CastShadow):
             return f'{name} must be one of {", ".join(known)}, got "{value}"'
+    if isinstance(surroundings[1], CastShadow):
+        size = sum(value * value for value in surroundings[1].direction)
+        if not (len(surroundings[1].direction) == 3 and 0.0 < size < float("inf")):
+            return (
+                f"the direction to a light must be three numbers, not all 0, got {surroundings[1].direction}"
+            )
     if not 0.0 <= surroundings[2] <= MOST_FEATHER:
         return f"feather must be 0 (a hard edge) to {MOST_FEATHER:g} voxels, got {surroundings[2]!r}"
     if adjustment == "continuous":

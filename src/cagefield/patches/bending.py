@@ -21,13 +21,12 @@ from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block, block_of
-from cagefield.patches.extent import RIM
+from cagefield.patches.extent import RIM, swept
 from cagefield.patches.light import (
     Ambience,
     Lighting,
     distance_in,
     lit_vertices,
-    nearness,
 )
 from cagefield.typing import Array, Mask
 from cagefield.warps.device_stack import DeviceStack
@@ -43,11 +42,11 @@ UNSEEN = 0.03
 """The log of a change of light that is left out."""
 
 
-def light_box(edit: Edit, voxel: float, reach: float) -> Array:
-    """The box [2,3] (min, max) in which a continuous edit changes the light. World units."""
+def light_box(edit: Edit, voxel: float, reach: float, falls: Array) -> Array:
+    """The box [2,3] (min, max) in which a continuous edit changes the light; arguments as of `patch_box`."""
     assert edit.outer is not None
     margin = 1.5 * reach + RIM * voxel
-    return np.asarray(edit.outer.aabb + margin * np.array([[-1.0], [1.0]]))
+    return np.asarray(swept(edit.outer.aabb, falls) + margin * np.array([[-1.0], [1.0]]))
 
 
 def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, Lighting]:
@@ -61,16 +60,14 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, 
     turned = np.einsum("nji,nj->ni", np.linalg.inv(moved.jacobian), normals)
     turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
     old, new = distance_in(coarse, coarse.solid), distance_in(coarse, _solid_after(coarse, edit))
-    before = nearness(old, points, normals, ambience.reaches)
-    after = nearness(new, moved.points, turned, ambience.reaches)
-    log = ambience.log_openness(after) - ambience.log_openness(before)
+    log = ambience.log_light(new, moved.points, turned) - ambience.log_light(old, points, normals)
     log[np.abs(log) < UNSEEN] = 0.0
     return coarse, Lighting(where, log).smoothed(coarse)
 
 
 def bent_voxels(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit | None:
     """The edit that changes the light of a voxel field under a continuous edit; None where none changes."""
-    box = light_box(edit, float(field.voxel_size.max()), ambience.reach)
+    box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
     block = block_of(field, below, box)
     coarse, light = bending_light(block, edit, ambience)
     where = block.slot >= 0

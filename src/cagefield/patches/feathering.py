@@ -54,8 +54,9 @@ def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Ma
     new = (1.0 - share) * density
     mixed = part.with_density(rim, (before + new).astype(np.float32), slots=True)
     rows, had = mixed.slot[rim], part.slot[rim] >= 0
-    weight = np.where(had, np.maximum(before, 1e-6 * share), 0.0)
-    other = np.maximum(new, 1e-6 * (1.0 - share))
+    # What is empty there has no colour that would count: a surface beside it keeps its own.
+    weight = np.where(had, np.maximum(before, 1e-6), 0.0)
+    other = np.where(new > 1e-6, new, np.where(had, 0.0, 1e-6))
     coefficients = mixed.sh.copy()
     total = np.maximum(weight + other, 1e-12)
     mean = weight[:, None, None] * coefficients[rows] + other[:, None, None] * sh

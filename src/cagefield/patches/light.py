@@ -15,7 +15,7 @@ Source: Evans, "Fast approximations for global illumination on dynamic scenes" (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
 from cagefield.patches.seen import SeenPairs
+from cagefield.patches.sun import Distance, Sun, sun_of
 from cagefield.typing import AnyArray, Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08)
@@ -58,28 +59,42 @@ SMOOTH = 2.0
 
 @dataclass(frozen=True)
 class Ambience:
-    """How a field's colours follow its openness: reaches [R] in world units, and their weights [R]."""
+    """How a field's colours follow its openness: reaches [R] in world units, and their weights [R].
+
+    And its dominant light, where that is to go along.
+    """
 
     reaches: tuple[float, ...]
     weights: tuple[float, ...]
+    sun: Sun | None = None
 
     @property
     def shows(self) -> bool:
-        """False where colours do not follow the openness."""
-        return sum(self.weights) > SHOWING
+        """False where colours follow neither openness nor a light."""
+        return self.sun is not None or sum(self.weights) > SHOWING
 
     @property
     def reach(self) -> float:
         """The largest distance, in world units, at which it makes a difference; 0 where it shows nowhere."""
         return max((r for r, w in zip(self.reaches, self.weights, strict=True) if w > 0.01), default=0.0)
 
+    @property
+    def falls(self) -> Array:
+        """Directions [K,3] in which shadows fall that go along."""
+        return np.zeros((0, 3)) if self.sun is None else -np.array([self.sun.direction])
+
+    def log_light(self, distance: Distance, points: Array, normals: AnyArray) -> Array:
+        """The log of how bright surface points [N,3] with normals [N,3] are, [N]."""
+        log = np.zeros(len(points))
+        if sum(self.weights) > SHOWING:
+            log += self.log_openness(nearness(distance, points, normals, self.reaches))
+        if self.sun is not None:
+            log += self.sun.log_light(distance, points, normals)
+        return log
+
     def log_openness(self, nearness: Array) -> Array:
         """log o [N], o at least DARKEST, of nearnesses [N,R]."""
         return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
-
-
-Distance = Callable[[Array], NDArray[np.float64]]
-"""Distances [N] in world units of points [N,3] to the nearest solid."""
 
 
 def distance_in(block: Block, solid: Mask) -> Distance:
@@ -155,6 +170,26 @@ def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
     return Ambience(reaches, tuple(float(w) * share for w in fit.x))
+
+
+def with_sun(
+    ambience: Ambience, field: VoxelField, pairs: SeenPairs, direction: Sequence[float] | None
+) -> Ambience:
+    """The ambience and the dominant light that explains what openness does not, if one does.
+
+    `direction` [3] is that to the light, None where it is to be found.
+    """
+    reaches = reaches_of(field)
+    if len(pairs.points) < ENOUGH or not reaches:
+        return ambience
+    distance = distance_in_field(field)
+    change = pairs.log_change
+    if sum(ambience.weights) > SHOWING:
+        near = nearness(distance, pairs.points, pairs.normals, reaches)
+        other = nearness(distance, pairs.other_points, pairs.other_normals, reaches)
+        change = change - (ambience.log_openness(other) - ambience.log_openness(near))
+    both = pairs.points, pairs.normals, pairs.other_points, pairs.other_normals
+    return replace(ambience, sun=sun_of(distance, both, change, reaches, direction))
 
 
 @dataclass(frozen=True, eq=False)

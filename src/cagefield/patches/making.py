@@ -18,7 +18,8 @@ from cagefield.patches.block import SOLID, Block, block_of
 from cagefield.patches.cloning import cloned
 from cagefield.patches.extent import RIM, patch_box
 from cagefield.patches.feathering import feathered
-from cagefield.patches.light import Ambience, Distance, Lighting, distance_in, lit_vertices, nearness
+from cagefield.patches.light import Ambience, Lighting, distance_in, lit_vertices
+from cagefield.patches.sun import Distance
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Mask
 from cagefield.warps.inner_map import HexahedronMap
@@ -148,8 +149,8 @@ class _Work:
     ) -> _Work:
         settled = settled and not edit.deleted
         voxel = float(field.voxel_size.max())
-        reach = ambience.reach if ambience is not None and ambience.shows else 0.0
-        box = patch_box(edit, voxel, reach, settled=settled)
+        lit = ambience if ambience is not None and ambience.shows else Ambience((), ())
+        box = patch_box(edit, voxel, lit.reach, settled=settled, falls=lit.falls)
         before = block_of(field, below, box, preserve_opacity=preserve_opacity)
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         if edit.source is not None:
@@ -204,10 +205,7 @@ class _Work:
         block = self.emptied
         where = lit_vertices(block)
         points, normals = block.positions(where), block.normals[where]
-        logs = [
-            ambience.log_openness(nearness(distance, points, normals, ambience.reaches))
-            for distance in self._distances
-        ]
+        logs = [ambience.log_light(distance, points, normals) for distance in self._distances]
         return Lighting(where, logs[1] - logs[0]).smoothed(block)
 
     def part_light(self, ambience: Ambience) -> Lighting:
@@ -220,9 +218,8 @@ class _Work:
         turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
         log = np.zeros(len(points))
         before, after = self._distances
-        new = nearness(after, moved, turned, ambience.reaches)
-        old = nearness(before, points[inside], normals[inside], ambience.reaches)
-        log[inside] = ambience.log_openness(new) - ambience.log_openness(old)
+        new = ambience.log_light(after, moved, turned)
+        log[inside] = new - ambience.log_light(before, points[inside], normals[inside])
         return Lighting(where, log).smoothed(block)
 
     def shown_part(self, light: Lighting | None, there: Block) -> Block | None:

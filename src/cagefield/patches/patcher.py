@@ -9,15 +9,16 @@ from typing import cast
 
 from cagefield.cameras import Camera
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import bent_voxels
 from cagefield.patches.joining import joined
-from cagefield.patches.light import Ambience, ambience_of
+from cagefield.patches.light import Ambience, ambience_of, with_sun
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
-from cagefield.patches.seen import seen_pairs
+from cagefield.patches.seen import SeenPairs, seen_pairs
 from cagefield.patches.splats import bent_splats, splat_patch_of
 from cagefield.patches.voxelised import voxelised_whole
 from cagefield.rendering.render_result import RenderResult
@@ -45,6 +46,7 @@ class Patcher:
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
+        self._suns: dict[tuple[float, float, float] | None, Ambience] = {}
         self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
     def patched(
@@ -108,10 +110,27 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness."""
-        pairs = seen_pairs(self._render, self._cameras, self._field.bounds)
-        if isinstance(self._field, VoxelField):
-            return ambience_of(self._field, pairs)
-        return ambience_of(voxelised_whole(self._field), pairs)
+        return ambience_of(self._voxels, self._pairs)
+
+    def _lit(self, edit: Edit) -> Ambience | None:
+        """What goes along of the light of an edit; None where all stays."""
+        if edit.relight == "none":
+            return None
+        if edit.relight == "occlusion":
+            return self.ambience
+        direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
+        if direction not in self._suns:
+            self._suns[direction] = with_sun(self.ambience, self._voxels, self._pairs, direction)
+        return self._suns[direction]
+
+    @cached_property
+    def _voxels(self) -> VoxelField:
+        """The field, or splats as coarsely as light is found out about."""
+        return self._field if isinstance(self._field, VoxelField) else voxelised_whole(self._field)
+
+    @cached_property
+    def _pairs(self) -> SeenPairs:
+        return seen_pairs(self._render, self._cameras, self._field.bounds)
 
     def _patch(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
@@ -120,11 +139,12 @@ class Patcher:
         stack = EditStack(below)
         # A drag does not wait for the light to be found out about.
         known = not moving or "ambience" in self.__dict__
-        relit = edit.relight == "occlusion" and known and self.ambience.shows
+        lit = self._lit(edit) if known else None
+        relit = lit is not None and lit.shows
         if edit.source is not None and not relit:
             return None
         kind = edit.deleted, edit.keep_source, edit.fill, edit.feather, edit.pasted, preserve_opacity
-        what: Key = (*stack.active, edit.inner, *kind, relit)
+        what: Key = (*stack.active, edit.inner, *kind, relit and edit.relight)
         settled: Key = (*what, edit.deformed if relit or edit.feather > 0.0 else None)
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
@@ -132,7 +152,7 @@ class Patcher:
             return cast("Patch | SplatPatch", self._kept[key])
         if not wants_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
-        ambience = self.ambience if relit else None
+        ambience = lit if relit else None
         patch: Patch | SplatPatch
         if isinstance(self._field, VoxelField):
             patch = patch_of(
@@ -145,18 +165,19 @@ class Patcher:
 
     def _light(self, below: tuple[Edit, ...], edit: Edit) -> Edit | None:
         """The edit that changes the light under a continuous one; None where none changes."""
-        if not self.ambience.shows:
+        lit = self._lit(edit)
+        if lit is None or not lit.shows:
             return None
         stack = EditStack(below)
         shape = edit.inner, edit.outer, edit.deformed, edit.shell, edit.falloff, edit.width
-        key: Key = ("light", *stack.active, *shape, edit.allow_folding)
+        key: Key = ("light", *stack.active, *shape, edit.allow_folding, edit.relight)
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Edit | None", self._kept[key])
         if isinstance(self._field, VoxelField):
-            found = bent_voxels(self._field, stack, edit, self.ambience)
+            found = bent_voxels(self._field, stack, edit, lit)
         else:
-            found = bent_splats(self._field, stack, edit, self.ambience)
+            found = bent_splats(self._field, stack, edit, lit)
         self._keep(key, found)
         return found
 

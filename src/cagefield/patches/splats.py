@@ -78,12 +78,16 @@ def splat_patch_of(
     # Splats overlap: their seams are soft.
     edit = edit.replace(feather=0.0)
     field = with_pasted(field, below.append(edit))
-    reach = ambience.reach if ambience is not None and ambience.shows else 0.0
+    lit = ambience if ambience is not None and ambience.shows else Ambience((), ())
     place = settled and not edit.deleted
-    moved = _around(field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, reach)))
+    moved = _around(
+        field, moved_splats(field, below), _box_of(edit, patch_box(edit, 0.0, lit.reach, falls=lit.falls))
+    )
     splats = where_they_are(field, moved)
-    voxel = voxel_for(splats, patch_box(edit, 0.0, reach, settled=place))
-    box = patch_box(edit, voxel, reach, settled=place) + 3.0 * voxel * np.array([[-1.0], [1.0]])
+    voxel = voxel_for(splats, patch_box(edit, 0.0, lit.reach, settled=place, falls=lit.falls))
+    box = patch_box(edit, voxel, lit.reach, settled=place, falls=lit.falls) + 3.0 * voxel * np.array(
+        [[-1.0], [1.0]]
+    )
     grid = voxelised(splats, _box_of(edit, box), voxel)
     after = None
     if edit.source is not None:
@@ -96,10 +100,10 @@ def splat_patch_of(
 def bent_splats(field: SplatField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit:
     """The edit that changes the light of splats under a continuous edit (`patches.bending`)."""
     field = with_pasted(field, below)
-    box = light_box(edit, 0.0, ambience.reach)
+    box = light_box(edit, 0.0, ambience.reach, ambience.falls)
     splats = where_they_are(field, _around(field, moved_splats(field, below), box))
     voxel = voxel_for(splats, box)
-    box = light_box(edit, voxel, ambience.reach)
+    box = light_box(edit, voxel, ambience.reach, ambience.falls)
     block = block_of(voxelised(splats, box, voxel), EditStack(), box)
     coarse, light = bending_light(block, edit, ambience)
     none, points = np.zeros(0, np.int64), np.zeros((0, 3))

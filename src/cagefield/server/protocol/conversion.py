@@ -11,6 +11,7 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
+from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.editor.document import Entry
@@ -102,7 +103,7 @@ def edit_state(
         falloff=cast(Any, edit.falloff),
         width=edit.width,
         fill="none" if edit.fill == "none" else "surroundings",
-        relight=edit.relight,
+        relight="shadow" if isinstance(edit.relight, CastShadow) else edit.relight,
         lattice=edit.lattice or 0,
         lattice_error=error,
         inner=corners(cage_in_scene(edit)),

@@ -10,7 +10,7 @@ from cagefield.edits import Edit
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import light_box
-from cagefield.patches.extent import patch_box
+from cagefield.patches.extent import EVERYWHERE, NOWHERE, patch_box
 from cagefield.patches.light import REACHES, reaches_of
 from cagefield.patches.patcher import wants_light, wants_patch
 from cagefield.patches.voxelised import coarsest_voxel
@@ -43,6 +43,8 @@ class PatchExtent:
 
 
 def _box(edit: Edit, voxel: float, reach: float) -> Array:
+    # Where the light comes from is found out elsewhere.
+    falls = NOWHERE if edit.relight in ("occlusion", "none") else EVERYWHERE
     if edit.adjustment == "continuous":
-        return light_box(edit, voxel, reach)
-    return patch_box(edit, voxel, reach)
+        return light_box(edit, voxel, reach, falls)
+    return patch_box(edit, voxel, reach, falls=falls)
