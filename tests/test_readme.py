@@ -34,7 +34,7 @@ def test_edit_files(page: str) -> None:
 def test_edit_files_show_every_kind_of_edit() -> None:
     (readme,) = blocks("README.md", "yaml")
     assert [edit.name for edit in parse_edits(readme)] == ["raise the arm"]
-    text, moved = blocks("docs/how-to/edit-files.md", "yaml")
+    text, _, moved = blocks("docs/how-to/edit-files.md", "yaml")
     edits = parse_edits(text)
     assert [edit.name for edit in edits] == ["raise the arm", "a second cone", "no beacon"]
     assert edits[1].keep_source and edits[2].deleted

@@ -299,7 +299,7 @@ def shaded() -> Scene:
 @pytest.mark.parametrize("name", PATCHED)
 def test_switching_fill_and_light_changes_pictures_where_patches_reach(shaded: Scene, name: str) -> None:
     patched = PATCHED[name]
-    bare = patched.replace(fill="none", relight="none")
+    bare = patched.replace(fill="none", relight="none", feather=0.0)
     extent = PatchExtent(shaded.field)
     region = shaded.patcher.patched([patched])[0].boxes
     assert (extent.boxes(patched).min(axis=(0, 1)) <= region.min(axis=(0, 1))).all()
@@ -347,7 +347,7 @@ def test_a_part_over_the_last_picture_is_the_whole_picture(renderers: RendererCa
 
 def test_a_refresh_that_is_given_up_leaves_nothing_half_done() -> None:
     renderers = RendererCache(ball_scene())
-    edits = (PART.translate((0.12, 0, 0)), OTHER)
+    edits = tuple(edit.replace(relight="none") for edit in (PART.translate((0.12, 0, 0)), OTHER))
     whole = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
     task = PictureTask(1, Shown(values_of(edits)), CAMERA, whole, Display(), False, True, 0)
     expected = Renderer(renderers.scene.field, EditStack(edits))

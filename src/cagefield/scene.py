@@ -352,8 +352,9 @@ class Scene:
         original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
         from cagefield.rendering.nerf import render_nerf
 
-        # What is relit is voxels: too rough for all of what a continuous edit bends.
-        patched = self.patcher.patched(self.edits.edits, bending=False)
+        # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
+        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
+        patched = self.patcher.patched(edits, bending=False)
         exact = EditStack(edit.replace(lattice=None) for edit in patched)
         return render_nerf(
             original,

@@ -116,7 +116,11 @@ def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 # ---- structure ----
 
 _NUMBERS = st.one_of(
-    st.floats(), st.integers(), st.sampled_from([1e308, -1e308, 10**400, 5e-324]), st.booleans(), st.none()
+    st.floats(allow_subnormal=False),  # which a process with quick kernels takes for 0
+    st.integers(),
+    st.sampled_from([1e308, -1e308, 10**400]),
+    st.booleans(),
+    st.none(),
 )
 _VALUES = st.recursive(
     st.one_of(_NUMBERS, st.text(max_size=8)),

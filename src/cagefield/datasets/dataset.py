@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -34,44 +36,47 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
     """
     check_holdout(holdout)
     path = Path(path).expanduser()
+    with _sensible_poses(path):
+        if not path.exists():
+            raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
+        if path.is_file():
+            if path.suffix == ".json":
+                return load_transforms(path, downscale, holdout)
+            if path.name == POSES_FILE:
+                return load_llff(path, downscale, holdout)
+            if path.name in MODEL_FILES:
+                return load_colmap(path.parent, downscale, holdout)
+            if is_video(path):
+                raise DatasetError(
+                    f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
+                )
+            raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
+        if any((path / name).is_file() for name in _TRANSFORMS):
+            return load_transforms(path, downscale, holdout)
+        if (path / POSES_FILE).is_file():
+            return load_llff(path, downscale, holdout)
+        if find_model(path) is not None:
+            return load_colmap(path, downscale, holdout)
+        if has_photos_alone(path):
+            raise DatasetError(
+                f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield train "
+                "does that by itself)"
+            )
+        raise DatasetError(
+            f"{path}: no camera file; looked for {', '.join(_TRANSFORMS)}, {POSES_FILE} and a COLMAP model "
+            "(sparse/0/cameras.bin or .txt), and there are no photos either"
+        )
+
+
+@contextmanager
+def _sensible_poses(path: Path) -> Iterator[None]:
+    """Raises DatasetError for numbers that no camera has."""
     try:
-        return _load(path, downscale, holdout)
+        yield
     except (np.linalg.LinAlgError, OverflowError) as error:
         raise DatasetError(
             f"{path}: the poses of its cameras make no sense ({error}); export them again"
         ) from None
-
-
-def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
-    if not path.exists():
-        raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
-    if path.is_file():
-        if path.suffix == ".json":
-            return load_transforms(path, downscale, holdout)
-        if path.name == POSES_FILE:
-            return load_llff(path, downscale, holdout)
-        if path.name in MODEL_FILES:
-            return load_colmap(path.parent, downscale, holdout)
-        if is_video(path):
-            raise DatasetError(
-                f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
-            )
-        raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
-    if any((path / name).is_file() for name in _TRANSFORMS):
-        return load_transforms(path, downscale, holdout)
-    if (path / POSES_FILE).is_file():
-        return load_llff(path, downscale, holdout)
-    if find_model(path) is not None:
-        return load_colmap(path, downscale, holdout)
-    if has_photos_alone(path):
-        raise DatasetError(
-            f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield train "
-            "does that by itself)"
-        )
-    raise DatasetError(
-        f"{path}: no camera file; looked for {', '.join(_TRANSFORMS)}, {POSES_FILE} and a COLMAP model "
-        "(sparse/0/cameras.bin or .txt), and there are no photos either"
-    )
 
 
 def has_photos_alone(path: Path) -> bool:

@@ -170,7 +170,12 @@ async def _send(socket: WebSocket, page: Page) -> None:
             await socket.close(COME_AGAIN, "another scene was opened")
             return
         send = socket.send_bytes(content) if isinstance(content, bytes) else socket.send_text(content)
+        # Not `asyncio.wait_for`: up to Python 3.11 it forgets that it was cancelled if what it waits for is done.
+        sending = asyncio.ensure_future(send)
         try:
-            await asyncio.wait_for(send, TO_TAKE)
-        except (TimeoutError, asyncio.TimeoutError):
+            sent, _ = await asyncio.wait({sending}, timeout=TO_TAKE)
+        finally:
+            sending.cancel()
+        if not sent:
             return  # nobody reads; a page that is there comes again
+        sending.result()
