@@ -138,9 +138,8 @@ def test_edits_move_along_the_camera_path(tmp_path: Path) -> None:
     scene = lumps_scene()
     gone = Edit.delete(Cage.box((-0.8, 0.0, 0.0), (0.4, 1.8, 1.6))).replace(**BARE)
     move = MOVE.replace(**BARE, patch=patch_by_hand(scene.field, MOVE.inner, part=True))
-    scene = dataclasses.replace(
-        scene, edits=EditStack([TURN.rotate((0.0, 0.0, np.pi / 2)).replace(relight="none"), move, gone])
-    )
+    turn = TURN.rotate((0.0, 0.0, np.pi / 2)).replace(relight="none")
+    scene = dataclasses.replace(scene, edits=EditStack([turn, move, gone]))
     pose = tuple(scene.cameras["test"][0].c2w.ravel())
     keys = (
         Keyframe(pose, 45.0, 2.0, {1: 0.0, 2: 0.0, 3: 0.0}),

@@ -59,8 +59,8 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
             return load_colmap(path, downscale, holdout)
         if has_photos_alone(path):
             raise DatasetError(
-                f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield train "
-                "does that by itself)"
+                f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield "
+                "train does that by itself)"
             )
         raise DatasetError(
             f"{path}: no camera file; looked for {', '.join(_TRANSFORMS)}, {POSES_FILE} and a COLMAP model "
