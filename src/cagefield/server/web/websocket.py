@@ -170,7 +170,7 @@ async def _send(socket: WebSocket, page: Page) -> None:
             await socket.close(COME_AGAIN, "another scene was opened")
             return
         send = socket.send_bytes(content) if isinstance(content, bytes) else socket.send_text(content)
-        # Not `asyncio.wait_for`: up to Python 3.11 it forgets that it was cancelled if what it waits for is done.
+        # Not `asyncio.wait_for`, which may forget (before 3.12) that it was cancelled.
         sending = asyncio.ensure_future(send)
         try:
             sent, _ = await asyncio.wait({sending}, timeout=TO_TAKE)
