@@ -65,10 +65,22 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, 
     return coarse, Lighting(where, log).smoothed(coarse)
 
 
-def bent_voxels(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit | None:
-    """The edit that changes the light of a voxel field under a continuous edit; None where none changes."""
+def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Block:
+    """The block of a voxel field, under the edits below, in which a continuous edit changes the light."""
+    return block_of(
+        field, below, light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
+    )
+
+
+def bent_voxels(
+    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience, block: Block | None = None
+) -> Edit | None:
+    """The edit that changes the light of a voxel field under a continuous edit; None where none changes.
+
+    `block` is its `bent_block`, where that is known.
+    """
     box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
-    block = block_of(field, below, box)
+    block = block or bent_block(field, below, edit, ambience)
     coarse, light = bending_light(block, edit, ambience)
     where = block.slot >= 0
     log = light.at(coarse, block.positions(where))

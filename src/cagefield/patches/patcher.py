@@ -13,7 +13,8 @@ from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import bent_voxels
+from cagefield.patches.bending import bent_block, bent_voxels
+from cagefield.patches.block import Block
 from cagefield.patches.joining import joined
 from cagefield.patches.light import Ambience, ambience_of, with_sun
 from cagefield.patches.making import patch_of
@@ -46,6 +47,7 @@ class Patcher:
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
+        self._around: tuple[Key, Block] | None = None
         self._suns: dict[tuple[float, float, float] | None, Ambience] = {}
         self._pasted: OrderedDict[Key, Pasted] = OrderedDict()
 
@@ -175,7 +177,11 @@ class Patcher:
             self._kept.move_to_end(key)
             return cast("Edit | None", self._kept[key])
         if isinstance(self._field, VoxelField):
-            found = bent_voxels(self._field, stack, edit, lit)
+            # While a cage is dragged again and again what is below it stays.
+            around: Key = (*stack.active, edit.outer, lit)
+            if self._around is None or self._around[0] != around:
+                self._around = around, bent_block(self._field, stack, edit, lit)
+            found = bent_voxels(self._field, stack, edit, lit, self._around[1])
         else:
             found = bent_splats(self._field, stack, edit, lit)
         self._keep(key, found)
