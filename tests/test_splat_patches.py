@@ -27,7 +27,7 @@ from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.rendering.splat_splitting import split_of
 from cagefield.scene import Scene
 from cagefield.sh import C0
-from splat_rooms import LIGHT, REACH, STRENGTH, cage, room
+from splat_rooms import LIGHT, REACH, STEP, STRENGTH, cage, room
 
 
 def cameras(scale: float = 1.0) -> tuple[Camera, ...]:
@@ -138,6 +138,10 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     patcher = Patcher(field, cameras(), lambda camera: pytest.fail("a drag found out about the light"))
     (moving,) = patcher.patched([edit], moving=True)
     assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
+    # Without light a patch does not depend on where the part is put down.
+    move = Edit(cage(), adjustment="discrete", relight="none").translate((0.5, 0.0, 0.0))
+    there, further = (patcher.patched([each])[0] for each in (move, move.translate((0.1, 0.0, 0.0))))
+    assert there.patch is further.patch is not None
 
 
 def test_voxelised_splats_are_as_opaque_and_as_coloured():
@@ -148,9 +152,12 @@ def test_voxelised_splats_are_as_opaque_and_as_coloured():
     column = np.bincount(voxels.vertices // voxels.resolution[2], voxels.density * 0.025)
     heights = low + 0.025 * z
     assert np.abs(np.average(heights, weights=voxels.density)) < 0.005
-    # What a ray straight down loses of a layer of splats of opacity .95 that overlap.
-    middle = column.reshape(-1)[column > 0].mean()
-    assert 1.5 < middle < 12.0
+    # A ray straight down loses, in the mean, the integral of -log(1 - o G) of a splat on its square, times
+    # how much of that a grid has face on (`fields.splat_mixture`), with splats widened to .6 voxels.
+    wide = np.array([0.7 * STEP, 0.7 * STEP, 0.6 * 0.025])
+    lost = 2.0 * np.pi * wide[0] ** 2 * sum(0.95**k / k**2 for k in range(1, 200)) / STEP**2
+    lost *= wide[2] * np.sqrt((wide**-2.0).mean())
+    assert column[column > 0.0].mean() == pytest.approx(lost, rel=0.05)
     x = voxels.bounds[0, 0] + 0.025 * (voxels.vertices // (voxels.resolution[1] * voxels.resolution[2]))
     red = 0.5 + C0 * voxels.sh[:, 0, 0]
     np.testing.assert_allclose(red, 0.45 + 0.2 * x, atol=0.02)

@@ -145,9 +145,10 @@ class Patcher:
         relit = lit is not None and lit.shows
         if edit.source is not None and not relit:
             return None
-        kind = edit.deleted, edit.keep_source, edit.fill, edit.feather, edit.pasted, preserve_opacity
+        feather = edit.feather if isinstance(self._field, VoxelField) else 0.0
+        kind = edit.deleted, edit.keep_source, edit.fill, feather, edit.pasted, preserve_opacity
         what: Key = (*stack.active, edit.inner, *kind, relit and edit.relight)
-        settled: Key = (*what, edit.deformed if relit or edit.feather > 0.0 else None)
+        settled: Key = (*what, edit.deformed if relit or feather > 0.0 else None)
         key = (*what, None) if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
