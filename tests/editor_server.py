@@ -115,6 +115,10 @@ class PageClient:
             return self.messages[-1]
         length = int.from_bytes(content[:4], "little")
         header = json.loads(content[4 : 4 + length])
+        if header["type"] == "edits":
+            self.messages.append(header)
+            self.send("presented", picture=header["picture"])
+            return header  # type: ignore[no-any-return]
         end = 4 + length + header["picture_bytes"]
         assert len(content) == end + header["depth_bytes"]
         self.pictures.append(Picture(header, content[4 + length : end], content[end:]))

@@ -14,7 +14,7 @@ from cagefield.keyframes import Keyframe
 from cagefield.server.editor import validity
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.drag_solver import Target, move_corners
-from cagefield.server.editor.history import History
+from cagefield.server.editor.history import LONGEST, History
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import edit_state
 
@@ -247,6 +247,16 @@ def test_history_never_leaves_its_ends() -> None:
     history = History.begin("a").push("more", "b")
     assert history.redo().state == "b" and history.undo().undo().state == "a"
     assert history.undo().push("other", "c").names == ("Open", "other")
+
+
+def test_a_long_history_keeps_its_beginning_and_the_newest() -> None:
+    history = History.begin(0)
+    for number in range(1, LONGEST + 20):
+        history = history.push(str(number), number)
+        assert history.state == number and len(history.names) == len(history.states) <= LONGEST
+    assert history.states == (0, *range(21, LONGEST + 20)) and history.names[:2] == ("Open", "21")
+    assert history.undo().push("other", -1).states[-2:] == (LONGEST + 18, -1)
+    assert history.go_to(0).state == 0
 
 
 def test_saved_follows_the_document_through_undo() -> None:

@@ -1,5 +1,8 @@
-"""History: every state that was, in order, and where in it we are. Nothing is ever thrown away but what a new
-entry replaces: the entries that had been undone."""
+"""History: the states that were, in order, and where in it we are.
+
+Thrown away is what a new entry replaces, the entries that had been undone, and beyond `LONGEST` entries the
+oldest after the beginning, which always stays.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,9 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
+
+LONGEST = 500
+"""Entries at most: all names go to every page with every change, for as many hours as it is edited."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,9 @@ class History(Generic[T]):
     def push(self, name: str, state: T) -> History[T]:
         """One entry more after the present one; what had been undone is gone."""
         keep = self.entry + 1
-        return History((*self.names[:keep], name), (*self.states[:keep], state), keep)
+        first = 1 + max(0, keep + 1 - LONGEST)
+        names = (self.names[0], *self.names[first:keep], name)
+        return History(names, (self.states[0], *self.states[first:keep], state), len(names) - 1)
 
     def undo(self) -> History[T]:
         """One entry back; the same at the beginning."""

@@ -1,0 +1,315 @@
+"""Pages that edit, play, have jobs rendered and reconnect for hours, and what the processes take up."""
+
+from __future__ import annotations
+
+import collections
+import contextlib
+import json
+import os
+import random
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from editor_server import EditorServer, PageClient, page
+
+EDITS = 4
+"""A page that finds more edits than this loads two again."""
+
+START = """{"edits": [
+  {"name": "left", "inner": {"center": [-0.3, 0, 0], "size": 0.5}, "outer": {"margin": 0.3}},
+  {"name": "right", "inner": {"center": [0.3, 0, 0], "size": 0.5}, "adjustment": "discrete"}
+]}"""
+
+
+@dataclass
+class Sample:
+    """What the editor's processes take up at a moment."""
+
+    seconds: float
+    server: int
+    """Bytes in memory of the process that pages talk to."""
+    rendering: int
+    """The same of those that it has started."""
+    threads: int
+    files: int
+    """Open file handles; both of all processes together."""
+    processes: int
+
+
+def sample(server: EditorServer, begun: float) -> Sample:
+    """What they take up now."""
+    own = server.process.pid
+    processes = [own, *server.children()]
+    return Sample(
+        time.monotonic() - begun,
+        _bytes(own),
+        sum(_bytes(process) for process in processes[1:]),
+        sum(len(os.listdir(f"/proc/{process}/task")) for process in processes),
+        sum(len(os.listdir(f"/proc/{process}/fd")) for process in processes),
+        len(processes),
+    )
+
+
+def _bytes(process: int) -> int:
+    with open(f"/proc/{process}/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass
+class Soak:
+    """What the pages did, and what was wrong."""
+
+    server: EditorServer
+    out: Path
+    """A folder that jobs write into."""
+    pause: float = 0.5
+    """Seconds between the actions of a page, about."""
+    stay: float = 60.0
+    """Seconds that a page stays, at most."""
+    done: collections.Counter[str] = field(default_factory=collections.Counter)
+    refused: collections.Counter[str] = field(default_factory=collections.Counter)
+    """What pages' users were told, by its first words."""
+    faults: list[str] = field(default_factory=list)
+    """Pages that the editor closed, and answers that did not come."""
+    over: threading.Event = field(default_factory=threading.Event)
+
+    def run(self, pages: int, seconds: float, every: float, watch: Callable[[Sample], None]) -> None:
+        """So many pages for so long; `watch` has a sample now and then."""
+        begun = time.monotonic()
+        threads = [
+            threading.Thread(target=self._page, args=(number,), daemon=True) for number in range(pages)
+        ]
+        for thread in threads:
+            thread.start()
+        try:
+            while time.monotonic() - begun < seconds and any(thread.is_alive() for thread in threads):
+                self.over.wait(min(every, max(0.1, begun + seconds - time.monotonic())))
+                watch(sample(self.server, begun))
+        finally:
+            self.over.set()
+            for thread in threads:
+                thread.join(150.0)
+        self.faults += [f"page {number} hangs" for number, thread in enumerate(threads) if thread.is_alive()]
+
+    def _page(self, number: int) -> None:
+        """A page that comes and goes."""
+        chance = random.Random(number)
+        while not self.over.is_set():
+            try:
+                with page(self.server) as (client, hello):
+                    self.done["open"] += 1
+                    visit = Visit(self, client, hello, chance, number)
+                    until = time.monotonic() + chance.uniform(0.1, 1.0) * self.stay
+                    while not self.over.is_set() and time.monotonic() < until:
+                        visit.act()
+                        visit.read(chance.uniform(0.5, 1.5) * self.pause)
+                    if chance.random() < 0.5:
+                        self.done["hang up"] += 1
+                        client.socket.socket.shutdown(socket.SHUT_RDWR)
+            except Exception as error:
+                self.faults.append(f"page {number}: {type(error).__name__}: {error}"[:300])
+                self.over.wait(5.0)
+
+
+@dataclass
+class Visit:
+    """One page from its opening to its end."""
+
+    soak: Soak
+    client: PageClient
+    hello: dict[str, Any]
+    chance: random.Random
+    number: int
+    state: dict[str, Any] = field(default_factory=dict)
+    count: int = 0
+    """Of questions, drags and cameras."""
+
+    dropped: bool = False
+    """Another page has taken over what this one drags, or undone it."""
+
+    def __post_init__(self) -> None:
+        self.state = self.client.joined
+        if self.chance.random() < 0.25:
+            # As a page with a GPU does, which then gets edits in the place of pictures.
+            self.client.send("drawing", here="all")
+        self.look()
+
+    def read(self, seconds: float) -> None:
+        """Takes what comes for so long."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            try:
+                message = self.client.take(left)
+            except TimeoutError:
+                return
+            if isinstance(message, dict):
+                self._read(message)
+            self.client.messages.clear()
+            self.client.pictures.clear()
+
+    def _read(self, message: dict[str, Any]) -> None:
+        if message["type"] == "state":
+            self.state = message
+        elif message["type"] == "notice" and message["level"] != "info":
+            self.soak.refused[" ".join(message["text"].split()[:4])] += 1
+            self.dropped |= message["text"].startswith("this drag is over")
+
+    def act(self) -> None:
+        """One of the things that people do."""
+        actions = {
+            self.look: 4, self.drag: 6, self.apply: 3, self.set_cage: 1, self.change: 3, self.travel: 4,
+            self.place: 1, self.remove: 1, self.path: 1, self.play: 1, self.job: 0.3, self.save: 1,
+            self.ask: 2, self.download: 1, self.show: 1, self.screenshot: 0.3,
+        }  # fmt: skip
+        if len(self.edits) > EDITS or not self.edits:
+            action = self.load
+        else:
+            [action] = self.chance.choices(list(actions), list(actions.values()))
+        action()
+        self.soak.done[action.__name__] += 1
+
+    @property
+    def edits(self) -> list[dict[str, Any]]:
+        """Those of the last state."""
+        found: list[dict[str, Any]] = self.state["edits"]
+        return found
+
+    def edit(self) -> int:
+        """One of them, rather one that moves something."""
+        moving = [edit for edit in self.edits if edit["kind"] != "delete"]
+        number: int = self.chance.choice(moving or self.edits)["id"]
+        return number
+
+    def look(self) -> None:
+        """Turns the camera around the scene, then rests."""
+        c2w = np.array(self.hello["start"]["c2w"]).reshape(4, 4)
+        angle = self.chance.uniform(-np.pi, np.pi)
+        turn = np.eye(4)
+        turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        for moving in (True, True, False):
+            self.count += 1
+            camera = self.hello["start"] | {
+                "c2w": (turn @ c2w).ravel().tolist(),
+                "width": 96, "height": 64, "seq": self.count, "moving": moving,
+            }  # fmt: skip
+            self.client.send(**(camera | {"kind": camera.pop("type")}))
+            self.read(0.05)
+
+    def operation(self) -> dict[str, Any]:
+        """A small move or turn."""
+        by = [self.chance.uniform(-0.05, 0.05) for _ in range(3)]
+        if self.chance.random() < 0.5:
+            return {"kind": "translate", "by": by}
+        return {"kind": "scale", "by": [1.0 + value for value in by]}
+
+    def drag(self) -> None:
+        """Drags an edit: ends it, gives it up, or leaves it to the next one."""
+        self.count += 1
+        drag, operation, self.dropped = self.count, self.operation(), False
+        self.client.send("drag_begin", drag=drag, edit=self.edit(), target="field")
+        for seq in range(1, 11):
+            self.client.send("drag", drag=drag, seq=seq, operation=operation)
+            self.read(0.03)
+            if self.dropped:
+                return
+        if self.chance.random() < 0.2:
+            self.client.send("drag_cancel", drag=drag)
+        else:
+            self.client.send("drag_end", drag=drag, seq=11, operation=operation)
+
+    def apply(self) -> None:
+        """A whole operation."""
+        self.client.send("apply", edit=self.edit(), target="field", operation=self.operation())
+
+    def set_cage(self) -> None:
+        """Takes the operations back."""
+        self.client.send("command", name="reset_operations", edit=self.edit())
+
+    def change(self) -> None:
+        """Options."""
+        values: dict[str, Any] = self.chance.choice(
+            [{"enabled": True}, {"enabled": False}, {"name": f"n{self.chance.randrange(99)}"},
+             {"kind": "delete"}, {"kind": "move"}, {"kind": "copy"}, {"fill": "none"},
+             {"fill": "surroundings"}, {"relight": "none"}, {"relight": "occlusion"}]
+        )  # fmt: skip
+        self.client.socket.send(json.dumps({"type": "change", "edit": self.edit()} | values))
+
+    def travel(self) -> None:
+        """Back and forth in the history."""
+        self.client.send("command", name=self.chance.choice(["undo", "undo", "redo"]))
+
+    def place(self) -> None:
+        """A new edit on the surface."""
+        self.client.send("place", x=self.chance.random(), y=self.chance.random())
+
+    def remove(self) -> None:
+        """One edit less."""
+        self.client.send("command", name="remove", edit=self.edit())
+
+    def load(self) -> None:
+        """Two edits in the place of all."""
+        self.client.send("load_edits", text=START)
+        self.read(1.0)
+
+    def path(self) -> None:
+        """A camera path of two keys."""
+        start = self.hello["start"]
+        key = {"c2w": start["c2w"], "fov_y_deg": 50.0, "seconds": 1.0, "parts": {}}
+        self.client.send("set_path", keys=[key, key])
+
+    def play(self) -> None:
+        """Plays it."""
+        self.count += 1
+        self.client.send("play_begin", play=self.count)
+        for step in range(5):
+            self.client.send("play", play=self.count, seconds=0.2 * step)
+            self.read(0.1)
+        self.client.send("play_end", play=self.count)
+
+    def job(self) -> None:
+        """Has the path rendered, over what the last job made; now and then it is stopped."""
+        out = self.soak.out / f"{self.number}.mp4"
+        self.client.send(
+            "render", what="camera_path", out=str(out), width=64, height=48, fps=8, overwrite=True
+        )
+
+    def save(self) -> None:
+        """Saves the scene."""
+        self.client.send("command", name="save")
+
+    def ask(self) -> None:
+        """Questions."""
+        self.count += 1
+        what = self.chance.choice(["surface", "path", "grid", "sources"])
+        self.client.send("ask", request=self.count, what=what)
+
+    def download(self) -> None:
+        """The files that a page offers."""
+        self._get(self.chance.choice(["/edits.yaml", "/camera_path.json", "/field", "/"]))
+
+    def screenshot(self) -> None:
+        """The picture as a file."""
+        self._get("/screenshot.png")
+
+    def _get(self, path: str) -> None:
+        address = f"http://localhost:{self.soak.server.port}{path}"
+        request = urllib.request.Request(address, headers=self.soak.server.headers)
+        with (
+            contextlib.suppress(urllib.error.HTTPError),
+            urllib.request.urlopen(request, timeout=60) as answer,
+        ):
+            answer.read()
+
+    def show(self) -> None:
+        """Other views."""
+        view = self.chance.choice(["colour", "depth", "normals"])
+        self.client.send("display", view=view, before=self.chance.random() < 0.2)
