@@ -92,6 +92,7 @@ def _table(
     done = ", ".join(f"{name} {count}" for name, count in soak.done.most_common())
     told = "; ".join(f"“{name} …” {count}" for name, count in soak.refused.most_common(12))
     faults = "\n".join(f"- {fault}" for fault in soak.faults[:20]) or "None."
+    command = f"--hours {options.hours:g} --pages {options.pages} --pause {options.pause:g}"
     return f"""# Hours of editing
 
 {options.pages} pages that edit, play, have jobs rendered, hang up and come back for {options.hours:g} hours.
@@ -100,7 +101,7 @@ MiB an hour, is that of the last three quarters.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
-    python benchmarks/robustness/soak.py --hours {options.hours:g} --pages {options.pages} --pause {options.pause:g}
+    python benchmarks/robustness/soak.py {command}
 
 | process | before | 1 | 2 | 3 | 4 | after | slope |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
