@@ -105,6 +105,11 @@ def test_bad_files_are_named(tmp_path: Path) -> None:
     flat = written(tmp_path, {"transform": np.zeros((3, 4)).tolist(), "scale": 1.0}, "flat.json")
     with pytest.raises(CameraError, match="singular"):
         load_camera_path(good, flat)
+    for transform, scale in ((1.0, 1e154), (1.0, 0.0), (1e154, 1.0)):
+        document = {"transform": (transform * np.eye(3, 4)).tolist(), "scale": scale}
+        huge = written(tmp_path, document, "huge.json")
+        with pytest.raises(CameraError, match='"scale" must be above 0'):
+            load_camera_path(good, huge)
 
 
 def test_orbit_of_a_full_circle_lies_on_that_circle() -> None:

@@ -269,6 +269,7 @@ def test_an_inner_cage_that_leaves_the_outer_is_an_error() -> None:
             'adjustment must be "continuous" or "discrete", got "fluid"',
         ),
         (lambda: Edit(INNER, OUTER, shell="cubic"), 'shell must be one of flow, trilinear, got "cubic"'),
+        (lambda: Edit(INNER, OUTER, shell="x" * 999), f'shell must be one of [a-z, ]*, got "{"x" * 40}"'),
         (
             lambda: Edit(INNER, OUTER, shell="trilinear", keep_source=True),
             'keep_source needs adjustment="discrete"',

@@ -144,8 +144,10 @@ def _similarity_inverse(path: Path | str | None) -> Floats:
             f'{path}: "transform" must be a 3x4 matrix; use dataparser_transforms.json'
         ) from None
     scale = document.get("scale")
-    if not _is_number(scale) or scale <= 0 or not np.isfinite(transform).all():
-        raise CameraError(f'{path}: "scale" must be above 0 and "transform" finite, got scale {scale!r:.40}')
+    if not _is_number(scale) or not 1e-30 < scale < 1e30 or not (np.abs(transform) < 1e30).all():
+        raise CameraError(
+            f'{path}: "scale" must be above 0 and "transform" finite, both below 1e30, got scale {scale!r:.40}'
+        )
     forward = np.vstack([scale * transform, [0.0, 0.0, 0.0, 1.0]])
     if abs(np.linalg.det(forward[:3, :3])) < 1e-12 * scale**3:
         raise CameraError(f'{path}: "transform" is singular; use the file that nerfstudio wrote')

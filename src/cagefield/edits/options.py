@@ -75,12 +75,12 @@ def problem_of_options(
     `cagefield.edits.edit.Edit` for what each of them means.
     """
     if adjustment not in ("continuous", "discrete"):
-        return f'adjustment must be "continuous" or "discrete", got "{adjustment}"'
+        return f'adjustment must be "continuous" or "discrete", got "{adjustment!s:.40}"'
     if shell not in SHELLS:
-        return f'shell must be one of {", ".join(SHELLS)}, got "{shell}"'
+        return f'shell must be one of {", ".join(SHELLS)}, got "{shell!s:.40}"'
     for name, value, known in zip(("fill", "relight"), surroundings[:2], (FILLS, RELIGHTS), strict=True):
         if value not in known and not isinstance(value, Clone if name == "fill" else CastShadow):
-            return f'{name} must be one of {", ".join(known)}, got "{value}"'
+            return f'{name} must be one of {", ".join(known)}, got "{value!s:.40}"'
     if isinstance(surroundings[1], CastShadow):
         size = sum(value * value for value in surroundings[1].direction)
         if not (len(surroundings[1].direction) == 3 and 0.0 < size < float("inf")):
@@ -104,7 +104,7 @@ def problem_of_options(
 
 def _problem_of_falloff(adjustment: str, shell: str, falloff: str, width: float) -> str | None:
     if falloff not in FALLOFFS:
-        return f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff}"'
+        return f'falloff must be one of {", ".join(FALLOFFS)}, got "{falloff!s:.40}"'
     if not 0.0 < width <= 1.0:
         return f"width must be above 0 and at most 1 (the whole shell), got {width!r}"
     fades = adjustment == "continuous" and shell == "flow"
