@@ -146,7 +146,7 @@ def _similarity_inverse(path: Path | str | None) -> Floats:
     scale = document.get("scale")
     if not _is_number(scale) or not 1e-30 < scale < 1e30 or not (np.abs(transform) < 1e30).all():
         raise CameraError(
-            f'{path}: "scale" must be above 0 and "transform" finite, both below 1e30, got scale {scale!r:.40}'
+            f'{path}: "scale" must be above 0 and "transform" finite, each below 1e30, got {scale!r:.40}'
         )
     forward = np.vstack([scale * transform, [0.0, 0.0, 0.0, 1.0]])
     if abs(np.linalg.det(forward[:3, :3])) < 1e-12 * scale**3:
