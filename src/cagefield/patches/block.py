@@ -68,11 +68,27 @@ class Block:
         return np.asarray(self.depth > SOLID)
 
     @cached_property
+    def matter(self) -> Mask:
+        """[X,Y,Z], True where there is something: what is solid, its small gaps closed and its inside filled.
+
+        Photos say nothing of what is behind a surface: fields are hollow there, or foggy.
+        """
+        padded = np.pad(self.solid, 2)
+        closed = ndimage.binary_closing(padded, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
+        return np.asarray(ndimage.binary_fill_holes(closed | self.solid))
+
+    @cached_property
+    def surface(self) -> Mask:
+        """[X,Y,Z], the outermost solid vertices, where the normal is known."""
+        known = (self.normals**2).sum(axis=-1) > 0.25
+        return np.asarray(self.solid & ndimage.binary_dilation(~self.matter) & known)
+
+    @cached_property
     def normals(self) -> Float32:
-        """Unit normals [X,Y,Z,3], against the gradient of a smoothed opacity; 0 where that is flat."""
+        """Unit normals [X,Y,Z,3], against the gradient of smoothed matter; 0 where that is flat."""
         if min(self.shape) < 3:
             return np.zeros((*self.shape, 3), np.float32)
-        smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
+        smooth = ndimage.gaussian_filter(self.matter.astype(np.float32), 1.2)
         slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
         length = np.linalg.norm(slope, axis=-1, keepdims=True)
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)

@@ -15,7 +15,7 @@ Source: Evans, "Fast approximations for global illumination on dynamic scenes" (
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,7 +53,7 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH = 2.0
+SMOOTH = 3.0
 """Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
 
 
@@ -199,15 +199,24 @@ class Lighting:
     where: Mask
     log_ratio: Array
 
-    def smoothed(self, block: Block) -> Lighting:
-        """The same, smoothed along surfaces."""
-        weight = np.zeros(block.shape)
-        weight[self.where] = np.minimum(block.depth[self.where], 1.0) + 1e-3
+    @classmethod
+    def on(cls, block: Block, among: Mask, change: Callable[[Array, Array], Array]) -> Lighting:
+        """The light on the coloured vertices of a mask [X,Y,Z]: that on the surface vertex next to each.
+
+        `change` gives logs [N] at surface points [N,3] with unit normals [N,3]. They are smoothed along the
+        surface. What lies beneath shows through it, and is lit as it is: there, fields are foggy.
+        """
+        surface, where = block.surface & among, (block.slot >= 0) & among
+        if not surface.any():
+            return cls(where, np.zeros(int(where.sum())))
+        normals = np.stack([_spread(block.normals[surface, axis], surface, 1.0) for axis in range(3)], axis=1)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         values = np.zeros(block.shape)
-        values[self.where] = self.log_ratio * weight[self.where]
-        total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
-        smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
-        return replace(self, log_ratio=smooth)
+        values[surface] = _spread(change(block.positions(surface), normals), surface, SMOOTH)
+        nearest = ndimage.distance_transform_edt(
+            ~surface, sampling=block.spacing, return_distances=False, return_indices=True
+        )
+        return cls(where, values[tuple(axis[where] for axis in nearest)])
 
     def at(self, block: Block, points: Array) -> Array:
         """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
@@ -230,6 +239,8 @@ class Lighting:
         return out
 
 
-def lit_vertices(block: Block) -> Mask:
-    """Vertices [X,Y,Z] whose colour shows, also those beside a surface, and whose normal is known."""
-    return np.asarray((block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25))
+def _spread(values: AnyArray, surface: Mask, sigma: float) -> Array:
+    """Values [N] of surface vertices [X,Y,Z], each the Gaussian mean of those around."""
+    dense, weight = np.zeros(surface.shape), ndimage.gaussian_filter(surface.astype(float), sigma)
+    dense[surface] = values
+    return np.asarray(ndimage.gaussian_filter(dense, sigma)[surface] / np.maximum(weight[surface], 1e-9))

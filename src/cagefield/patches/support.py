@@ -11,7 +11,7 @@ Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from scipy import ndimage, sparse
 from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import factorized
 
-from cagefield.patches.block import Block
+from cagefield.patches.block import Block, world_of
 from cagefield.typing import Array, Mask
 
 TRIALS = 200
@@ -36,6 +36,12 @@ LEAST = 60
 
 DEEP, HIGH = -4.0, 3.0
 """Heights over a support, in voxels, between which its density is made anew."""
+
+LEVEL = 1.5
+"""Height over a support, in voxels, up to which what is seen of it belongs to it."""
+
+BESIDE = 2
+"""Columns beside those that no camera sees that are filled too."""
 
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
@@ -116,6 +122,22 @@ class Footprint:
     around: Mask
     height: Array
 
+    def points(self, block: Block) -> Array:
+        """World positions [N,3] of the hole's columns on the surface."""
+        cells = np.argwhere(self.hole)
+        uv, height = cells + self.first, self.height[tuple(cells.T)]
+        at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
+        return world_of(block.field, at + block.low)
+
+    def without(self, seen: NDArray[np.bool_]) -> tuple[Footprint, Mask]:
+        """(the footprint whose hole lacks what is seen [N] of its columns, those columns [U,V])."""
+        hole = np.zeros(self.hole.shape, bool)
+        hole[tuple(np.argwhere(self.hole)[~seen].T)] = True
+        # What shows through gaps, and right beside the part, is of no use.
+        hole = ndimage.binary_dilation(ndimage.binary_opening(hole), iterations=BESIDE) & self.hole
+        known = self.hole & ~hole
+        return replace(self, hole=hole, around=self.around | known), known
+
     def column(self, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(u [N], v [N], height over the support [N]) of block coordinates [N,3]; u is -1 outside."""
         uv, height = self.support.local(at)
@@ -181,8 +203,22 @@ def _crossing(block: Block, support: Support) -> Array:
     return np.asarray(steps[last])
 
 
+def with_seen(
+    block: Block, before: Block, footprint: Footprint, known: Mask, removed: Mask
+) -> tuple[Block, Mask]:
+    """(the block with what was seen of a support in V^c, the vertices [X,Y,Z] of V^c without these).
+
+    `before` is the block with its V^c, `removed` [X,Y,Z], and `known` [U,V] are columns of the footprint.
+    """
+    voxels = np.argwhere(removed)
+    u, v, height = footprint.column(voxels.astype(np.float64))
+    back = np.zeros(block.shape, bool)
+    back[tuple(voxels[(u >= 0) & known[u, v] & (height < LEVEL)].T)] = True
+    return block.with_density(back, before.density[back]), removed & ~back
+
+
 def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
-    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c."""
+    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c that are empty."""
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
     known = u >= 0
