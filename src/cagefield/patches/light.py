@@ -29,14 +29,14 @@ from cagefield.patches.seen import SeenPairs
 from cagefield.patches.sun import Distance, Sun, sun_of
 from cagefield.typing import AnyArray, Array, Mask
 
-REACHES = (0.01, 0.02, 0.04, 0.08)
+REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD = (0.1, 0.2, 0.2, 0.15), 0.2
+USUAL, SPREAD = (0.1, 0.15, 0.15, 0.15, 0.1), 0.2
 """Weights that are usual where light comes from all around, and their standard deviation."""
 
-ALIKE = 10.0
-"""Pairs that count as one."""
+ALIKE = 300.0
+"""Pairs that count as one: neighbours, and other views, see the same texture."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -53,8 +53,8 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH = 3.0
-"""Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
+SMOOTH, LEVEL = 1.0, 3.0
+"""Standard deviations, in voxels along the surface, by which ratios of light and normals are smoothed."""
 
 
 @dataclass(frozen=True)
@@ -159,13 +159,14 @@ def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
     change = pairs.log_change
 
     usual = np.array(USUAL)
-    # Neighbouring pairs see the same texture.
-    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826 * np.sqrt(ALIKE)
+    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826
 
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        told = ambience.log_openness(second) - ambience.log_openness(first) - change
-        return np.concatenate([told / max(noise, 1e-3), (weights - usual) / SPREAD])
+        told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / max(noise, 1e-3)
+        # Edges of textures are further off than noise: Cauchy's loss.
+        robust = np.sign(told) * np.sqrt(np.log1p(told**2) / ALIKE)
+        return np.concatenate([robust, (weights - usual) / SPREAD])
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
@@ -209,7 +210,9 @@ class Lighting:
         surface, where = block.surface & among, (block.slot >= 0) & among
         if not surface.any():
             return cls(where, np.zeros(int(where.sum())))
-        normals = np.stack([_spread(block.normals[surface, axis], surface, 1.0) for axis in range(3)], axis=1)
+        normals = np.stack(
+            [_spread(block.normals[surface, axis], surface, LEVEL) for axis in range(3)], axis=1
+        )
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         values = np.zeros(block.shape)
         values[surface] = _spread(change(block.positions(surface), normals), surface, SMOOTH)

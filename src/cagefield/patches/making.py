@@ -29,10 +29,15 @@ from cagefield.warps.inner_map import HexahedronMap
 CLOSE = 3.0
 """Surfaces are hidden by what comes this near to them, voxels."""
 
+import os
+
+UNSURE = float(os.environ.get("UN", "0.6"))
+"""Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
+
 VIEWS = 2
 """Cameras that see a surface from which on it counts as known."""
 
-BEFORE = 2.0
+BEFORE = 0.7
 """What is so little behind what a camera shows, in voxels, is seen."""
 
 
@@ -88,16 +93,18 @@ def made_of(
     support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
     ground, removed = work.emptied, work.inside
     if support is not None:
-        hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
-        footprint = footprint_of(ground, support, work.part, hidden)
+        near = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
+        footprint = footprint_of(ground, support, work.part, near)
     if footprint is not None and sight is not None:
-        footprint, known = footprint.without(work.seen(footprint.points(ground), below, sight))
+        footprint, known = footprint.without(work.seen(footprint.points(ground), below, sight), work.part)
         ground, removed = with_seen(ground, work.before, footprint, known, work.inside)
     if ambience is not None and ambience.shows:
         lighting = work.light(ground, ambience)
         part_light = work.part_light(ambience) if work.settled and edit.source is None else None
     under = _lit(ground, lighting)
-    if footprint is None:
+    if footprint is not None and lighting is not None:
+        footprint = footprint.with_hole(np.argwhere(work.rim & (lighting.dense(under) > UNSURE)))
+    if footprint is None or not footprint.hole.any():
         support = None
     else:
         under = rebuilt(under, footprint, removed)

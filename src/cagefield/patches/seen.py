@@ -16,7 +16,7 @@ from cagefield.typing import Array, Mask
 VIEWS, PIXELS = 28, 200
 """Pictures, and their longer edge in pixels."""
 
-APART = (5, 14)
+APART = (5, 30)
 """Distance of a pair, in pixels."""
 
 WINDOW = 3

@@ -129,14 +129,35 @@ class Footprint:
         at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
         return world_of(block.field, at + block.low)
 
-    def without(self, seen: NDArray[np.bool_]) -> tuple[Footprint, Mask]:
-        """(the footprint whose hole lacks what is seen [N] of its columns, those columns [U,V])."""
-        hole = np.zeros(self.hole.shape, bool)
+    def without(self, seen: NDArray[np.bool_], part: Mask) -> tuple[Footprint, Mask]:
+        """(the footprint whose hole lacks what is seen [N] of its columns, those columns [U,V]).
+
+        What a part [X,Y,Z] stands on is not seen.
+        """
+        hole = self.stands(np.argwhere(part)) & self.hole
         hole[tuple(np.argwhere(self.hole)[~seen].T)] = True
         # What shows through gaps, and right beside the part, is of no use.
         hole = ndimage.binary_dilation(ndimage.binary_opening(hole), iterations=BESIDE) & self.hole
         known = self.hole & ~hole
         return replace(self, hole=hole, around=self.around | known), known
+
+    def with_hole(self, at: NDArray[np.int64]) -> Footprint:
+        """The footprint whose hole also has the columns of block coordinates [N,3] on the support."""
+        uv, height = self.support.local(at.astype(np.float64))
+        cells = np.round(uv[np.abs(height) < 2.0 * NEAR]).astype(np.int64) - self.first
+        cells = cells[((cells >= 0) & (cells < self.hole.shape)).all(axis=1)]
+        more = np.zeros(self.hole.shape, bool)
+        more[tuple(cells.T)] = True
+        hole = self.hole | (ndimage.binary_closing(more, iterations=2) & self.around)
+        return replace(self, hole=hole, around=self.around & ~hole)
+
+    def stands(self, at: NDArray[np.int64]) -> Mask:
+        """Columns [U,V] that block coordinates [N,3] of a part stand on, or nearly."""
+        u, v, height = self.column(at.astype(np.float64))
+        low = (u >= 0) & (height > LEVEL) & (height < HIGH + 2.0)
+        out = np.zeros(self.hole.shape, bool)
+        out[u[low], v[low]] = True
+        return out
 
     def column(self, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(u [N], v [N], height over the support [N]) of block coordinates [N,3]; u is -1 outside."""
