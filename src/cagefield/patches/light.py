@@ -53,7 +53,7 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH, LEVEL = 1.0, 3.0
+SMOOTH, LEVEL = 1.0, 1.5
 """Standard deviations, in voxels along the surface, by which ratios of light and normals are smoothed."""
 
 
@@ -201,11 +201,14 @@ class Lighting:
     log_ratio: Array
 
     @classmethod
-    def on(cls, block: Block, among: Mask, change: Callable[[Array, Array], Array]) -> Lighting:
+    def on(
+        cls, block: Block, among: Mask, change: Callable[[Array, Array], Array], level: AnyArray | None = None
+    ) -> Lighting:
         """The light on the coloured vertices of a mask [X,Y,Z]: that on the surface vertex next to each.
 
         `change` gives logs [N] at surface points [N,3] with unit normals [N,3]. They are smoothed along the
-        surface. What lies beneath shows through it, and is lit as it is: there, fields are foggy.
+        surface. What lies beneath shows through it, and is lit as it is: there, fields are foggy. Normals
+        [X,Y,Z,3] that are better known are in `level`, 0 elsewhere.
         """
         surface, where = block.surface & among, (block.slot >= 0) & among
         if not surface.any():
@@ -213,6 +216,8 @@ class Lighting:
         normals = np.stack(
             [_spread(block.normals[surface, axis], surface, LEVEL) for axis in range(3)], axis=1
         )
+        if level is not None:
+            normals = np.where(level[surface].any(axis=1, keepdims=True), level[surface], normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         values = np.zeros(block.shape)
         values[surface] = _spread(change(block.positions(surface), normals), surface, SMOOTH)

@@ -23,7 +23,7 @@ from cagefield.patches.light import Ambience, Lighting, distance_in
 from cagefield.patches.seen import Sight
 from cagefield.patches.sun import Distance
 from cagefield.patches.support import Support, footprint_of, rebuilt, support_of, with_seen
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.inner_map import HexahedronMap
 
 CLOSE = 3.0
@@ -90,7 +90,10 @@ def made_of(
     """
     work = _Work.of(field, below, edit, ambience, settled, preserve_opacity, after)
     lighting = part_light = footprint = None
-    support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
+    fills = edit.fill == "surroundings" and not edit.keep_source
+    relights = ambience is not None and ambience.shows
+    under_part = work.support() if fills or relights else None
+    support = under_part if fills else None
     ground, removed = work.emptied, work.inside
     if support is not None:
         near = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
@@ -98,8 +101,9 @@ def made_of(
     if footprint is not None and sight is not None:
         footprint, known = footprint.without(work.seen(footprint.points(ground), below, sight), work.part)
         ground, removed = with_seen(ground, work.before, footprint, known, work.inside)
-    if ambience is not None and ambience.shows:
-        lighting = work.light(ground, ambience)
+    if ambience is not None and relights:
+        level = None if under_part is None else under_part.normals(ground)
+        lighting = work.light(ground, ambience, level)
         part_light = work.part_light(ambience) if work.settled and edit.source is None else None
     under = _lit(ground, lighting)
     if footprint is not None and lighting is not None:
@@ -228,14 +232,14 @@ class _Work:
         )
         return matter
 
-    def light(self, block: Block, ambience: Ambience) -> Lighting:
+    def light(self, block: Block, ambience: Ambience, level: Float32 | None) -> Lighting:
         """What the light on a block without the part is multiplied by."""
         before, after = self._distances
 
         def change(points: Array, normals: Array) -> Array:
             return ambience.log_light(after, points, normals) - ambience.log_light(before, points, normals)
 
-        return Lighting.on(block, np.ones(block.shape, bool), change)
+        return Lighting.on(block, np.ones(block.shape, bool), change, level)
 
     def part_light(self, ambience: Ambience) -> Lighting:
         """What the light on the content of V^c is multiplied by at its new place."""

@@ -20,7 +20,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import factorized
 
 from cagefield.patches.block import Block, world_of
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array, Float32, Mask
 
 TRIALS = 200
 """Planes that are tried."""
@@ -30,6 +30,9 @@ NEAR = 1.5
 
 ALONG = 0.9
 """Least cosine between its normal and the plane's."""
+
+ROUGH = 0.6
+"""The same of one that lies on the plane, whose own normal is noise."""
 
 LEAST = 60
 """Vertices of a support, at least."""
@@ -60,6 +63,16 @@ class Support:
         """(u and v [N,2], height [N]) of block coordinates [N,3]."""
         away = at - self.point
         return away @ self.axes.T, away @ self.normal
+
+    def normals(self, block: Block) -> Float32:
+        """Normals [X,Y,Z,3] of a block's surface where it is the support's, 0 elsewhere."""
+        out = np.zeros((*block.shape, 3), np.float32)
+        at = np.argwhere(block.surface)
+        _, height = self.local(at.astype(np.float64))
+        mine = (np.abs(height) < 2.0 * NEAR) & (block.normals[block.surface] @ self.normal > ROUGH)
+        out[tuple(at[mine].T)] = self.normal / np.array(block.spacing)
+        out /= np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-9)
+        return out
 
 
 def support_of(block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0) -> Support | None:
