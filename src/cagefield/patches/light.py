@@ -53,7 +53,7 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH, LEVEL = 1.0, 1.5
+SMOOTH, LEVEL = 1.0, 3.0
 """Standard deviations, in voxels along the surface, by which ratios of light and normals are smoothed."""
 
 
