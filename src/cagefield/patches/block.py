@@ -30,6 +30,9 @@ NOTICED = 0.01
 SOLID = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
+FOG = 0.03
+"""The same of a vertex that is more than air."""
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -69,13 +72,13 @@ class Block:
 
     @cached_property
     def matter(self) -> Mask:
-        """[X,Y,Z], True where there is something: what is solid, its small gaps closed and its inside filled.
+        """[X,Y,Z], True where there is something: what is solid, the fog in its gaps, and what these enclose.
 
         Photos say nothing of what is behind a surface: fields are hollow there, or foggy.
         """
-        padded = np.pad(self.solid, 2)
-        closed = ndimage.binary_closing(padded, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
-        return np.asarray(ndimage.binary_fill_holes(closed | self.solid))
+        solid = np.pad(self.solid, 2)
+        closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
+        return np.asarray(ndimage.binary_fill_holes(self.solid | (closed & (self.depth > FOG))))
 
     @cached_property
     def surface(self) -> Mask:

@@ -29,9 +29,7 @@ from cagefield.warps.inner_map import HexahedronMap
 CLOSE = 3.0
 """Surfaces are hidden by what comes this near to them, voxels."""
 
-import os
-
-UNSURE = float(os.environ.get("UN", "0.6"))
+UNSURE = 0.6
 """Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
 
 VIEWS = 2

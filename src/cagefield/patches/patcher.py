@@ -156,7 +156,8 @@ class Patcher:
         if not wants_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
         ambience = lit if relit else None
-        sight = None if moving and "_sight" not in self.__dict__ else self._sight
+        looks = edit.fill == "surroundings" and not edit.keep_source
+        sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
         patch: Patch | SplatPatch
         if isinstance(self._field, VoxelField):
             patch = patch_of(

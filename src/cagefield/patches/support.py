@@ -252,7 +252,7 @@ def with_seen(
 
 
 def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
-    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c that are empty."""
+    """The block with the support going on in its hole; `removed` [X,Y,Z]: V^c's vertices that are empty."""
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
     known = u >= 0
