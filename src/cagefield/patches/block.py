@@ -33,6 +33,9 @@ SOLID = 0.3
 FOG = 0.03
 """The same of a vertex that is more than air."""
 
+ROUND = 1.2
+"""Standard deviation, in voxels, by which matter is smoothed for normals."""
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -91,7 +94,7 @@ class Block:
         """Unit normals [X,Y,Z,3], against the gradient of smoothed matter; 0 where that is flat."""
         if min(self.shape) < 3:
             return np.zeros((*self.shape, 3), np.float32)
-        smooth = ndimage.gaussian_filter(self.matter.astype(np.float32), 1.2)
+        smooth = ndimage.gaussian_filter(self.matter.astype(np.float32), ROUND)
         slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
         length = np.linalg.norm(slope, axis=-1, keepdims=True)
         return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
