@@ -53,11 +53,8 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-ROUGH, EVEN = 2.5, 1.0
-"""Standard deviations, in voxels along the surface, by which ratios of light are smoothed.
-
-The second where normals are known well: most of the noise is theirs.
-"""
+SMOOTH, NOISY = 1.0, 3.0
+"""Standard deviations, in voxels along the surface, by which light is smoothed, and normals that are noise."""
 
 
 @dataclass(frozen=True)
@@ -216,16 +213,14 @@ class Lighting:
         surface, where = block.surface & among, (block.slot >= 0) & among
         if not surface.any():
             return cls(where, np.zeros(int(where.sum())))
-        normals, known = block.normals[surface].astype(np.float64), np.zeros(int(surface.sum()), bool)
+        normals = np.stack(
+            [_spread(block.normals[surface, axis], surface, NOISY) for axis in range(3)], axis=1
+        )
         if level is not None:
-            known = level[surface].any(axis=1)
-            normals[known] = level[surface][known]
-        change_there = change(block.positions(surface), normals)
+            normals = np.where(level[surface].any(axis=1, keepdims=True), level[surface], normals)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         values = np.zeros(block.shape)
-        values[surface] = _spread(change_there, surface, ROUGH)
-        even = surface.copy()
-        even[surface] = known
-        values[even] = _spread(change_there[known], even, EVEN)
+        values[surface] = _spread(change(block.positions(surface), normals), surface, SMOOTH)
         nearest = ndimage.distance_transform_edt(
             ~surface, sampling=block.spacing, return_distances=False, return_indices=True
         )
