@@ -22,7 +22,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
-from cagefield.leftovers import remove_leftovers
+from cagefield.leftovers import remove_leftovers, remove_unfinished
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
@@ -105,10 +105,11 @@ class SceneStore:
     def lock(self) -> None:
         """Keeps other programs from editing the scene, and removes what ended ones left half-written.
 
-        Raises SceneError where another one does edit it.
+        Their videos beside it, too. Raises SceneError where another one does edit it.
         """
         self._lock = SceneLock(self.path)
         remove_leftovers(self.path, inside=True)
+        remove_unfinished(self.path.parent)
 
     def close(self) -> None:
         """Lets other programs edit the scene."""
