@@ -142,7 +142,7 @@ def _line_problem(lines: list[str], out: Path) -> str | None:
     said = [line for line in lines if line.startswith("cagefield: ") and "cagefield: warning" not in line]
     if len(said) != 1 or lines[-1] != said[0] or any("Traceback" in line for line in lines):
         return f"said {lines[-3:]}"
-    if str(out) not in said[0]:
+    if str(out.with_suffix("")) not in said[0]:  # or what goes beside it
         return f"names no place: {said[0]}"
     return None if "/." not in said[0].replace(str(out), "") else f"names a hidden file: {said[0]}"
 

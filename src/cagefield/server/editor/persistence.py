@@ -193,12 +193,13 @@ class SceneStore:
             )
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
-        save_edits(self.written(document.stack), self.path / _EDITS)
-        self._written = self._fingerprint()  # ours, should the rest not be possible
-        if document.keys or (self.path / CAMERA_PATH).exists():
-            with replaced_file(self.path / CAMERA_PATH) as draft:
+        with contextlib.ExitStack() as drafts:  # there is room for all files, or none changes
+            if document.keys or (self.path / CAMERA_PATH).exists():
+                draft = drafts.enter_context(replaced_file(self.path / CAMERA_PATH))
                 draft.write_text(camera_path, encoding="utf-8")
-        self._scene(document, self.path).save_manifest(self.path)
+            drafts.enter_context(self._scene(document, self.path).draft_manifest(self.path))
+            save_edits(self.written(document.stack), self.path / _EDITS)
+            self._written = self._fingerprint()  # ours, should the rest not be possible
         self._done(session)
 
     def save_as(self, session: Session, path: str, overwrite: bool) -> None:
@@ -225,14 +226,12 @@ class SceneStore:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         try:
-            self._scene(document, target).save(target, overwrite)
+            beside = {CAMERA_PATH: camera_path if document.keys else None}
+            self._scene(document, target).save(target, overwrite, beside=beside)
         except SceneError as error:
             raise SceneError(
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
-        if document.keys:
-            with replaced_file(target / CAMERA_PATH) as draft:
-                draft.write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path, self.source = target.resolve(), None
