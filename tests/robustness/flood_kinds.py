@@ -136,13 +136,13 @@ def _half_sent(server: EditorAt, over: threading.Event) -> None:
 
 
 def _screenshots(server: EditorAt, over: threading.Event) -> None:
-    """Of every open page, one after the other; every second client hangs up while its picture is made."""
+    """Pictures of the newest page; every second client hangs up while its picture is made."""
     for number in itertools.count():
         if over.is_set():
             return
         with contextlib.suppress(OSError, http.client.HTTPException):
             client = http.client.HTTPConnection("localhost", server.port, timeout=20)
-            client.request("GET", f"/screenshot.png?page={1 + number // 2 % 6}", headers=server.headers)
+            client.request("GET", "/screenshot.png", headers=server.headers)
             if number % 2:
                 client.getresponse().read()
             else:
