@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from PIL import Image
 
 from cagefield.cameras import Camera
-from cagefield.datasets import Dataset, View
+from cagefield.datasets import Dataset, View, photos
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders, read_header, read_photo
 from cagefield.datasets.views import hold_out, report_missing
 from cagefield.errors import DatasetError
@@ -59,6 +60,24 @@ def test_composite_of_shrunk_cut_out_is_the_shrunk_composite(tmp_path):
 
     direct = on_white(pixels.astype(float)).reshape(3, 4, 4, 4, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(on_white(small), direct, atol=1.6)  # alpha and colour each rounded once
+
+
+def test_cut_outs_are_shrunk_in_bands(tmp_path, monkeypatch):
+    """The same as at once, for heights that no band divides, and with little memory."""
+    save(tmp_path / "a.png", RNG.integers(0, 256, (47, 20, 4), dtype=np.uint8))
+    whole = read_photo(tmp_path / "a.png", 3)
+    for pixels in (1, 200, 400):
+        monkeypatch.setattr(photos, "_BAND", pixels)
+        np.testing.assert_array_equal(read_photo(tmp_path / "a.png", 3), whole)
+    monkeypatch.undo()
+    save(tmp_path / "b.png", np.zeros((1000, 1000, 4), np.uint8))
+    tracemalloc.start()
+    try:
+        read_photo(tmp_path / "b.png", 2)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 10_000_000  # 40 at once; the result has 1 MB, Pillow's own is not counted
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield import Scene, datasets
+from cagefield.benchmarking.tables import write_texts
 from cagefield.datasets.procedural import make_scene
 from cagefield.formats.splat_files import write_splats
 from cagefield.rendering.images import video_writer
@@ -216,3 +217,12 @@ def test_a_scene_without_room_says_where_its_training_is(
     assert f"the training is kept in {out}.training" in line
     assert "scene written" in printed(capsys, *arguments, "--resume")
     assert sorted(tmp_path.iterdir()) == [photos, out]
+
+
+def test_files_that_belong_together_are_written_together(tmp_path: Path) -> None:
+    table, figures = tmp_path / "a.md", tmp_path / "a.json"
+    write_texts({figures: "1", table: "2"})
+    with files_up_to(1_000), pytest.raises(OSError) as caught:
+        write_texts({figures: "3", table: "4" * 2_000})
+    assert caught.value.filename == str(table)
+    assert files_of(tmp_path) == {"a.json": b"1", "a.md": b"2"}

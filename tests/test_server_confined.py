@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -13,6 +14,7 @@ import pytest
 from cagefield.cli import main
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.keyframes import Keyframe
+from cagefield.leftovers import hidden_name
 from cagefield.rendering.images import write_video
 from cagefield.scene import Scene
 from cagefield.server.editor.persistence import SceneStore
@@ -146,3 +148,21 @@ def test_the_lock_goes_with_the_scene(scene: Path) -> None:
     assert [file.name for file in scene.parent.glob(".*lock")] == [".new.cagefield-lock"]
     store.close()
     assert list(scene.parent.glob(".*lock")) == []
+
+
+def test_the_next_editor_removes_what_an_ended_one_was_rendering(scene: Path) -> None:
+    """A killed editor's video beside the scene; another's, that goes on, and the user's own files stay."""
+    ours = hidden_name(scene.with_name("video.mp4"), "part")
+    ended = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True)
+    pid = f"-{ended.stdout.decode().strip()}-"
+    for name in (ours, ours.replace(f"-{os.getpid()}-", pid), ".video.mp4", ".old.part-3.mp4"):
+        (scene.parent / name).write_text("half")
+    folder = scene.parent / hidden_name(scene.with_name("pictures"), "new").replace(f"-{os.getpid()}-", pid)
+    folder.mkdir()
+    aside = folder.with_name(folder.name.replace(".new-", ".old-"))
+    aside.mkdir()
+    store, _ = opened(scene)
+    store.lock()
+    store.close()
+    left = {file.name for file in scene.parent.iterdir()}
+    assert left == {"scene", ours, ".video.mp4", ".old.part-3.mp4", aside.name}

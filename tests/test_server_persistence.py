@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from cagefield.cages import Cage
-from cagefield.edits import Edit, EditStack, Translate, load_edits, save_edits
+from cagefield.edits import Edit, EditStack, Translate, dump_edits, load_edits, save_edits
 from cagefield.errors import SceneError
 from cagefield.keyframe_files import load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
-from cagefield.server.editor.persistence import SceneStore
+from cagefield.server.editor.persistence import CAMERA_PATH, SceneStore
 from cagefield.server.editor.session import Session
+from full_disks import files_up_to
 from scenes import ball_scene, files_of
 
 INNER = Cage.box((0, 0, 0), 1.1)
@@ -143,6 +144,33 @@ def test_saving_as_replaces_nothing_that_it_was_not_asked_to(path: Path, tmp_pat
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(SceneError, match="holds no scene and is left as it is"):
         store.save_as(session, str(tmp_path / "mine"), overwrite=True)
+
+
+def test_saving_as_takes_the_camera_path_with_it(path: Path) -> None:
+    """The path of a scene that is replaced goes with it, where the new one has none."""
+    store, session = changed(path)
+    store.save_as(session, "copy", overwrite=False)
+    assert opened(store.path)[1].document.keys == (KEY,)
+    session.set_path((), False)
+    store.save_as(session, "other", overwrite=False)
+    store.save_as(session, "copy", overwrite=True)
+    assert opened(store.path)[1].document.keys == () and not (store.path / CAMERA_PATH).exists()
+
+
+def test_a_save_without_room_for_all_files_changes_none(path: Path) -> None:
+    store, session = changed(path)
+    store.save(session)
+    before = files_of(path.parent)
+    session.change(1, locked=False)
+    session.apply(1, "field", Translate((0.1, 0, 0)))
+    session.set_path((KEY,) * 3, False)
+    assert len(dump_edits(session.document.stack)) < 2_000
+    for action in (lambda: store.save(session), lambda: store.save_as(session, "new", False)):
+        with files_up_to(2_000), pytest.raises(OSError, match="File too large") as caught:
+            action()
+        assert "/." not in str(caught.value) and files_of(path.parent) == before and not session.saved
+    store.save(session)
+    assert opened(path)[1].document.keys == (KEY,) * 3
 
 
 def test_a_scene_that_is_gone_says_what_helps(path: Path) -> None:

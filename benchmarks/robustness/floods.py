@@ -2,8 +2,9 @@
 
 python benchmarks/robustness/floods.py [--seconds 20] [--floods 4] [--out FILE.md]
 
-Four pages or programs flood at a time (`tests/robustness/floods.py`). The floods and the editor share this
-machine's processors, so the first row, of an editor that nobody floods, is what to compare with.
+Four pages or programs flood at a time (`tests/robustness/flood_kinds.py`), in a process of their own. The
+floods and the editor share this machine's processors, so the first row, of an editor that nobody floods, is
+what to compare with.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from cagefield.benchmarking.machine import cpu_model
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
-from floods import FLOODS, during, memory  # noqa: E402
+from flood_kinds import FLOODS  # noqa: E402
+from floods import during, memory  # noqa: E402
 
-from editor_server import editor_server, page  # noqa: E402
+from editor_server import editor_server  # noqa: E402
 from scenes import ball_scene  # noqa: E402
 
 EVERY = 0.2
@@ -40,20 +42,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
     rows = []
-    for name, flood in {"none": lambda server, over: None, **FLOODS}.items():
+    for name in ("none", *FLOODS):
         if options.only and name not in options.only:
             continue
         with tempfile.TemporaryDirectory() as folder:
             ball_scene().save(Path(folder) / "scene")
             with editor_server(Path(folder) / "scene") as server:
                 before = memory(server.process.pid)
-                if name == "screenshots":
-                    with page(server) as (client, hello):
-                        client.look_from(hello)
-                        client.final()
-                        found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)
-                else:
-                    found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)
+                flood = None if name == "none" else name
+                found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)
                 time.sleep(0.5)
                 grown = (found.most - before) >> 20
         waits = np.array(found.seconds)

@@ -1,10 +1,11 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
-python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--servers 10] [--out FILE.md]
+python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
-wanted, and at random moments. Editors (`cagefield view`) are killed while a page sends changes and saves;
-what the page was told is compared with what the next editor has. About half an hour of one processor.
+wanted, and at random moments. Editors (`cagefield view`) are killed while a page sends changes, saves and
+renders a video; what the page was told is compared with what the next editor has. About an hour of one
+processor.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import random
 import sys
 import tempfile
 import threading
-import time
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,119 +25,156 @@ from cagefield.benchmarking.machine import cpu_model
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
+import kill_commands  # noqa: E402
+import kill_points  # noqa: E402
 import kills  # noqa: E402
 
 from cagefield import Scene  # noqa: E402
 from cagefield.server.editor.persistence import SceneStore  # noqa: E402
-from editor_server import editor_server, page  # noqa: E402
-
-STAYS = 5.0
-"""Seconds after which no process of a killed editor may be there."""
+from cagefield.server.editor.session import Session  # noqa: E402
+from editor_server import PageClient, editor_server, page  # noqa: E402
 
 
 @dataclass
-class Servers:
-    """What came of killed editors."""
+class Told:
+    """What pages were told before their editors were killed."""
 
-    kills: int = 0
     changes: int = 0
-    """Changes that pages were told of."""
     saves: int = 0
-    lost: int = 0
-    unreadable: int = 0
-    outlived: int = 0
-    longest: float = 0.0
-    """Seconds that a process was there after its editor."""
+    videos: int = 0
 
 
 def main() -> None:
     """See the module."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=1)
-    parser.add_argument("--random", type=int, default=40)
-    parser.add_argument("--slow", type=int, default=20, help="kills of commands with kernels, each")
+    parser.add_argument("--random", type=int, default=40, help="kills at random, of each command")
+    parser.add_argument("--slow", type=int, default=10, help="the same of each command with kernels")
     parser.add_argument("--servers", type=int, default=10)
+    parser.add_argument("--only", nargs="*", default=None)
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
-    rows = []
-    for name, command in {**kills.COMMANDS, **kills.SLOW_COMMANDS}.items():
-        slow = name in kills.SLOW_COMMANDS
+    rows, everything = [], []
+    for name in kills.ALL if options.only is None else options.only:
         found = kills.Killed()
-        with tempfile.TemporaryDirectory() as folder:
-            calls, seconds = kills.calls_of(name, Path(folder))
-        points = [*range(1, calls + 1)] * options.rounds
-        random.Random(name).shuffle(points)
-        for at in points[: options.slow] if slow else points:
-            with tempfile.TemporaryDirectory() as folder:
-                kills.kill(command, name, Path(folder), at, found)
-        for after in kills.moments(options.slow if slow else options.random, seconds, len(name)):
-            with tempfile.TemporaryDirectory() as folder:
-                kills.kill(command, name, Path(folder), 0, found, after)
-        counts = (calls, found.kills, found.lost, found.unreadable, found.left)
-        rows.append(f"| {name} | {' | '.join(map(str, counts))} |")
+        calls = _kill_command(name, found, options)
+        everything.append(found)
+        rows.append(_row(name, str(calls), found))
         print(rows[-1], *found.faults, sep="\n    ", flush=True)
-    servers = Servers()
+    found, told = kills.Killed(), Told()
     for number in range(options.servers):
         with tempfile.TemporaryDirectory() as folder:
-            _kill_editor(Path(folder), number, servers)
-        print(servers, flush=True)
+            _kill_editor(Path(folder), number, found, told)
+        print(found, told, flush=True)
+    everything.append(found)
+    rows.append(_row("whole editors", "", found))
+    rows.append(_row("**all**", "", _sum(everything)))
     if options.out is not None:
-        options.out.write_text(_table(rows, servers, options))
+        options.out.write_text(_table(rows, found, told, options))
 
 
-def _kill_editor(folder: Path, number: int, found: Servers) -> None:
+def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -> int:
+    """Kills a command at all its calls, whose number is returned, and at random."""
+    command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
+    with tempfile.TemporaryDirectory() as folder:
+        calls, seconds = kills.calls_of(name, Path(folder))
+    points = [*range(1, calls + 1)] * (1 if slow else options.rounds)
+    random.Random(name).shuffle(points)
+    for at in points:
+        with tempfile.TemporaryDirectory() as folder:
+            kills.kill(command, name, Path(folder), at, found)
+    for after in kills.moments(options.slow if slow else options.random, seconds, len(name)):
+        with tempfile.TemporaryDirectory() as folder:
+            kills.kill(command, name, Path(folder), 0, found, after)
+    return calls
+
+
+def _kill_editor(folder: Path, number: int, found: kills.Killed, told: Told) -> None:
     """Kills an editor at a random moment while a page names an edit and saves it, over and over."""
-    chance = random.Random(number)
     kills.COMMANDS["changes and saves"].make(folder)
-    told, saved = 0, 0
+    others = kill_points.adopted()
     with editor_server(folder / "scene") as server, page(server) as (client, hello):
-        client.look_from(hello)
-        client.send("load_edits", text=kills.EDITS)
-        edit = client.state(lambda state: bool(state["edits"]))["edits"][0]["id"]
-        # It draws meanwhile, so that processes have something to do.
-        children = server.children()
-        threading.Timer(chance.uniform(0.0, 3.0), server.kill).start()
-        try:
-            for n in range(1, 10_000):
-                client.send("change", edit=edit, name=f"n{n}")
-                client.state(lambda state, n=n: state["edits"][0]["name"] == f"n{n}")  # type: ignore[misc]
-                told = n
-                if n % 5 == 0:
-                    client.send("command", name="save")
-                    client.until(lambda m: m["type"] == "notice" and "saved to" in m["text"])
-                    saved = n
-        except Exception:  # the socket has gone
-            pass
-        begun = time.monotonic()
+        edit = _begin(client, hello)
+        if number % 2:  # kernels are there, and ffmpeg soon
+            client.final()
+        threading.Timer(random.Random(number).uniform(0.0, 4.0), server.kill).start()
+        kept, saved = _edit_until_killed(client, edit, told)
         server.process.wait(30)
-        while any(_runs(child) for child in children) and time.monotonic() - begun < 30.0:
-            time.sleep(0.05)
-        took = time.monotonic() - begun
-    found.kills += 1
-    found.changes, found.saves = found.changes + told, found.saves + saved // 5
-    found.longest = max(found.longest, took)
-    found.outlived += took > STAYS
+        # The editor's own process is known, and has ended; its video goes with it.
+        left, seconds = kill_points.outliving(others, kill_points.STAYS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        problem = _problem(folder, kept, saved)
+    ended = kill_points.Ended(True, 0, kept, left, seconds)
+    found.count(f"editor {number}", ended, problem, kills.hidden(folder))
+
+
+def _begin(client: PageClient, hello: dict[str, object]) -> int:
+    """An edit, and a path whose video takes long: its number."""
+    client.look_from(hello)
+    client.send("load_edits", text=kill_commands.EDITS)
+    edit: int = client.state(lambda state: bool(state["edits"]))["edits"][0]["id"]
+    pose = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0]
+    keys = [{"c2w": pose, "fov_y_deg": fov, "seconds": 4.0} for fov in (40.0, 44.0)]
+    client.send("set_path", keys=keys)
+    client.send("render", what="camera_path", out="r.mp4", width=160, height=120)
+    return edit
+
+
+def _edit_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int, int]:
+    """(the last name, the last saved name) that the page was told of before its socket was gone."""
+    kept, saved = 0, 0
+    try:
+        for n in range(1, 10_000):
+            client.send("change", edit=edit, name=f"n{n}")
+            client.state(lambda state, n=n: state["edits"][0]["name"] == f"n{n}")  # type: ignore[misc]
+            kept, told.changes = n, told.changes + 1
+            if n % 5 == 0:
+                client.send("command", name="save")
+                client.until(lambda m: m["type"] == "notice" and "saved to" in m["text"])
+                saved, told.saves = n, told.saves + 1
+            if n % 40 == 0:
+                client.send("render", what="camera_path", out="r.mp4", width=64, height=48, overwrite=True)
+    except Exception:  # the socket has gone
+        pass
+    told.videos += any("r.mp4" in str(m.get("text")) for m in client.messages if m["type"] == "notice")
+    return kept, saved
+
+
+def _problem(folder: Path, kept: int, saved: int) -> str | None:
+    """What the next editor does not find; it then saves what it has."""
     try:
         scene = Scene.open(folder / "scene")
         store = SceneStore(scene, folder / "scene")
+        store.lock()
         document = store.recovered() or store.document()
     except Exception as error:
-        print(f"unreadable: {error}")
-        found.unreadable += 1
-        return
-    kept = [int(entry.edit.name[1:]) for entry in document.entries if entry.edit.name.startswith("n")]
+        return f"unreadable: {error}"
+    names = [int(entry.edit.name[1:]) for entry in document.entries if entry.edit.name.startswith("n")]
     on_disk = [int(edit.name[1:]) for edit in scene.edits if edit.name.startswith("n")]
-    found.lost += max(kept, default=0) < told or max(on_disk, default=0) < saved
+    session = Session(document, scene.field.bounds, scene.field.sample_spacing)
+    store.save(session)
+    store.close()
+    if max(names, default=0) < kept:
+        return f"lost: change {kept} was acknowledged, {names} is there"
+    if max(on_disk, default=0) < saved:
+        return f"lost: change {saved} was saved, {on_disk} is there"
+    return None
 
 
-def _runs(process: int) -> bool:
-    try:
-        return ") Z" not in Path(f"/proc/{process}/stat").read_text()
-    except OSError:
-        return False
+def _row(name: str, calls: str, found: kills.Killed) -> str:
+    counts = (calls, found.kills, found.lost, found.unreadable, found.left, found.outlived)
+    return f"| {name} | {' | '.join(map(str, counts))} | {found.stayed:.1f} |"
 
 
-def _table(rows: list[str], servers: Servers, options: argparse.Namespace) -> str:
+def _sum(every: list[kills.Killed]) -> kills.Killed:
+    total = kills.Killed(stayed=max(found.stayed for found in every))
+    for name in ("kills", "lost", "unreadable", "left", "outlived"):
+        setattr(total, name, sum(getattr(found, name) for found in every))
+    return total
+
+
+def _table(rows: list[str], found: kills.Killed, told: Told, options: argparse.Namespace) -> str:
     command = f"--rounds {options.rounds} --random {options.random} --slow {options.slow}"
     command += f" --servers {options.servers}"
     return f"""# Kills
@@ -144,18 +182,19 @@ def _table(rows: list[str], servers: Servers, options: argparse.Namespace) -> st
 Calls: those that change a name or open a file to write, of the whole command; each is a kill point, and then
 there are random moments. Lost: what the command, or the editor, had said was done, or a file of the user's.
 Unreadable: no scene, old or new, at its place. Left: hidden files after the same command has been run again.
+Outlived: kills after which a process that the killed one had started was there {kill_points.STAYS:g} s later;
+stayed: seconds that the last of them was there at most.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
     python benchmarks/robustness/kills.py {command} --out benchmarks/results/robustness_kills.md
 
-| command | calls | kills | lost | unreadable | left |
-| --- | ---: | ---: | ---: | ---: | ---: |
+| command | calls | kills | lost | unreadable | left | outlived | stayed, s |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 {chr(10).join(rows)}
 
-Editors killed while a page changes and saves: {servers.kills}, with {servers.changes} acknowledged changes
-and {servers.saves} acknowledged saves; lost {servers.lost}, unreadable {servers.unreadable}; processes that
-were there {STAYS:g} s later: {servers.outlived}, the longest {servers.longest:.1f} s.
+Whole editors draw, keep changes, save and render a video: pages had been told of {told.changes} changes and
+{told.saves} saves before the {found.kills} kills. Hidden there are files after the next save.
 """
 
 

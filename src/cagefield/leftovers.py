@@ -52,11 +52,23 @@ def remove_leftovers(target: Path, *, inside: bool = False) -> None:
         role = _MARK.search(path.name)
         if role is None or not is_abandoned(path) or (role[1] == "old" and not target.exists()):
             continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            with contextlib.suppress(OSError):
-                path.unlink()
+        _remove(path)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Removes what ended programs were writing in a folder, whatever it was to become."""
+    for path in folder.glob(".*"):
+        role = _MARK.search(path.name)
+        if role is not None and role[1] != "old" and is_abandoned(path):
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink()
 
 
 def _host() -> str:

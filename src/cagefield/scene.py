@@ -21,7 +21,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache, cached_property, partial
 from pathlib import Path
 from types import MappingProxyType
@@ -208,17 +209,27 @@ class Scene:
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
 
-    def save(self, path: Path | str, overwrite: bool = False) -> None:
+    def save(
+        self,
+        path: Path | str,
+        overwrite: bool = False,
+        *,
+        beside: Mapping[str, str | None] = MappingProxyType({}),
+    ) -> None:
         """Writes the scene folder `path`, complete or not at all.
 
         With `overwrite` a scene that is there is replaced once the new one is complete; other files in its
-        folder are kept. Relative sources of pastes are written as that folder sees them.
+        folder are kept. `beside` has the text of files that are written with it, by name; None removes one.
+        Relative sources of pastes are written as that folder sees them.
 
         Raises:
             SceneError: something else is there, or a scene and no `overwrite`.
         """
         target = check_destination(path, overwrite)
-        with replaced_folder(target, FILES) as draft:
+        with replaced_folder(target, (*FILES, *beside)) as draft:
+            for name, text in beside.items():
+                if text is not None:
+                    (draft / name).write_text(text, encoding="utf-8")
             self.field.save(draft / FIELD)
             if self.original is not None:
                 save_nerf(self.original, draft / ORIGINAL)
@@ -232,6 +243,12 @@ class Scene:
 
     def save_manifest(self, folder: Path) -> None:
         """Writes the scene's manifest into a folder that holds its other files, complete or not at all."""
+        with self.draft_manifest(folder):
+            pass
+
+    @contextmanager
+    def draft_manifest(self, folder: Path) -> Iterator[None]:
+        """The manifest is written when the context begins and takes its place in the folder when it ends."""
         manifest: dict[str, object] = {
             "format": FORMAT,
             "version": self.version,
@@ -243,6 +260,7 @@ class Scene:
             manifest["preserve_opacity"] = False
         with replaced_file(folder / MANIFEST, parents=False) as draft:
             write_json(manifest, draft)
+            yield
 
     def with_edits(self, edits: EditStack) -> Scene:
         """The same scene under another edit stack.

@@ -1,23 +1,15 @@
-"""Pages and programs that flood an editor, beside a page that only asks a question now and then."""
+"""How long a page waits for its answers while an editor is flooded."""
 
 from __future__ import annotations
 
 import contextlib
-import http.client
-import json
 import os
-import socket
-import threading
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from websockets.sync.client import ClientConnection, connect
+from flooding import flooded
 
 from editor_server import EditorServer, PageClient, page
-
-Flood = Callable[[EditorServer, threading.Event], None]
-"""Floods an editor until the event is set."""
 
 
 @dataclass
@@ -30,15 +22,14 @@ class Answers:
 
 
 def during(
-    server: EditorServer, flood: Flood, questions: int, every: float = 0.2, floods: int = 1
+    server: EditorServer, flood: str | None, questions: int, every: float = 0.2, floods: int = 1
 ) -> Answers:
-    """What a second page sees of a flood: answers to so many questions."""
-    found, over = Answers(), threading.Event()
-    threads = [threading.Thread(target=flood, args=(server, over), daemon=True) for _ in range(floods)]
-    with page(server) as (client, _):
-        for thread in threads:
-            thread.start()
-        try:
+    """What a second page sees of a flood, or of none: answers to so many questions."""
+    found = Answers()
+    with page(server) as (client, hello):
+        if flood == "screenshots":  # of as many pixels as there may be
+            client.look_from(hello, side=4096)
+        with contextlib.nullcontext() if flood is None else flooded(flood, server.link, floods):
             time.sleep(1.0)
             for number in range(1, questions + 1):
                 begun = time.monotonic()
@@ -47,10 +38,6 @@ def during(
                 found.seconds.append(time.monotonic() - begun)
                 found.most = max(found.most, memory(server.process.pid))
                 time.sleep(every)
-        finally:
-            over.set()
-            for thread in threads:
-                thread.join(60)
     return found
 
 
@@ -62,129 +49,3 @@ def memory(process: int) -> int:
     """Bytes that a process has in memory."""
     with open(f"/proc/{process}/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-@contextlib.contextmanager
-def _socket(server: EditorServer) -> Iterator[ClientConnection]:
-    origin = f"http://localhost:{server.port}"
-    cookie = {"Cookie": f"cagefield_{server.port}={server.token}"}
-    with connect(
-        f"ws://localhost:{server.port}/socket",
-        origin=origin,  # type: ignore[arg-type]
-        max_size=None,
-        additional_headers=cookie,
-        close_timeout=1,
-        ping_interval=None,
-    ) as client:
-        yield client
-
-
-def _sending(content: Callable[[int], str | bytes], pause: float = 0.0) -> Flood:
-    """Sends messages as fast as they are taken; opens another socket when it is closed."""
-
-    def flood(server: EditorServer, over: threading.Event) -> None:
-        number = 0
-        while not over.is_set():
-            with contextlib.suppress(Exception), _socket(server) as client:
-                threading.Thread(target=_read, args=(client,), daemon=True).start()
-                while not over.is_set():
-                    client.send(content(number))
-                    number += 1
-                    if pause:
-                        time.sleep(pause)
-
-    return flood
-
-
-def _read(client: ClientConnection) -> None:
-    with contextlib.suppress(Exception):
-        for _ in client:
-            pass
-
-
-def _edits(count: int, operations: int) -> str:
-    edit = {
-        "inner": {"center": [0, 0, 0], "size": 1},
-        "outer": {"margin": 0.5},
-        "operations": [{"translate": [1e-6, 0, 0]}] * operations,
-    }
-    return json.dumps({"type": "load_edits", "text": json.dumps({"edits": [edit] * count})})
-
-
-def _never_reading(server: EditorServer, over: threading.Event) -> None:
-    """Pages that send what has answers, and read none: their lines are small, and stay full."""
-    key = f"cagefield_{server.port}={server.token}"
-    head = (
-        f"GET /socket HTTP/1.1\r\nHost: localhost:{server.port}\r\nOrigin: http://localhost:{server.port}\r\n"
-        f"Cookie: {key}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
-    )
-    text = b'{"type": "nothing"}'
-    frame = bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text
-    lines = []
-    for _ in range(20):
-        line = socket.socket()
-        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        line.connect(("127.0.0.1", server.port))
-        line.sendall(head.encode())
-        line.setblocking(False)
-        lines.append(line)
-    while not over.is_set():
-        for line in lines:
-            with contextlib.suppress(OSError):
-                line.send(frame * 50)
-        time.sleep(0.05)
-    for line in lines:
-        line.close()
-
-
-def _half_sent(server: EditorServer, over: threading.Event) -> None:
-    lines: list[socket.socket] = []
-    while not over.is_set():
-        with contextlib.suppress(OSError):
-            line = socket.create_connection(("127.0.0.1", server.port), timeout=5)
-            line.sendall(b"GET /edits.yaml HTTP/1.1\r\nHost: local")
-            lines.append(line)
-        if len(lines) > 600:
-            lines.pop(0).close()
-    for line in lines:
-        line.close()
-
-
-def _screenshots(server: EditorServer, over: threading.Event) -> None:
-    while not over.is_set():
-        with contextlib.suppress(OSError, http.client.HTTPException):
-            client = http.client.HTTPConnection("localhost", server.port, timeout=20)
-            client.request("GET", "/screenshot.png", headers=server.headers)
-            if threading.get_ident() % 2:
-                client.getresponse().read()
-            client.close()
-
-
-def _wrong_tokens(server: EditorServer, over: threading.Event) -> None:
-    number = 0
-    while not over.is_set():
-        number += 1
-        with contextlib.suppress(OSError, http.client.HTTPException):
-            client = http.client.HTTPConnection("localhost", server.port, timeout=20)
-            client.request("GET", "/edits.yaml", headers={"Authorization": f"Bearer {number:040}"})
-            client.getresponse().read()
-            client.close()
-
-
-FLOODS: dict[str, Flood] = {
-    "small messages": _sending(lambda _: '{"type": "presented", "picture": 1}'),
-    "messages that are none": _sending(lambda number: '{"type": "x' + "y" * (number % 5000) + '"}'),
-    "binary messages": _sending(lambda _: bytes(1 << 16)),
-    "messages of a megabyte": _sending(lambda _: '{"type": "' + "x" * 1_000_000 + '"}'),
-    "edit files of 300 edits": _sending(lambda _: _edits(300, 1)),
-    "edits of 2,000 operations": _sending(lambda _: _edits(1, 2000)),
-    "changes that all pages are told of": _sending(
-        lambda number: json.dumps({"type": "scene_change", "preserve_opacity": bool(number % 2)})
-    ),
-    "pages that never read": _never_reading,
-    "requests half sent": _half_sent,
-    "screenshots": _screenshots,
-    "wrong tokens": _wrong_tokens,
-}
-"""The floods, by what they are of."""

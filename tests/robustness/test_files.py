@@ -98,9 +98,9 @@ def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     )
     import attack as attacking
 
-    program = (Path(__file__).parent / "attacked_reader.py").read_text()
-    (tmp_path / "attacked_reader.py").write_text(program)
-    (tmp_path / "mutators.py").write_text((Path(__file__).parent / "mutators.py").read_text())
+    for name in ("attacked_reader", "mutators", "plain_mutators", "hostile_values"):
+        program = (Path(__file__).parent / f"{name}.py").read_text()
+        (tmp_path / f"{name}.py").write_text(program)
     monkeypatch.setattr(attacking, "__file__", str(tmp_path / "attack.py"))
     monkeypatch.setattr(attacking, "HANG", 0.5)
     found = attack(["crash", "death", "memory", "burn"], 0, 1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from floods import FLOODS, during, memory
+from floods import during, memory
 
 from editor_server import EditorServer, editor_server
 from scenes import ball_scene
@@ -23,9 +23,18 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
         yield running
 
 
-@pytest.mark.parametrize("name", ["binary messages", "pages that never read", "edit files of 300 edits"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "binary messages",
+        "pages that never read",
+        "edit files of 300 edits",
+        "requests half sent",
+        "wrong tokens",
+    ],
+)
 def test_another_page_has_its_answers(server: EditorServer, name: str) -> None:
     before = memory(server.process.pid)
-    found = during(server, FLOODS[name], questions=4, every=0.1)
+    found = during(server, name, questions=4, every=0.1)
     assert len(found.seconds) == 4
     assert found.most - before < 200 << 20

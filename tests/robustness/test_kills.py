@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
+from kill_points import Ended, Say, adopted, children, forked
 from kills import COMMANDS, Killed, calls_of, kill
 
 pytestmark = [
@@ -45,3 +47,20 @@ def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     session.make(tmp_path / "other")
     assert (session.check(tmp_path / "other", 4) or "").startswith("lost: change 2 was kept")
+
+
+def test_processes_that_go_on_are_seen(tmp_path: Path) -> None:
+    """A killed process's own process, which it has started, goes on: it is counted, and ended."""
+    others = adopted()
+
+    def work(say: Say) -> None:
+        sleeping = subprocess.Popen(["sleep", "600"])
+        say(sleeping.pid)
+        (tmp_path / "a").write_text("b")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("kill_points.STAYS", 0.2)
+        ended = forked(work, tmp_path, 1)
+    assert ended.killed and ended.outlived == 1 and ended.stayed >= 0.2
+    assert children(os.getpid()) == others and not Path(f"/proc/{ended.said}").exists()
+    assert forked(lambda say: say(3), tmp_path, 1) == Ended(False, 0, 3, 0, pytest.approx(0, abs=0.2))

@@ -15,7 +15,7 @@ import { Presenter } from "./presenter";
 import { recallCamera, recallTools } from "./session_storage";
 import { cageOverlay, shownCages } from "./cage_overlay";
 import { Viewport } from "./viewport";
-import { Store, obstacle, selected, showsCages, target } from "./store";
+import { LOOKING, Store, maySay, obstacle, selected, showsCages, target } from "./store";
 import { headed } from "./picture_message";
 import type { Operation } from "./operations";
 import type { Answer, Ask, EditState, Hello, Job, PageMessage, Preview, ServerMessage, State, Vec3 } from "./protocol";
@@ -67,8 +67,12 @@ export class App {
     });
   }
 
-  /** Sends a message, or says that nobody is there. */
+  /** Sends a message; false where nobody is there, or where the page may not say it. */
   send(message: PageMessage): boolean {
+    if (!maySay(this.store.now, message)) {
+      this.say(LOOKING, "warning");
+      return false;
+    }
     return this.connection.send(message);
   }
 
@@ -89,7 +93,7 @@ export class App {
   beginDrag(what = target(this.store.now)): Drag | null {
     const edit = selected(this.store.now);
     if (edit === null || this.store.now.connection !== "open") return null;
-    const why = obstacle(edit, this.store.now.mode);
+    const why = obstacle(this.store.now, edit);
     if (why !== null) {
       this.say(why, "warning");
       return null;
@@ -143,7 +147,7 @@ export class App {
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
-    if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null || (now.tool === "select" && now.corners.length === 0)) {
+    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null || (now.tool === "select" && now.corners.length === 0)) {
       this.gizmo.hide();
       return;
     }

@@ -74,7 +74,7 @@ function chosenEdit(out: CageOverlay, editor: Editor, edit: EditState, cages: Ca
     cage(out, cages.outer.corners, tint.clone().lerp(WHITE, 0.35), stroke, dim);
   }
   cage(out, first.corners, tint, INNER, dim);
-  if (obstacle(edit, editor.mode) !== null) return;
+  if (obstacle(editor, edit) !== null) return;
   for (const { cage: name, corners } of draggable(editor, cages)) {
     const hover = editor.hover?.cage === name ? editor.hover.part : null;
     if (hover) highlight(out, corners, hover);

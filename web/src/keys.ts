@@ -2,7 +2,11 @@
 import type { Actions } from "./actions";
 import type { App } from "./app";
 import type { Pointer } from "./pointer";
+import { LOOKING, looking } from "./store";
 import type { Dialogs } from "./ui/dialogs";
+
+/** Keys beside those of the view that pages have which may not change anything. */
+const OF_LOOKERS = ["Escape", "Ctrl+C", "?"];
 
 export interface Binding {
   /** As shown: "Ctrl+Shift+Z". Several may do the same. */
@@ -85,6 +89,7 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     const binding = byKey.get(name);
     if (!binding) return;
     event.preventDefault();
+    if (looking(app.store.now) && binding.group !== "View" && !OF_LOOKERS.includes(name)) return app.say(LOOKING, "warning");
     if (!event.repeat || name.endsWith("Z")) binding.run();
   });
   addEventListener("keyup", (event) => {

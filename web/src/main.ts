@@ -5,6 +5,7 @@ import { testApi } from "./test_api";
 import { bindings, listenForKeys } from "./keys";
 import { Pointer } from "./pointer";
 import { remember } from "./session_storage";
+import { LOOKING, looking } from "./store";
 import { dialogs } from "./ui/dialogs";
 import { h } from "./ui/dom";
 import { editsList } from "./ui/edits_list";
@@ -29,24 +30,30 @@ const pointer = new Pointer(app);
 const keys = bindings(app, actions, pointer, questions);
 listenForKeys(app, actions, pointer, keys);
 
-const panel = h(
-  "aside",
-  { class: "panel" },
+// Who may look but not change anything finds its buttons and fields disabled.
+const controls = h(
+  "fieldset",
+  { class: "controls" },
   editsList(app, actions, questions),
   options(app, actions),
   historyList(app),
   pathList(app, actions, questions),
   jobs(app),
 );
+const panel = h("aside", { class: "panel" }, controls);
 view.append(overlay(app, pointer));
 root.append(topbar(app, actions, questions), toolbar(app, actions), panel, status(app), help(app, keys), questions.element);
+app.store.watch(["hello"], (now) => {
+  controls.disabled = looking(now);
+  root.classList.toggle("looking", looking(now));
+});
 app.store.watch(["panel"], (now) => root.classList.toggle("wide", !now.panel));
 app.store.watch(["state", "hello"], ({ hello, state }) => {
   document.title = `${state?.saved === false ? "● " : ""}${hello?.name ?? "cagefield"}`;
 });
 addEventListener("beforeunload", (event) => {
   if (app.store.now.hello !== null) remember(app.store.now, app.viewport.c2w);
-  if (app.store.now.state?.saved === false) event.preventDefault();
+  if (app.store.now.state?.saved === false && !looking(app.store.now)) event.preventDefault();
 });
 addEventListener("dragover", (event) => {
   if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
@@ -55,7 +62,8 @@ addEventListener("drop", (event) => {
   const file = event.dataTransfer?.files[0];
   if (file === undefined) return;
   event.preventDefault();
-  void actions.load(file);
+  if (looking(app.store.now)) app.say(LOOKING, "warning");
+  else void actions.load(file);
 });
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) app.player.stop();

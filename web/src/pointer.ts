@@ -161,7 +161,7 @@ export class Pointer {
     const { now } = this.app.store;
     const edit = selected(now);
     this.app.gizmo.leave();
-    if (edit === null || !showsCages(now) || obstacle(edit, now.mode) !== null) return null;
+    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null) return null;
     const { project } = this.app.viewport;
     const { x, y } = this.at;
     const cages = draggable(now, shownCages(edit, this.app.drag));

@@ -1,7 +1,7 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "./cage";
 import type { Axes } from "./operations";
-import type { Drawing, EditState, Hello, Job, DisplayMessage, Notice, Preparing, Preview, State } from "./protocol";
+import type { Drawing, EditState, Hello, Job, DisplayMessage, Notice, PageMessage, Preparing, Preview, State } from "./protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<DisplayMessage["view"]>;
@@ -145,8 +145,26 @@ export function target(editor: Editor): Target {
   return selected(editor)?.outer === null ? "inner" : editor.cage;
 }
 
+/** What a page is told that came by a link which may not change anything. */
+export const LOOKING = "this link may look but not change anything";
+
+/** What such a page may say: the server takes nothing else of it. */
+const OF_LOOKERS: PageMessage["type"][] = ["camera", "display", "presented", "drawing", "ask"];
+
+/** Whether the page may look but not change anything. */
+export function looking(editor: Editor): boolean {
+  return editor.hello?.read_only === true;
+}
+
+/** Whether the server takes a message of this page. */
+export function maySay(editor: Editor, message: PageMessage): boolean {
+  return !looking(editor) || OF_LOOKERS.includes(message.type);
+}
+
 /** Whether the edit can be dragged at all, or why not. */
-export function obstacle(edit: EditState, mode: Editor["mode"]): string | null {
+export function obstacle(editor: Editor, edit: EditState): string | null {
+  const { mode } = editor;
+  if (looking(editor)) return LOOKING;
   if (edit.locked) return `“${edit.name}” is locked`;
   if (!edit.enabled) return `“${edit.name}” is hidden; show it (H) to move it`;
   if (mode === "edit" && edit.kind === "delete") return "a delete has nothing to move; choose another kind, or Set mode (Tab)";

@@ -3,11 +3,11 @@ import { Connection, socketAddress, type Handlers, type Socket } from "../src/co
 import { HELD, bindings, named } from "../src/keys";
 import { Latency } from "../src/latency";
 import { cageOverlay } from "../src/cage_overlay";
-import { START, Store, fillable, obstacle, relightable, selected, target } from "../src/store";
+import { LOOKING, START, Store, fillable, maySay, obstacle, relightable, selected, target } from "../src/store";
 import { Actions } from "../src/actions";
 import type { App } from "../src/app";
 import type { Pointer } from "../src/pointer";
-import type { Hello, Preview } from "../src/protocol";
+import type { Hello, PageMessage, Preview } from "../src/protocol";
 import { edit, state } from "./fake_server";
 
 describe("the connection", () => {
@@ -79,12 +79,21 @@ describe("the store", () => {
     expect([fillable(START), relightable(START)]).toEqual([false, false]);
   });
 
+  it("knows what a page may say that may look alone", () => {
+    const looker = { ...START, hello: { read_only: true } as Hello };
+    const question = { type: "ask", request: 1, what: "path" } as PageMessage;
+    const change = { type: "change", edit: 1, name: "mine" } as PageMessage;
+    expect([maySay(looker, question), maySay(looker, change)]).toEqual([true, false]);
+    expect([maySay(START, question), maySay(START, change)]).toEqual([true, true]);
+    expect(obstacle(looker, edit())).toBe(LOOKING);
+  });
+
   it("says why an edit cannot be dragged", () => {
-    expect(obstacle(edit(), "edit")).toBeNull();
-    expect(obstacle(edit({ locked: true }), "edit")).toMatch(/locked/);
-    expect(obstacle(edit({ enabled: false }), "set")).toMatch(/hidden/);
-    expect(obstacle(edit({ kind: "delete" }), "edit")).toMatch(/nothing to move/);
-    expect(obstacle(edit({ kind: "delete" }), "set")).toBeNull();
+    expect(obstacle(START, edit())).toBeNull();
+    expect(obstacle(START, edit({ locked: true }))).toMatch(/locked/);
+    expect(obstacle({ ...START, mode: "set" }, edit({ enabled: false }))).toMatch(/hidden/);
+    expect(obstacle(START, edit({ kind: "delete" }))).toMatch(/nothing to move/);
+    expect(obstacle({ ...START, mode: "set" }, edit({ kind: "delete" }))).toBeNull();
   });
 });
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,8 +69,15 @@ def number(value: float, digits: int = 2) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Writes a text file, whole or not at all."""
-    with replaced_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_texts({path: text})
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Writes text files, all of them or none."""
+    with ExitStack() as stack:
+        for path, text in texts.items():
+            temporary = stack.enter_context(replaced_file(path))
+            temporary.write_text(text, encoding="utf-8")
 
 
 def _row(cells: tuple[str, ...]) -> str:

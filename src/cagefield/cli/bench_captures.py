@@ -73,7 +73,7 @@ class BenchCaptures:
         from cagefield.benchmarking.captures import table
         from cagefield.benchmarking.learning import Budget
         from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_text
+        from cagefield.benchmarking.tables import write_texts
         from cagefield.cli.bench_command import command_line, work_folder
 
         if not self.data:
@@ -101,13 +101,14 @@ class BenchCaptures:
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench captures', self)}`")
         result = table(scores, notes)
         result.show()
-        write_text(self.out, result.markdown())
-        print(f"table written to {self.out}")
+        texts = {self.out: result.markdown()}
         if edited:
             beside = room_edits.table(edited, notes)
             beside.show()
-            write_text(self._beside(), beside.markdown())
-            print(f"table written to {self._beside()}")
+            texts[self._beside()] = beside.markdown()
+        write_texts(texts)
+        for path in texts:
+            print(f"table written to {path}")
 
     def _beside(self) -> Path:
         return self.out.with_name(f"{self.out.stem}_edits{self.out.suffix}")

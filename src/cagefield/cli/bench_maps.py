@@ -82,6 +82,7 @@ class BenchAblation:
     def run(self) -> None:
         """Trains what is missing, measures, writes both files."""
         from cagefield import devices
+        from cagefield.atomic_files import replaced_file
         from cagefield.benchmarking.ablations import with_notes
         from cagefield.benchmarking.cases import chosen
         from cagefield.benchmarking.machine import Machine
@@ -116,8 +117,9 @@ class BenchAblation:
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench ablation', self)}`")
         result = with_notes(result, notes)
         result.table.show()
-        write_png(picture, result.picture)
-        write_text(text, result.table.markdown())
+        with replaced_file(picture) as draft:
+            write_png(draft, result.picture)
+            write_text(text, result.table.markdown())
         print(f"written to {picture} and {text}")
 
     def _measure(self, case: Case, bench: Workbench) -> Ablation:

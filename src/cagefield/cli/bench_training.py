@@ -55,7 +55,7 @@ class BenchSpeed:
         from cagefield import devices
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.speed import measure
-        from cagefield.benchmarking.tables import write_text
+        from cagefield.benchmarking.tables import write_texts
         from cagefield.edits.files import load_edits
         from cagefield.scene import Scene
 
@@ -77,8 +77,8 @@ class BenchSpeed:
         result = report.table(machine, command)
         result.show()
         if self.out is not None:
-            write_text(self.out, json.dumps(report.document(machine, command), indent=1) + "\n")
-            write_text(self.out.with_suffix(".md"), result.markdown())
+            figures = json.dumps(report.document(machine, command), indent=1) + "\n"
+            write_texts({self.out: figures, self.out.with_suffix(".md"): result.markdown()})
             print(f"figures written to {self.out} and {self.out.with_suffix('.md')}")
 
 
@@ -102,7 +102,7 @@ class BenchTraining:
         """Trains, evaluates on the way, shows the table, writes the files."""
         from cagefield import devices
         from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_text
+        from cagefield.benchmarking.tables import write_texts
         from cagefield.benchmarking.training import Point, measure
         from cagefield.scene import Scene
         from cagefield.scene_files import check_destination
@@ -135,8 +135,7 @@ class BenchTraining:
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench training', self)}`")
         result = curve.table(dataset.name, notes)
         result.show()
-        write_text(self.out, curve.csv())
-        write_text(self.out.with_suffix(".md"), result.markdown())
+        write_texts({self.out: curve.csv(), self.out.with_suffix(".md"): result.markdown()})
         print(f"curve written to {self.out} and {self.out.with_suffix('.md')}")
         if self.scene_out is not None:
             Scene.trained(curve.result, dataset).save(self.scene_out, self.overwrite)

@@ -16,6 +16,9 @@ from cagefield.rendering.images import DAMAGED, check_pixels
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
 
+_BAND = 1 << 16
+"""Pixels of a photo with alpha that are averaged at a time."""
+
 _DEEP_MODES = ("I", "F")  # and "I;16...": more than 8 bits a channel
 
 
@@ -72,8 +75,18 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     box = (0, 0, pixels.width // factor * factor, pixels.height // factor * factor)
     if pixels.mode == "RGB":
         return np.array(pixels.reduce(factor, box))
-    straight = np.asarray(pixels.crop(box), dtype=np.float32)
-    blocks = straight.reshape(box[3] // factor, factor, box[2] // factor, factor, 4)
+    rows = factor * max(1, _BAND // (factor * max(1, pixels.width)))
+    shrunk = np.empty((box[3] // factor, box[2] // factor, 4), np.uint8)
+    for first in range(0, box[3], rows):
+        end = min(first + rows, box[3])
+        shrunk[first // factor : end // factor] = _shrunk(pixels.crop((0, first, box[2], end)), factor)
+    return shrunk
+
+
+def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
+    """Means of an RGBA picture, whose sides are multiples of `factor`: 40 bytes for each of its pixels."""
+    straight = np.asarray(pixels, dtype=np.float32)
+    blocks = straight.reshape(pixels.height // factor, factor, pixels.width // factor, factor, 4)
     alpha = blocks[..., 3:].mean(axis=(1, 3))
     premultiplied = (blocks[..., :3] * blocks[..., 3:]).mean(axis=(1, 3))
     rgb = np.divide(premultiplied, alpha, out=np.zeros_like(premultiplied), where=alpha > 0)

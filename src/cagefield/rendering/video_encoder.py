@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -76,10 +77,12 @@ def is_ours(path: Path) -> bool:
 
 
 def _failure(process: subprocess.Popen[bytes], path: Path) -> OSError:
-    """The error that ffmpeg ended with, by the system's number where its words name one."""
+    """The error that ffmpeg ended with, by the system's number where it tells one."""
     assert process.stderr is not None
     words = process.stderr.read().decode(errors="replace")
     process.wait()
+    if process.returncode == -getattr(signal, "SIGXFSZ", 0):  # more than `ulimit -f`
+        return OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
     for number in _CAUSES:
         if os.strerror(number).lower() in words.lower():
             return OSError(number, os.strerror(number), str(path))

@@ -3,15 +3,17 @@ import { ChevronDown, ChevronUp, ClipboardPaste, Copy, Eye, EyeOff, FlipHorizont
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import type { EditState } from "../protocol";
-import { selected } from "../store";
+import { looking, selected } from "../store";
 import type { Dialogs } from "./dialogs";
 import { h, icon, iconButton, section } from "./dom";
 
 const KIND: Record<EditState["kind"], string> = { continuous: "continuous", move: "move", copy: "copy", delete: "delete" };
 
+const HINT = "Double-click the picture to put a pair of cages around what is there.";
+
 export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "paste">): HTMLElement {
   const list = h("ul", { class: "edits" });
-  const empty = h("p", { class: "empty" }, "Double-click the picture to put a pair of cages around what is there.");
+  const empty = h("p", { class: "empty" });
   const needSelected: HTMLButtonElement[] = [];
   const button = (...parameters: Parameters<typeof iconButton>): HTMLButtonElement => {
     const made = iconButton(...parameters);
@@ -44,6 +46,9 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
   );
   // Rows that show the same stay where they are: a double click on one that was made anew in between is lost.
   let rows = new Map<string, HTMLElement>();
+  app.store.watch(["hello"], (now) => {
+    empty.textContent = looking(now) ? "There are no edits." : HINT;
+  });
   app.store.watch(["state"], ({ state }) => {
     const edits = state?.edits ?? [];
     if (!(document.activeElement instanceof HTMLInputElement && list.contains(document.activeElement))) {
@@ -79,7 +84,7 @@ function row(app: App, edit: EditState, index: number): HTMLElement {
   const swatch = h("span", { class: "swatch" });
   swatch.style.background = edit.colour;
   const name = h("span", { class: "name", title: "Double-click to rename" }, edit.name || `edit ${index + 1}`);
-  name.ondblclick = () => rename(name, edit.name, (text) => change({ name: text }));
+  name.ondblclick = () => !looking(app.store.now) && rename(name, edit.name, (text) => change({ name: text }));
   const problem = edit.problem === null ? null : h("span", { class: "problem", title: edit.problem }, icon(TriangleAlert, 15));
   const item = h(
     "li",

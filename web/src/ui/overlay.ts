@@ -3,6 +3,7 @@ import type { App } from "../app";
 import { described } from "../operations";
 import type { Pointer } from "../pointer";
 import { h } from "./dom";
+import { looking } from "../store";
 
 const TOAST_STAYS = 7000;
 
@@ -98,8 +99,8 @@ function opening(app: App): HTMLElement {
 
 function hint(app: App): HTMLElement {
   const line = h("div", { class: "hint" }, "Double-click the picture to put a pair of cages around what is there");
-  app.store.watch(["state"], ({ state }) => {
-    line.hidden = state === null || state.edits.length > 0;
+  app.store.watch(["state", "hello"], (now) => {
+    line.hidden = looking(now) || now.state === null || now.state.edits.length > 0;
   });
   return line;
 }

@@ -2,18 +2,26 @@
 import { Axis3d, Box, Boxes, Globe, Magnet, MousePointer2, Move3d, PencilRuler, Rotate3d, Scale3d, Spline, Square, SquareDashed } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
-import type { Editor } from "../store";
+import { looking, type Editor } from "../store";
 import { h, iconButton } from "./dom";
 
 export function toolbar(app: App, actions: Actions): HTMLElement {
   const bar = h("nav", { class: "tools" });
   const lit: [HTMLButtonElement, (now: Editor) => boolean][] = [];
   const setOnly: HTMLElement[] = [];
+  const editing: HTMLElement[] = [];
   const add = (button: HTMLButtonElement, on: (now: Editor) => boolean): HTMLButtonElement => {
     lit.push([button, on]);
     return button;
   };
   const group = (...buttons: HTMLElement[]): HTMLElement => h("div", { class: "group" }, ...buttons);
+  const tools = (...buttons: HTMLElement[]): HTMLElement => {
+    const made = group(...buttons);
+    editing.push(made);
+    return made;
+  };
+  const snap = add(iconButton(Magnet, "Snap; Ctrl does the opposite while held", () => actions.toggle("snap"), "snap"), (e) => e.snap);
+  editing.push(snap);
   const cages = group(
     add(iconButton(Square, "Move the inner cage (C)", () => actions.cage("inner"), "cage-inner"), (e) => e.cage === "inner"),
     add(iconButton(SquareDashed, "Move the outer cage (C)", () => actions.cage("outer"), "cage-outer"), (e) => e.cage === "outer"),
@@ -21,29 +29,30 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
   );
   setOnly.push(cages);
   bar.append(
-    group(
+    tools(
       add(iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.tool("select"), "tool-select"), (e) => e.tool === "select"),
       add(iconButton(Move3d, "Move (1, G)", () => actions.tool("translate"), "tool-translate"), (e) => e.tool === "translate"),
       add(iconButton(Rotate3d, "Rotate (2, R)", () => actions.tool("rotate"), "tool-rotate"), (e) => e.tool === "rotate"),
       add(iconButton(Scale3d, "Scale (3, S)", () => actions.tool("scale"), "tool-scale"), (e) => e.tool === "scale"),
     ),
-    group(
+    tools(
       add(iconButton(PencilRuler, "Set mode: move cages, never the field (Tab)", () => actions.mode("set"), "mode-set"), (e) => e.mode === "set"),
       add(iconButton(Spline, "Edit mode: the field follows the inner cage (Tab)", () => actions.mode("edit"), "mode-edit"), (e) => e.mode === "edit"),
     ),
     cages,
-    group(
+    tools(
       add(iconButton(Globe, "Along the world's axes (W)", () => app.store.set({ axes: "world" }), "axes-world"), (e) => e.axes === "world"),
       add(iconButton(Box, "Along the cage's own axes (W)", () => app.store.set({ axes: "cage" }), "axes-cage"), (e) => e.axes === "cage"),
     ),
     group(
-      add(iconButton(Magnet, "Snap; Ctrl does the opposite while held", () => actions.toggle("snap"), "snap"), (e) => e.snap),
+      snap,
       add(iconButton(Axis3d, "Show or hide the cages (O)", () => actions.toggle("cages"), "cages"), (e) => e.cages),
     ),
   );
-  app.store.watch(["tool", "mode", "cage", "axes", "snap", "cages"], (now) => {
+  app.store.watch(["hello", "tool", "mode", "cage", "axes", "snap", "cages"], (now) => {
+    for (const element of editing) element.hidden = looking(now);
     for (const [button, on] of lit) button.classList.toggle("on", on(now));
-    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set");
+    for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || looking(now));
   });
   return bar;
 } // prettier-ignore

@@ -2,7 +2,7 @@
 import { Camera, CircleQuestionMark, Columns2, Download, FileDown, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
 import type { Actions } from "../actions";
 import type { App } from "../app";
-import type { View } from "../store";
+import { LOOKING, looking, type View } from "../store";
 import { SPLATS } from "../upload";
 import type { Dialogs } from "./dialogs";
 import { h, iconButton, iconLink } from "./dom";
@@ -40,18 +40,18 @@ export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveA
     name.textContent = now.hello?.name ?? "";
     unsaved.classList.toggle("shown", now.state?.saved === false);
     save.classList.toggle("due", now.state?.saved === false);
-    const looking = now.hello?.read_only === true;
-    for (const button of [save, saveAs, load]) button.hidden = looking;
-    undo.disabled = looking || (now.state?.entry ?? 0) <= 0;
-    redo.disabled = looking || now.state === null || now.state.entry >= now.state.history.length - 1;
+    const isLooking = looking(now);
+    for (const button of [save, saveAs, load]) button.hidden = isLooking;
+    undo.disabled = isLooking || (now.state?.entry ?? 0) <= 0;
+    redo.disabled = isLooking || now.state === null || now.state.entry >= now.state.history.length - 1;
     for (const button of views) button.classList.toggle("on", button.dataset.view === now.view);
-    splats.hidden = looking || now.hello?.splats !== true;
+    splats.hidden = isLooking || now.hello?.splats !== true;
     split.classList.toggle("on", now.split !== null);
     grid.classList.toggle("on", now.grid);
     panel.classList.toggle("on", now.panel);
-    mode.textContent = looking ? "Read only" : now.mode === "set" ? "Set cages" : "Edit field";
-    mode.title = looking ? "This link may look but not change anything" : "";
-    mode.dataset.mode = looking ? "look" : now.mode;
+    mode.textContent = isLooking ? "Read only" : now.mode === "set" ? "Set cages" : "Edit field";
+    mode.title = isLooking ? LOOKING : "";
+    mode.dataset.mode = isLooking ? "look" : now.mode;
   });
   const screenshot = iconLink(Camera, "Screenshot of the field", "screenshot.png", "screenshot.png");
   app.store.watch(["hello"], ({ hello }) => {

@@ -16,15 +16,17 @@ from pathlib import Path
 
 from cagefield import json_text
 from cagefield.atomic_files import replaced_file
-from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
-from cagefield.edits.files import save_edits
+from cagefield.edits import Edit, EditStack, parse_edits
+from cagefield.edits.files import MOST_EDITS, VERSION, save_edits
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
-from cagefield.leftovers import remove_leftovers
+from cagefield.leftovers import remove_leftovers, remove_unfinished
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
+from cagefield.server.editor.edit_texts import ReadEdits, file_values
+from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
@@ -58,6 +60,8 @@ class SceneStore:
         self._written = self._fingerprint()
         self._warned = ""
         self._kept: Document | None = None
+        self._values: IdentityCache[Edit, object] = IdentityCache(4 * MOST_EDITS)
+        """What files have of the edits that were written last."""
 
     # ---- opening ----
 
@@ -105,10 +109,11 @@ class SceneStore:
     def lock(self) -> None:
         """Keeps other programs from editing the scene, and removes what ended ones left half-written.
 
-        Raises SceneError where another one does edit it.
+        Their videos beside it, too. Raises SceneError where another one does edit it.
         """
         self._lock = SceneLock(self.path)
         remove_leftovers(self.path, inside=True)
+        remove_unfinished(self.path.parent)
 
     def close(self) -> None:
         """Lets other programs edit the scene."""
@@ -168,11 +173,26 @@ class SceneStore:
             if session.saved:
                 self.autosave_path.unlink(missing_ok=True)
             else:
+                content = _content(document, self._values_of(document))
                 with replaced_file(self.autosave_path) as draft:
-                    draft.write_text(json.dumps(_content(document)), encoding="utf-8")
+                    draft.write_text(json.dumps(content), encoding="utf-8")
             self.trouble = None
         except OSError as error:
             self.trouble = f"changes cannot be kept in {self.autosave_path} ({error.strerror}); save often"
+
+    def remember(self, read: ReadEdits) -> None:
+        """What files have of edits is known already."""
+        for edit, values in zip(read.edits, read.values, strict=True):
+            self._values.put(edit, values)
+
+    def _values_of(self, document: Document) -> list[object]:
+        edits = [entry.edit for entry in document.entries]
+        new = [edit for edit in edits if edit not in self._values]
+        known = dict(zip(map(id, new), file_values(new), strict=True))
+        return [
+            self._values.put(edit, known[id(edit)]) if id(edit) in known else self._values[edit]
+            for edit in edits
+        ]
 
     def save(self, session: Session) -> None:
         """Writes the session into its scene's folder.
@@ -192,12 +212,13 @@ class SceneStore:
             )
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
-        save_edits(self.written(document.stack), self.path / _EDITS)
-        self._written = self._fingerprint()  # ours, should the rest not be possible
-        if document.keys or (self.path / CAMERA_PATH).exists():
-            with replaced_file(self.path / CAMERA_PATH) as draft:
+        with contextlib.ExitStack() as drafts:  # there is room for all files, or none changes
+            if document.keys or (self.path / CAMERA_PATH).exists():
+                draft = drafts.enter_context(replaced_file(self.path / CAMERA_PATH))
                 draft.write_text(camera_path, encoding="utf-8")
-        self._scene(document, self.path).save_manifest(self.path)
+            drafts.enter_context(self._scene(document, self.path).draft_manifest(self.path))
+            save_edits(self.written(document.stack), self.path / _EDITS)
+            self._written = self._fingerprint()  # ours, should the rest not be possible
         self._done(session)
 
     def save_as(self, session: Session, path: str, overwrite: bool) -> None:
@@ -224,14 +245,12 @@ class SceneStore:
         document = session.document
         camera_path = dump_path(document.placed_keys, loop=document.loop)
         try:
-            self._scene(document, target).save(target, overwrite)
+            beside = {CAMERA_PATH: camera_path if document.keys else None}
+            self._scene(document, target).save(target, overwrite, beside=beside)
         except SceneError as error:
             raise SceneError(
                 str(error).replace("--overwrite (overwrite=True)", "choose to overwrite")
             ) from None
-        if document.keys:
-            with replaced_file(target / CAMERA_PATH) as draft:
-                draft.write_text(camera_path, encoding="utf-8")
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path, self.source = target.resolve(), None
@@ -261,10 +280,10 @@ def stem_of(file: Path) -> str:
     return file.name.removesuffix(file.suffix).removesuffix(".compressed") or file.name
 
 
-def _content(document: Document) -> dict[str, object]:
+def _content(document: Document, edits: list[object]) -> dict[str, object]:
     return {
         "version": 1,
-        "edits": json.loads(dump_edits(document.stack, format="json")),
+        "edits": {"version": VERSION, "edits": edits},
         "locked": [entry.locked for entry in document.entries],
         "preserve_opacity": document.preserve_opacity,
         "loop": document.loop,

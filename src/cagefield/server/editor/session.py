@@ -11,17 +11,18 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from cagefield.cages import Cage
-from cagefield.edits import Edit, parse_edits
+from cagefield.edits import Edit
+from cagefield.edits.files import MOST_EDITS
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
-from cagefield.errors import CameraError, EditError
-from cagefield.keyframe_files import is_path
+from cagefield.errors import EditError
 from cagefield.keyframes import Keyframe, Timeline
 from cagefield.server.editor.cage_placement import outer_around, pair_around
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
 from cagefield.server.editor.drags import Drags
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
+from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.labels import fresh_name, named, of, option_word
@@ -61,7 +62,7 @@ class Session:
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
-        self._problems: IdentityCache[Edit, str | None] = IdentityCache(64)
+        self._problems: IdentityCache[Edit, str | None] = IdentityCache(4 * MOST_EDITS)
 
     # ---- what is there ----
 
@@ -311,24 +312,19 @@ class Session:
     def load_edits(
         self, text: str, append: bool, admitted: Callable[[Edit], Edit] = lambda edit: edit
     ) -> int:
-        """How many edits a text held; they replace the stack, or are appended to it.
+        """How many edits a text held; they replace the stack, or are appended to it. Raises as `edits_in`."""
+        return self.take_edits(ReadEdits(edits_in(text, admitted), (), ()), append)
 
-        `admitted` gives each the form that it has here, and raises where a page may not bring it. Raises
-        EditFileError for a text that holds no edits, CameraError for a camera path's.
-        """
-        if is_path(text):
-            raise CameraError(
-                "this is a camera path, and no edits; save it as camera_path.json in the scene's folder, "
-                "then start the editor again"
-            )
-        form = "json" if text.lstrip().startswith("{") else "yaml"
-        edits = [admitted(e) for e in parse_edits(text, format=form, source="the text", check=False)]
+    def take_edits(self, read: ReadEdits, append: bool) -> int:
+        """How many edits there are; they replace the stack, or are appended to it."""
+        for edit, found in zip(read.edits, read.problems, strict=False):
+            self._problems.put(edit, found or self._source_problem(edit))
         document = self.document if append else replace(self.document, entries=())
-        for edit in edits:
+        for edit in read.edits:
             document = document.insert(self._entry(edit, document))
         self._push("Paste" if append else "Load edits", document)
         self.selected = document.entries[-1].id if document.entries else None
-        return len(edits)
+        return len(read.edits)
 
     def set_path(self, keys: tuple[Keyframe, ...], loop: bool) -> None:
         """The camera path's keyframes."""

@@ -49,7 +49,7 @@ class BackgroundWork:
         self.warming = list(WarmStage)
         self._errors: IdentityCache[Edit, Errors | None] = IdentityCache(64)
         self._jobs: list[Job] = []
-        self._ending: list[EndJobTask] = []
+        self._ending: list[tuple[Job, str]] = []
         self._numbers = 0
         self.exports = Exports(session, store, tell)
 
@@ -61,8 +61,7 @@ class BackgroundWork:
         if edit is not None:
             return self._measure(edit, generation)
         if self._ending:
-            task = self._ending.pop(0)
-            return BackgroundTask(lambda number: EndJobTask(number, task.job, task.keep), lambda _: None)
+            return self._finish(*self._ending[0])
         return self._picture(generation) if self._jobs else None
 
     # ---- kernels ----
@@ -114,7 +113,8 @@ class BackgroundWork:
 
     def jobs(self) -> list[server_messages.Job]:
         """How far the jobs that go on are."""
-        return [*(_message(job, "running") for job in self._jobs), *self.exports.running()]
+        finishing = (job for job, state in self._ending if state == "done")
+        return [*(_message(job, "running") for job in (*finishing, *self._jobs)), *self.exports.running()]
 
     def render(self, message: client_messages.RenderJob) -> None:
         """Begins a job. Raises CagefieldError where it could not write its result."""
@@ -158,7 +158,7 @@ class BackgroundWork:
             if isinstance(result, Failed):
                 self._end(job, "failed", result.text)
             elif isinstance(result, Answered):
-                job.done += 1
+                job.done = job.done + 1 if result.value else 0  # from the beginning, in another process
                 if job.done == job.total:
                     self._end(job, "done", "")
                 else:
@@ -167,11 +167,27 @@ class BackgroundWork:
         return BackgroundTask(lambda number: job.task(number, generation), done)
 
     def _end(self, job: Job, state: str, text: str) -> None:
+        """A job is over; one that is done is so once its files are there."""
         self._jobs.remove(job)
-        self._ending.append(EndJobTask(0, job.number, keep=state == "done"))
+        self._ending.append((job, state))
         if state == "cancelled" and job.what == "test_views" and job.done:
             text = f"{job.done} pictures were written and are kept"
-        self._tell(_message(job, state, text))
+        self._tell(_message(job, "running" if state == "done" else state, text))
+
+    def _finish(self, job: Job, state: str) -> BackgroundTask:
+        keep = state == "done" or (state == "cancelled" and job.what == "test_views")
+
+        def done(result: Result) -> None:
+            self._ending.remove((job, state))
+            if state != "done":
+                return
+            if isinstance(result, Answered) and result.value:
+                self._tell(_message(job, "done"))
+            else:
+                text = result.text if isinstance(result, Failed) else "the renderer was lost; render it again"
+                self._tell(_message(job, "failed", text))
+
+        return BackgroundTask(lambda number: EndJobTask(number, job.number, keep), done)
 
 
 def _message(job: Job, state: str, text: str = "") -> server_messages.Job:

@@ -1,11 +1,18 @@
-"""The files of background jobs, in the rendering process: pictures in a folder, or one growing video."""
+"""The files of background jobs, in the rendering process: pictures in a folder, or one growing video.
+
+Pictures that take the places of others do so together, when the job ends.
+"""
 
 from __future__ import annotations
 
+import os
+import shutil
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
+from cagefield.atomic_files import merged_folder
+from cagefield.leftovers import remove_leftovers
 from cagefield.rendering.images import video_writer, write_png
 from cagefield.rendering.render_result import RenderResult
 from cagefield.server.render_worker.cancellation import GivenUpError
@@ -20,38 +27,64 @@ class JobFiles:
     """What jobs have written so far."""
 
     def __init__(self) -> None:
-        self._videos: dict[int, tuple[AbstractContextManager[Any], Any]] = {}
+        self._jobs: dict[int, tuple[AbstractContextManager[Any], Any]] = {}
+        """Job -> (what makes its files appear, the folder or the function that takes pictures)."""
+
+    def misses(self, task: FrameTask) -> bool:
+        """Whether a job's pictures before this one are gone: another process has rendered them."""
+        return task.index > 0 and task.job not in self._jobs
 
     def add(self, task: FrameTask, frame: RenderResult) -> None:
         """One picture of a job more."""
-        if task.what == "test_views":
-            digits = max(4, len(str(task.total - 1)))
-            pixels = frame.rgba8() if frame.background is None else frame.rgb8()
-            if task.index == 0:
-                Path(task.out).mkdir(parents=True, exist_ok=True)
-                (Path(task.out) / MARK).touch()
-            write_png(Path(task.out) / f"{task.index:0{digits}d}.png", pixels)
-            return
-        if task.job not in self._videos:
-            context = video_writer(task.out, (frame.height, frame.width), task.fps)
-            self._videos[task.job] = (context, context.__enter__())
-        shown = frame if frame.background is not None else frame.over(BEHIND)
-        self._videos[task.job][1](shown.rgb8())
+        if task.job not in self._jobs:
+            context: AbstractContextManager[Any]
+            if task.what == "test_views":
+                remove_leftovers(Path(task.out), inside=True)
+                context = merged_folder(Path(task.out))
+            else:
+                context = video_writer(task.out, (frame.height, frame.width), task.fps)
+            self._jobs[task.job] = (context, context.__enter__())
+        try:
+            self._write(task, frame, self._jobs[task.job][1])
+        except OSError as error:
+            self._give_up(task.job, error)  # which may name its place
+            raise
 
-    def end(self, job: int, keep: bool) -> None:
-        """A job ends: its video appears, or the unfinished file is removed."""
-        if job not in self._videos:
+    def _write(self, task: FrameTask, frame: RenderResult, to: Any) -> None:
+        if task.what == "camera_path":
+            shown = frame if frame.background is not None else frame.over(BEHIND)
+            to(shown.rgb8())
             return
-        context, _ = self._videos.pop(job)
+        digits = max(4, len(str(task.total - 1)))
+        pixels = frame.rgba8() if frame.background is None else frame.rgb8()
+        if task.index == 0:
+            to.mkdir(parents=True, exist_ok=True)
+            (to / MARK).touch()
+        write_png(to / f"{task.index:0{digits}d}.png", pixels)
+
+    def end(self, job: int, keep: bool) -> bool:
+        """A job ends: its files appear, or what is unfinished is removed; False where there is nothing of it.
+
+        Raises OSError where they cannot appear.
+        """
+        if job not in self._jobs:
+            return False
         if keep:
+            context, _ = self._jobs.pop(job)
             context.__exit__(None, None, None)
-            return
-        error = GivenUpError()
-        with suppress(GivenUpError):
+        else:
+            self._give_up(job, GivenUpError())
+        return True
+
+    def _give_up(self, job: int, error: Exception) -> None:
+        context, to = self._jobs.pop(job)
+        with suppress(type(error)):
             context.__exit__(type(error), error, None)
+        if isinstance(to, Path) and to.is_dir() and os.listdir(to) == [MARK]:
+            shutil.rmtree(to, ignore_errors=True)
 
     def close(self) -> None:
         """Gives up all jobs; what of their files cannot be removed stays."""
-        for job in list(self._videos):
+        for job in list(self._jobs):
             with suppress(OSError):
                 self.end(job, keep=False)

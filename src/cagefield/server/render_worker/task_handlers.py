@@ -104,11 +104,14 @@ class TaskHandlers:
         return Answered(task.number, (most / voxel, mean / voxel))
 
     def _frame(self, task: FrameTask, stop: Callable[[], bool]) -> Result:
+        """Whether the picture was added; False where those before it are gone."""
+        if self._files.misses(task):
+            return Answered(task.number, False)
         frame = self._renderers.still(task.shown, task.still.camera, Display(), stop)
         if frame is None:
             return Stopped(task.number)
         self._files.add(task, frame)
-        return Answered(task.number)
+        return Answered(task.number, True)
 
     def _still(self, task: StillTask, stop: Callable[[], bool]) -> Result:
         """The picture as a PNG."""

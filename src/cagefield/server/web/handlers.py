@@ -12,6 +12,7 @@ from cagefield.cages import Cage
 from cagefield.edits import EditStack, dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.cage_placement import fitted
+from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import pasted
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, server_messages
@@ -27,6 +28,7 @@ from cagefield.server.protocol.conversion import (
 from cagefield.server.render_queue.coordinator import Coordinator, Page
 from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import FitTask, GridTask, LookTask, Shown, SurfaceTask, values_of
+from cagefield.server.web.threads import in_thread
 from cagefield.typing import Array
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]
@@ -321,8 +323,11 @@ class MessageHandlers:
         self._coordinator.changed()
 
     @_handles(client_messages.LoadEdits)
-    def _load_edits(self, message: client_messages.LoadEdits) -> None:
-        self._session.load_edits(message.text, message.append, self._coordinator.store.admitted)
+    async def _load_edits(self, message: client_messages.LoadEdits) -> None:
+        store = self._coordinator.store
+        read = await in_thread(lambda: read_edits(message.text, store.admitted))
+        store.remember(read)
+        self._session.take_edits(read, message.append)
         self._coordinator.changed()
 
     @_handles(client_messages.SetPath)

@@ -34,6 +34,12 @@ from cagefield.server.web.opening import scene_of_file
 from cagefield.server.web.patience import PatientHttp
 from cagefield.server.web.security import Guard
 
+WAITING = 128
+"""New connections that the system lets wait."""
+
+AT_A_TIME = 8
+"""New connections that are taken before open ones have their turn."""
+
 
 def open_scene(
     path: Path, device: str = "auto", root: Path | None = None
@@ -136,7 +142,7 @@ def bound_socket(host: str, port: int) -> socket.socket:
             if os.name == "posix":
                 listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind(address)
-            listening.listen(128)
+            listening.listen(WAITING)
             return listening
         except OSError as error:
             listening.close()
@@ -193,12 +199,23 @@ def serve(
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,
+        backlog=AT_A_TIME,
         server_header=False,
         ssl_certfile=None if certificate is None else certificate.file,
         ssl_keyfile=None if certificate is None or certificate.key is None else certificate.key,
     )
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[listening])
+        _Server(config).run(sockets=[listening])
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's, whose loop takes a few new connections at a time while more of them wait in the system."""
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begins to listen; what asyncio takes at a time is the length of the line that it was told."""
+        await super().startup(sockets)
+        for listening in sockets or ():
+            listening.listen(WAITING)
 
 
 def _allow_many_connections() -> None:

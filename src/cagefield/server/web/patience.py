@@ -14,6 +14,14 @@ HEAD_SECONDS = 10.0
 MOST_WAITING = 256
 """Connections whose request's head has not come yet; the oldest is closed for another one."""
 
+AT_A_TIME = 8 << 10
+"""Bytes of a page's messages that are read before other connections have their turn."""
+
+
+def read_little(transport: asyncio.BaseTransport) -> None:
+    """A connection's bytes come in parts of `AT_A_TIME` from now on; asyncio's own are of 256 kB."""
+    transport.max_size = AT_A_TIME  # type: ignore[attr-defined]
+
 
 class PatientHttp(H11Protocol):
     """uvicorn's, with limits on connections that hold a place and ask nothing."""
@@ -41,6 +49,7 @@ class PatientHttp(H11Protocol):
     def handle_websocket_upgrade(self, event: Any) -> None:
         """The connection is a socket from now on."""
         self._stop()
+        read_little(self.transport)
         super().handle_websocket_upgrade(event)
 
     def _await_head(self) -> None:

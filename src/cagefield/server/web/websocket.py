@@ -45,7 +45,21 @@ MOST_REFUSED = 2000
 OF_ALL = 1200.0
 """Messages a second of all pages together; more wait in their lines."""
 
-_of_all: WeakKeyDictionary[asyncio.AbstractEventLoop, Allowance] = WeakKeyDictionary()
+
+class _Turns:
+    """Messages of all pages together: where there are too many, each page has its turn for one."""
+
+    def __init__(self) -> None:
+        self._allowance, self._line = Allowance(OF_ALL, OF_ALL, OF_ALL), asyncio.Lock()
+
+    async def take(self) -> None:
+        """Returns when one more message may be heard: after at most one of each other page."""
+        async with self._line:  # first come, first served
+            while not self._allowance.take(time.monotonic()):
+                await asyncio.sleep(1.0 / OF_ALL)
+
+
+_turns: WeakKeyDictionary[asyncio.AbstractEventLoop, _Turns] = WeakKeyDictionary()
 
 
 async def attend(
@@ -90,7 +104,7 @@ def _is_parting(socket: WebSocket, error: Exception) -> bool:
 
 async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> None:
     burst = 4.0 * BYTES_PER_SECOND
-    every = _of_all.setdefault(asyncio.get_running_loop(), Allowance(OF_ALL, OF_ALL, OF_ALL))
+    turns = _turns.setdefault(asyncio.get_running_loop(), _Turns())
     allowance, bytes_allowed, refused = Allowance(), Allowance(BYTES_PER_SECOND, burst, burst), 0
     while True:
         received = await socket.receive()
@@ -101,8 +115,7 @@ async def _read(socket: WebSocket, page: Page, receive_queue: ReceiveQueue) -> N
         if size > common.MOST_BYTES:
             await socket.close(TOO_BIG, "message too big")
             return
-        while not every.take(time.monotonic()):
-            await asyncio.sleep(0.01)  # the line holds back what more comes
+        await turns.take()  # the line holds back what more comes
         now = time.monotonic()
         if not (allowance.take(now) and bytes_allowed.take(now, size)):
             refused += 1
@@ -127,13 +140,16 @@ async def _do(handlers: MessageHandlers, page: Page, receive_queue: ReceiveQueue
     try:
         while True:
             message = await receive_queue.get()
-            # Edit files may take a second each: one at a time of all pages, and as long again for others.
+            # Edit files may take a second each, in a thread: one at a time of all pages, which comes before
+            # what its page says next, and as long again for others.
             heavy = isinstance(message, client_messages.LoadEdits)
             async with turn if heavy else contextlib.nullcontext():
                 begun = time.monotonic()
                 with errors_reported_to(page):
                     rest = handlers.handle(message)
-                    if rest is not None:
+                    if rest is not None and heavy:
+                        await rest
+                    elif rest is not None:
                         task = asyncio.ensure_future(_finish(rest, page))
                         waiting.add(task)
                         task.add_done_callback(waiting.discard)

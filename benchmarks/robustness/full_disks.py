@@ -1,0 +1,94 @@
+"""Runs every command that writes on disks that are too small for what it writes; as root, on Linux.
+
+python benchmarks/robustness/full_disks.py [--levels 6] [--only NAME ...] [--out FILE.md]
+
+Each command (`tests/robustness/disk_commands.py`) is run with no room at all, with a page of 4 kB, and with
+shares of the room that its result takes, so that it fails early and late: with nothing at its place, and
+with an old result there that it is to replace. An editor is told to save, to keep its changes and to render
+there. Minutes of one processor.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from cagefield import devices
+from cagefield.benchmarking.machine import cpu_model
+
+TESTS = Path(__file__).resolve().parents[2] / "tests"
+sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
+
+import disk_commands  # noqa: E402
+import disk_editors  # noqa: E402
+import disks  # noqa: E402
+
+
+def main() -> None:
+    """See the module."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--levels", type=int, default=6)
+    parser.add_argument("--only", nargs="*", default=None)
+    parser.add_argument("--out", type=Path, default=None)
+    options = parser.parse_args()
+    rows, everything = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder)
+        disk_commands.sources(source)
+        for name in (*disk_commands.DISK_COMMANDS, *disk_editors.EDITORS):
+            if options.only is not None and name not in options.only:
+                continue
+            found = disks.Filled()
+            if name in disk_commands.DISK_COMMANDS:
+                need = _fill(name, source, found, options.levels)
+            else:
+                need = disk_editors.fill(name, source, found, options.levels)
+            everything.append(found)
+            rows.append(_row(name, f"{need / 1000:.0f}", found))
+            print(rows[-1], *found.faults, sep="\n    ", flush=True)
+    total = disks.Filled()
+    for counted in ("runs", "fitted", "code", "line", "changed", "left"):
+        setattr(total, counted, sum(getattr(found, counted) for found in everything))
+    rows.append(_row("**all**", "", total))
+    if options.out is not None:
+        options.out.write_text(_table(rows, options))
+
+
+def _fill(name: str, source: Path, found: disks.Filled, levels: int) -> int:
+    """Runs a command on all disks; the bytes that its result takes."""
+    command = disk_commands.DISK_COMMANDS[name]
+    need = disks.room_for(command, source)
+    for again in (True,) if command.on_disk else (False, True):
+        for left in disks.levels(need, levels):
+            disks.fill(name, command, source, left, again, found)
+    return need
+
+
+def _row(name: str, need: str, found: disks.Filled) -> str:
+    counts = (found.runs, found.fitted, found.code, found.line, found.changed, found.left)
+    return f"| {name} | {need} | {' | '.join(map(str, counts))} |"
+
+
+def _table(rows: list[str], options: argparse.Namespace) -> str:
+    return f"""# Full disks
+
+Every command that writes, on a file system (tmpfs) with less room than its result takes, with and without an
+old result at its place. Fitted: runs that ended well. Code: those that failed otherwise than with exit code 2
+(an editor: without an error on the page). Line: those that said anything but one line that names the place.
+Changed: those after which what had been there was not bit by bit what it was. Left: those that left something
+of their own of which they did not tell.
+
+{cpu_model()}, {devices.threads()} cores.
+
+    python benchmarks/robustness/full_disks.py --levels {options.levels}
+
+| command | result, kB | runs | fitted | code | line | changed | left |
+| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
+{chr(10).join(rows)}
+"""
+
+
+if __name__ == "__main__":
+    main()

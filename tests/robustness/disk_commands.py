@@ -1,0 +1,92 @@
+"""The commands that write, to be run on a disk that has no room for what they write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from cagefield import Scene
+from cagefield.datasets.procedural import make_scene
+from cagefield.formats.splat_files import write_splats
+from scenes import ball_scene
+from splat_scenes import ball_of_splats
+
+EDITS = """edits:
+  - name: moved
+    adjustment: discrete
+    inner: {center: [0, 0, 0], size: 1}
+    operations: [{translate: [1, 0, 0]}]
+"""
+
+
+def sources(folder: Path) -> None:
+    """What commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits."""
+    ball_scene().save(folder / "voxels")
+    Scene(ball_of_splats(4000), cameras=ball_scene().cameras).save(folder / "splats")
+    write_splats(ball_of_splats(4000), folder / "x.ply")
+    make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
+    (folder / "e.yaml").write_text(EDITS)
+
+
+@dataclass(frozen=True)
+class DiskCommand:
+    """A command: `{s}` in its words is the folder of `sources`, `{out}` the place on the disk it writes to.
+
+    Its old result is there in half of the runs, which say --overwrite; `on_disk` is copied there before.
+    """
+
+    words: str
+    out: str
+    on_disk: str = ""
+    """The folder of `sources` that is copied to `out` and changed there; else nothing, or an old result."""
+    keeps: bool = False
+    """Pictures that fit stay, without an old result: they can be looked at."""
+
+    def arguments(self, source: Path, disk: Path, again: bool) -> list[str]:
+        """The command line; `again` where its result is there."""
+        words = [
+            word.replace("{s}", str(source)).replace("{out}", str(disk / self.out))
+            for word in self.words.split()
+        ]
+        return [*words, "--overwrite"] if again else words
+
+
+_SPLAT_ENDINGS = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
+_TRAIN = "train {s}/photos -o {out} --steps 3 --resolution 16"
+
+DISK_COMMANDS: dict[str, DiskCommand] = {
+    "render, one picture": DiskCommand("render {s}/voxels -o {out} --views 0 --size 200", "r.png"),
+    "render, a folder": DiskCommand(
+        "render {s}/voxels -o {out} --turntable 3 --size 96 --depth", "r", keeps=True
+    ),
+    "render, a video": DiskCommand("render {s}/voxels -o {out} --turntable 6 --size 240", "r.mp4"),
+    "edit -o": DiskCommand("edit {s}/voxels {s}/e.yaml -o {out}", "new"),
+    "edit -o, splats": DiskCommand("edit {s}/splats {s}/e.yaml -o {out}", "new"),
+    "edit --overwrite": DiskCommand("edit {out} {s}/e.yaml", "scene", on_disk="voxels"),
+    "train, voxels": DiskCommand(_TRAIN + " --field voxel", "new"),
+    "train, splats": DiskCommand("train {s}/photos -o {out} --steps 3 --field splat", "new"),
+    "train, nerf": DiskCommand(_TRAIN + " --field nerf", "new"),
+    "import": DiskCommand("import {s}/x.ply -o {out}", "new"),
+    "bake": DiskCommand("bake {s}/splats -o {out} --resolution 24 --compare 0", "new"),
+    **{f"export {end}": DiskCommand("export {s}/splats -o {out}", f"x{end}") for end in _SPLAT_ENDINGS},
+    "export, a page": DiskCommand("export {s}/splats -o {out}", "x.html"),
+    "export, a page of voxels": DiskCommand("export {s}/voxels -o {out}", "x.html"),
+    "export --embed": DiskCommand("export {s}/voxels -o {out} --as page --embed", "x"),
+    "export, a mesh .ply": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.ply"),
+    "export, a mesh .glb": DiskCommand("export {s}/voxels -o {out} --as mesh", "m.glb"),
+    "export, points": DiskCommand("export {s}/voxels -o {out} --as points --splats 500", "p.ply"),
+    "export, fitted splats": DiskCommand("export {s}/voxels -o {out} --steps 2 --splats 200", "f.ply"),
+    **{f"convert to {end}": DiskCommand("convert {s}/x.ply {out}", f"c{end}") for end in _SPLAT_ENDINGS},
+    "make-scene, a thing": DiskCommand(
+        "make-scene chair -o {out} --views 2 --test-views 1 --size 32", "made"
+    ),
+    "make-scene, a room": DiskCommand("make-scene room-chair -o {out} --views 8 --size 64", "made"),
+    "demo": DiskCommand(
+        "demo -o {out} --views 3 --size 32 --steps 3 --resolution 16 --frames 2", "made", keeps=True
+    ),
+    "bench speed": DiskCommand(
+        "bench speed {s}/voxels -o {out} --size 24 --cameras 1 --rounds 1", "speed.json"
+    ),
+    "bench grids": DiskCommand("bench grids -o {out} --methods trilinear", "grids.png"),
+}
+"""What writes files, by what it writes."""

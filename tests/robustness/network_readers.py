@@ -1,0 +1,76 @@
+"""Checkpoints of networks and of trainings: honest seeds, and how they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from reader_seeds import Reader, written
+
+from cagefield.formats.nerf_pytorch_config import read_config
+from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from nerf_networks import krrish94_state, yenchenlin_state
+
+
+def _torch_file(content: dict[str, Any], old: bool) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        import torch
+
+        def tensors(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {name: tensors(part) for name, part in value.items()}
+            return torch.from_numpy(np.array(value)) if isinstance(value, np.ndarray) else value
+
+        torch.save(tensors(content), folder / "a.tar", _use_new_zipfile_serialization=not old)
+
+    return make
+
+
+def _read_networks(folder: Path) -> None:
+    from cagefield.formats.nerf_pytorch import read_checkpoint as read
+
+    read(folder / "a.tar")
+
+
+_YENCHENLIN = {"global_step": 5, "network_fn_state_dict": yenchenlin_state(0, width=8, depth=4)}
+_KRRISH94 = {"iter": 9, "model_coarse_state_dict": krrish94_state(0), "loss": 0.1, "psnr": 21.0}
+_CONFIG = """expname = x
+dataset_type = blender
+datadir = ./data
+N_samples = 64
+N_importance = 128
+use_viewdirs = True
+white_bkgd = True
+"""
+_CONFIG_YML = """dataset: {type: blender, basedir: x, near: 2.0, far: 6.0, no_ndc: true}
+models:
+  coarse: {log_sampling_xyz: true, log_sampling_dir: true, num_encoding_fn_xyz: 6}
+nerf:
+  validation: {num_coarse: 64, num_fine: 128, lindisp: false, white_background: true}
+"""
+
+
+def _make_training(folder: Path) -> None:
+    write_checkpoint(folder / "a.training", "x", {"step": 3}, {"noise": np.arange(600.0).reshape(20, 30)})
+
+
+NETWORK_READERS: dict[str, Reader] = {
+    "nerf .tar, new": Reader(_torch_file(_YENCHENLIN, False), _read_networks, {"a.tar": "zip"}),
+    "nerf .ckpt, new": Reader(_torch_file(_KRRISH94, False), _read_networks, {"a.tar": "zip"}),
+    "nerf .ckpt, old": Reader(_torch_file(_KRRISH94, True), _read_networks, {"a.tar": "bytes"}),
+    "nerf config": Reader(
+        written("args.txt", lambda file: file.write_text(_CONFIG)),
+        lambda folder: read_config(folder / "args.txt"),
+        {"args.txt": "text"},
+    ),
+    "nerf config.yml": Reader(
+        written("config.yml", lambda file: file.write_text(_CONFIG_YML)),
+        lambda folder: read_config(folder / "config.yml"),
+        {"config.yml": "yaml"},
+    ),
+    "training": Reader(
+        _make_training, lambda folder: read_checkpoint(folder / "a.training", "x"), {"a.training": "zip"}
+    ),
+}

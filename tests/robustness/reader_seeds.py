@@ -1,0 +1,60 @@
+"""What the readers that are attacked share: their form, and edits and keyframes to begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cagefield.cages import Cage
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.operations import MoveCorner, Rotate, Scale, Translate
+from cagefield.keyframes import Keyframe
+from scenes import ball_scene
+
+Read = Callable[[Path], Any]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """`make` writes an honest seed into a folder, `read` reads it; `damaged`: its files and their kinds."""
+
+    make: Callable[[Path], None]
+    read: Read
+    damaged: Mapping[str, str]
+
+
+def example_edits() -> EditStack:
+    inner = Cage.box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (0.0, 0.1, 0.2))
+    moved = Edit(
+        inner,
+        operations=(
+            Translate((0.1, 0.0, 0.0)),
+            Rotate((0.0, 0.0, 10.0)),
+            Scale((1.1, 1.0, 1.0)),
+            MoveCorner(3, (0.02, 0.0, 0.0)),
+        ),
+        outer=inner.grown((0.4, 0.4, 0.4)),
+        name="arm up",
+        lattice=16,
+    )
+    other = Edit(
+        Cage.box((0.3, 0.3, 0.0), (0.2, 0.2, 0.2)),
+        operations=(Translate((0.0, 0.3, 0.0)),),
+        adjustment="discrete",
+        keep_source=True,
+    )
+    gone = Edit(Cage.box((-0.3, 0.3, 0.0), (0.2, 0.2, 0.2)), deleted=True, adjustment="discrete")
+    return EditStack([moved, other, gone])
+
+
+def example_keys() -> tuple[Keyframe, ...]:
+    cameras = ball_scene().cameras["train"]
+    return tuple(
+        Keyframe(tuple(camera.c2w.reshape(-1).tolist()), 40.0, 0.3, {1: 0.5, 2: 1.0}) for camera in cameras
+    )
+
+
+def written(name: str, write: Callable[[Path], Any]) -> Callable[[Path], None]:
+    return lambda folder: write(folder / name)

@@ -1,0 +1,59 @@
+"""Commands on disks without room: exit code 2, one line that names the place, and what was there as it was.
+
+`benchmarks/robustness/full_disks.py` does it with all commands, and with editors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import disks
+import pytest
+from disk_commands import DISK_COMMANDS, DiskCommand, sources
+from disks import PAGE, Filled, disk, levels, room_for
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    folder = tmp_path_factory.mktemp("source")
+    try:
+        with disk(folder / "disk"):
+            pass
+    except (PermissionError, FileNotFoundError):
+        pytest.skip("only root, on Linux, may mount a small file system")
+    sources(folder)
+    yield folder
+
+
+@pytest.mark.parametrize(
+    "name", ["edit --overwrite", "edit -o", "import", "export .sog", "convert to .spz", "export, a page"]
+)
+def test_a_command_on_a_full_disk(source: Path, name: str) -> None:
+    command, found = DISK_COMMANDS[name], Filled()
+    need = room_for(command, source)
+    for again in (True,) if command.on_disk else (False, True):
+        for left in levels(need, 3):
+            disks.fill(name, command, source, left, again, found)
+    assert found.faults == []
+    assert found.runs - found.fitted >= 3  # what stays as it is takes no room
+
+
+def test_what_is_wrong_is_seen(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The checks themselves: a command that ends well, changes a file, leaves one, and says nothing."""
+    found = Filled()
+    command = DiskCommand("edit {out} {s}/e.yaml", "scene", on_disk="voxels")
+    assert not disks.fill("room", command, source, 1 << 20, True, found)
+    assert (found.runs, found.fitted, found.faults) == (1, 1, [])
+
+    def damaging(arguments: list[str]) -> tuple[int, list[str]]:
+        (Path(arguments[1]) / "notes.txt").write_text("")
+        (Path(arguments[1]) / ".hidden").touch()
+        return 2, ["cagefield: No space left on device"]
+
+    monkeypatch.setattr(disks, "ran", damaging)
+    assert disks.fill("bad", command, source, 0, True, found)
+    assert (found.code, found.line, found.changed, found.left) == (0, 1, 1, 1)
+    monkeypatch.setattr(disks, "ran", lambda arguments: (-1, ["OSError: [Errno 28]"]))
+    disks.fill("worse", command, source, PAGE, True, found)
+    assert (found.runs, found.code, found.left) == (3, 1, 1)
