@@ -32,7 +32,7 @@ from cagefield.typing import AnyArray, Array, Mask
 REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD = (0.1, 0.15, 0.15, 0.15, 0.1), 0.2
+USUAL, SPREAD = (0.05, 0.15, 0.2, 0.15, 0.1), 0.2
 """Weights that are usual where light comes from all around, and their standard deviation."""
 
 ALIKE = 300.0
@@ -54,7 +54,10 @@ FAR = 1e9
 """A distance beyond all reaches."""
 
 SMOOTH, NOISY = 1.0, 3.0
-"""Standard deviations, in voxels along the surface, by which light is smoothed, and normals that are noise."""
+"""Standard deviations, in voxels along the surface, by which light and noisy normals are smoothed."""
+
+CLEAR = 0.1
+"""The slope of matter from which on a normal is no noise; thin leaves have less."""
 
 
 @dataclass(frozen=True)
@@ -213,9 +216,10 @@ class Lighting:
         surface, where = block.surface & among, (block.slot >= 0) & among
         if not surface.any():
             return cls(where, np.zeros(int(where.sum())))
-        normals = np.stack(
-            [_spread(block.normals[surface, axis], surface, NOISY) for axis in range(3)], axis=1
-        )
+        slope = block.slope[surface].astype(np.float64)
+        normals = np.stack([_spread(axis, surface, NOISY) for axis in slope.T], axis=1)
+        clear = np.linalg.norm(slope, axis=1) > CLEAR
+        normals[clear] = slope[clear]
         if level is not None:
             normals = np.where(level[surface].any(axis=1, keepdims=True), level[surface], normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
