@@ -30,7 +30,7 @@ NOTICED = 0.01
 SOLID = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
-FOG = 0.03
+FOG = 0.12
 """The same of a vertex that is more than air."""
 
 ROUND = 1.2

@@ -53,11 +53,11 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH, NOISY = 1.0, 3.0
-"""Standard deviations, in voxels along the surface, by which light and noisy normals are smoothed."""
+SMOOTH, EVEN = 2.0, 1.0
+"""Standard deviations, in voxels along surfaces and even ones, by which light is smoothed."""
 
-CLEAR = 0.1
-"""The slope of matter from which on a normal is no noise; thin leaves have less."""
+DEEP, ABOVE = 5.0, 1.5
+"""How deep beneath an even surface, and how little above it, what is lit is lit as it is; voxels."""
 
 
 @dataclass(frozen=True)
@@ -207,28 +207,29 @@ class Lighting:
     def on(
         cls, block: Block, among: Mask, change: Callable[[Array, Array], Array], level: AnyArray | None = None
     ) -> Lighting:
-        """The light on the coloured vertices of a mask [X,Y,Z]: that on the surface vertex next to each.
+        """The light on the coloured vertices of a mask [X,Y,Z], smoothed along the surface.
 
-        `change` gives logs [N] at surface points [N,3] with unit normals [N,3]. They are smoothed along the
-        surface. What lies beneath shows through it, and is lit as it is: there, fields are foggy. Normals
-        [X,Y,Z,3] that are better known are in `level`, 0 elsewhere.
+        `change` gives logs [N] at points [N,3] with unit normals [N,3]. Normals [X,Y,Z,3] of an even surface
+        are in `level`, 0 elsewhere: what lies beneath it shows through it, and is lit as it is, as fields are
+        foggy there.
         """
-        surface, where = block.surface & among, (block.slot >= 0) & among
-        if not surface.any():
-            return cls(where, np.zeros(int(where.sum())))
-        slope = block.slope[surface].astype(np.float64)
-        normals = np.stack([_spread(axis, surface, NOISY) for axis in slope.T], axis=1)
-        clear = np.linalg.norm(slope, axis=1) > CLEAR
-        normals[clear] = slope[clear]
-        if level is not None:
-            normals = np.where(level[surface].any(axis=1, keepdims=True), level[surface], normals)
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        where = (block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25) & among
         values = np.zeros(block.shape)
-        values[surface] = _spread(change(block.positions(surface), normals), surface, SMOOTH)
-        nearest = ndimage.distance_transform_edt(
-            ~surface, sampling=block.spacing, return_distances=False, return_indices=True
-        )
-        return cls(where, values[tuple(axis[where] for axis in nearest)])
+        values[where] = change(block.positions(where), block.normals[where].astype(np.float64))
+        weight = np.where(where, np.minimum(block.depth, 1.0) + 1e-3, 0.0)
+        values[where] = _spread(values[where], where, SMOOTH, weight)
+        if level is not None and (even := block.surface & among & level.any(axis=-1)).any():
+            normals = level[even].astype(np.float64)
+            there = np.zeros(block.shape)
+            there[even] = _spread(change(block.positions(even), normals), even, EVEN)
+            away, nearest = ndimage.distance_transform_edt(~even, return_indices=True)
+            beneath = (block.slot >= 0) & among & (away <= DEEP)
+            nearest = nearest[:, beneath]
+            up = ((np.argwhere(beneath).T - nearest) * level[tuple(nearest)].T).sum(axis=0)
+            beneath[beneath] = up <= ABOVE
+            values[beneath] = there[tuple(nearest[:, up <= ABOVE])]
+            where |= beneath
+        return cls(where, values[where])
 
     def at(self, block: Block, points: Array) -> Array:
         """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
@@ -251,8 +252,10 @@ class Lighting:
         return out
 
 
-def _spread(values: AnyArray, surface: Mask, sigma: float) -> Array:
-    """Values [N] of surface vertices [X,Y,Z], each the Gaussian mean of those around."""
-    dense, weight = np.zeros(surface.shape), ndimage.gaussian_filter(surface.astype(float), sigma)
-    dense[surface] = values
-    return np.asarray(ndimage.gaussian_filter(dense, sigma)[surface] / np.maximum(weight[surface], 1e-9))
+def _spread(values: AnyArray, where: Mask, sigma: float, weight: AnyArray | None = None) -> Array:
+    """Values [N] of the vertices of a mask [X,Y,Z], each the Gaussian mean of those around."""
+    each = where.astype(float) if weight is None else weight
+    dense = np.zeros(where.shape)
+    dense[where] = values
+    total = ndimage.gaussian_filter(each, sigma)[where]
+    return np.asarray(ndimage.gaussian_filter(dense * each, sigma)[where] / np.maximum(total, 1e-9))

@@ -253,7 +253,7 @@ class _Work:
             log[inside] = new - ambience.log_light(before, points[inside], normals[inside])
             return log
 
-        return Lighting.on(self.before, self.inside, change, self.before.normals)
+        return Lighting.on(self.before, self.inside, change)
 
     def shown_part(self, light: Lighting | None, there: Block) -> Block | None:
         """The content of V^c as it is put into `there`; no more has colours. None where it stays."""
