@@ -33,9 +33,6 @@ SOLID = 0.3
 FOG = 0.12
 """The same of a vertex that is more than air."""
 
-ROUND = 1.2
-"""Standard deviation, in voxels, by which matter is smoothed for normals."""
-
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -90,19 +87,14 @@ class Block:
         return np.asarray(self.solid & ndimage.binary_dilation(~self.matter) & known)
 
     @cached_property
-    def slope(self) -> Float32:
-        """Against the gradient [X,Y,Z,3] of smoothed matter, per voxel: of a plane 1 / (ROUND sqrt(2 pi))."""
+    def normals(self) -> Float32:
+        """Unit normals [X,Y,Z,3], against the gradient of a smoothed opacity; 0 where that is flat."""
         if min(self.shape) < 3:
             return np.zeros((*self.shape, 3), np.float32)
-        smooth = ndimage.gaussian_filter(self.matter.astype(np.float32), ROUND)
-        scale = self.field.voxel_size / float(self.field.voxel_size.max())
-        return np.asarray(-np.stack(np.gradient(smooth), axis=-1) / scale, np.float32)
-
-    @cached_property
-    def normals(self) -> Float32:
-        """Unit normals [X,Y,Z,3], along the slope; 0 where that is flat."""
-        length = np.linalg.norm(self.slope, axis=-1, keepdims=True)
-        return np.asarray(self.slope / np.maximum(length, 1e-6), np.float32)
+        smooth = ndimage.gaussian_filter(1.0 - np.exp(-self.depth), 1.2)
+        slope = -np.stack(np.gradient(smooth), axis=-1) / self.field.voxel_size
+        length = np.linalg.norm(slope, axis=-1, keepdims=True)
+        return np.asarray(slope / np.maximum(length, 1e-6), np.float32)
 
     def positions(self, where: Mask) -> Array:
         """World positions [N,3] of the vertices of a mask [X,Y,Z]."""
