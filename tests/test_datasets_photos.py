@@ -91,6 +91,14 @@ def test_every_8_bit_mode_becomes_rgb_or_rgba(tmp_path, mode, channels):
     assert read_header(path).alpha == (channels == 4)
 
 
+def test_photos_smaller_than_the_factor_are_refused(tmp_path):
+    path = tmp_path / "a.png"
+    save(path, np.zeros((12, 3, 3), np.uint8))
+    assert read_photo(path, 3).shape == (4, 1, 3)
+    with pytest.raises(DatasetError, match="3x12 pixels are too few to shrink by 4"):
+        read_photo(path, 4)
+
+
 def test_deep_images_are_refused(tmp_path):
     Image.fromarray(np.zeros((4, 4), dtype=np.uint16)).save(tmp_path / "a.png")
     with pytest.raises(DatasetError, match=r"a.png: image mode I;16 has more than 8 bits a channel; convert"):

@@ -308,6 +308,10 @@ def _change(file: Path, change) -> None:
             r"frames\[2\]: key 'file_path' must name the photo, got None",
         ),
         (
+            lambda v: v["frames"][2].update(file_path="images/" + 300 * "x"),
+            r"frames\[2\]: key 'file_path' must name the photo, got 'images/x{72}$",
+        ),
+        (
             lambda v: v["frames"][1]["transform_matrix"][0].__setitem__(2, float("nan")),
             r"frames\[1\] \(images/0001\): transform_matrix\[0\]\[2\] is nan; every entry must be finite",
         ),

@@ -457,6 +457,21 @@ def test_a_file_that_claims_a_lot_is_refused_before_memory_is_taken(tmp_path: Pa
     (tmp_path / "a.spz").write_bytes(struct.pack("<4sIIBBBB", b"NGSP", 3, 2**31, 3, 12, 0, 0) + bytes(4000))
     with pytest.raises(FieldError, match="it says that it holds 2147483648 splats"):
         read_splats(tmp_path / "a.spz")
+    packed = gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 3, 2**20, 0, 12, 0, 0) + bytes(20 * 2**20))
+    (tmp_path / "a.spz").write_bytes(packed)
+    with pytest.raises(FieldError, match="it says that it holds 1048576 splats"):
+        read_splats(tmp_path / "a.spz")
+
+
+def test_archives_that_cannot_be_unpacked_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.sog"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("meta.json", '{"version": 2, "count": 4, "means": {}, "scales": {}}')
+    whole = bytearray(path.read_bytes())
+    whole[40:44] = b"\xff\xff\xff\xff"  # of the packed bytes
+    path.write_bytes(whole)
+    with pytest.raises(FieldError, match=r"a\.sog: .*decompressing|a\.sog: .*damaged"):
+        read_splats(path)
 
 
 @pytest.mark.parametrize(

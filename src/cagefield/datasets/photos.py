@@ -72,6 +72,10 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
             raise DatasetError(f"{path}: the image cannot be decoded ({error}); replace the file") from error
     if factor == 1:
         return np.array(pixels)
+    if min(pixels.size) < factor:
+        raise DatasetError(
+            f"{path}: {pixels.width}x{pixels.height} pixels are too few to shrink by {factor}; use less"
+        )
     box = (0, 0, pixels.width // factor * factor, pixels.height // factor * factor)
     if pixels.mode == "RGB":
         return np.array(pixels.reduce(factor, box))

@@ -38,6 +38,9 @@ from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out, repo
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
 
+LONGEST = 255
+"""Characters in a file's name, at most, on the systems there are."""
+
 SPLITS = ("train", "test", "val")
 
 _SYNTHETIC_HALF_SIZE = 1.5  # the NeRF-synthetic scenes fit in [-1.5, 1.5]^3
@@ -124,7 +127,7 @@ class _TransformsFile:
             if not isinstance(frame, dict):
                 raise DatasetError(f"{where} must be an object with file_path and transform_matrix")
             file_path = frame.get("file_path")
-            if not isinstance(file_path, str) or not file_path:
+            if not isinstance(file_path, str) or not 0 < max(map(len, file_path.split("/"))) <= LONGEST:
                 raise DatasetError(f"{where}: key 'file_path' must name the photo, got {file_path!r:.80}")
             name = _view_name(file_path)
             photo = find_photo(self.path.parent / name)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -60,8 +61,8 @@ def open_sog(path: Path) -> SplatSource:
         return _open(path, lambda name: _from_folder(folder, name))
     try:
         archive = zipfile.ZipFile(path)
-    except (zipfile.BadZipFile, OSError):
-        raise FieldError(f"{path}: no SOG file, it is no zip; copy it again") from None
+    except (zipfile.BadZipFile, NotImplementedError, OSError):
+        raise FieldError(f"{path}: no SOG file, it is no zip that can be read; copy it again") from None
     with archive:
         held = {PurePosixPath(name).name: name for name in archive.namelist()}
 
@@ -101,6 +102,7 @@ def _open(path: Path, content: Images) -> SplatSource:
         NotImplementedError,
         RuntimeError,
         zipfile.BadZipFile,
+        zlib.error,
         Image.DecompressionBombError,
     ) as error:
         raise _damaged(path, " ".join(str(error).split())[:120] or type(error).__name__) from None

@@ -47,6 +47,9 @@ COLOUR = 0.15
 _MOST_RATIO = 1040
 """Deflate packs 1032 bytes into one at most; what claims to hold more is damaged."""
 
+_SMALL, _USUAL_RATIO = 1 << 24, 100
+"""Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
+
 # Coordinate systems of the extension, by their number.
 _SYSTEMS = (None, "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf")
 
@@ -108,7 +111,7 @@ def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
     expected = [width * count for width in widths if width]
     raw = [size for _, size in struct.iter_unpack("<QQ", table)] if len(table) == 16 * streams else []
     if raw != expected:
-        raise _damaged(path, f"its streams have {raw} bytes, expected {expected}")
+        raise _damaged(path, f"its streams have {_short(raw)} bytes, expected {_short(expected)}")
     spool, at = _spool(), contents + len(table)
     for packed, size in struct.iter_unpack("<QQ", table):
         left = size
@@ -160,7 +163,8 @@ def _widths(path: Path, version: int, count: int, degree: int) -> tuple[int, ...
         raise _damaged(path, f"harmonics of degree {degree}; at most 4 exist")
     rotation = 3 if version < 3 else 4
     widths = (6 if version == 1 else 9, 1, 3, 3, rotation, 3 * ((degree + 1) ** 2 - 1))
-    if not count or sum(widths) * count > _MOST_RATIO * path.stat().st_size:
+    total, size = sum(widths) * count, path.stat().st_size
+    if not count or total > _MOST_RATIO * size or (total > _SMALL and total > _USUAL_RATIO * size):
         raise _damaged(path, f"it says that it holds {count} splats")
     return widths
 
@@ -237,3 +241,7 @@ def _smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
 
 def _damaged(path: Path, why: str) -> FieldError:
     return FieldError(f"{path}: no SPZ file that can be read: {why}; copy or export it again")
+
+
+def _short(sizes: list[int]) -> str:
+    return str(sizes[:8])[:150]

@@ -48,7 +48,7 @@ class Sight:
     """What some cameras of a field see of it.
 
     pairs: neighbours on its surfaces. depths: of each camera the distance [H,W] along the pixels' rays at
-    which they end, inf where they do not; of surfaces alone, where nothing is known of other views.
+    which they end, inf where they do not.
     """
 
     pairs: SeenPairs
@@ -71,7 +71,7 @@ class Sight:
 def sight_of(
     render: Callable[[Camera], RenderResult], cameras: Sequence[Camera], bounds: Array, *, seed: int = 0
 ) -> Sight:
-    """What some of a field's cameras see, by pictures with normals.
+    """What some of a field's cameras see, by pictures.
 
     Without cameras it is looked at from around its bounds [2,3].
     """
