@@ -23,8 +23,7 @@ from cagefield.patches.block import block_of, interpolated
 from cagefield.patches.light import Ambience
 from cagefield.patches.making import patch_of
 from cagefield.patches.patcher import wants_patch
-from cagefield.patches.seen import sight_of
-from cagefield.patches.support import Footprint, Support, membrane
+from cagefield.patches.support import membrane
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
@@ -106,28 +105,6 @@ def test_a_box_leaves_no_trace(scenes: tuple[Scene, Scene]) -> None:
         found[fill, relight] = db(seen(scene.with_edits(EditStack([edit]))), seen(truth))
     none, filled, both = found.values()
     assert filled > none + 2.0 and both > filled + 4.0 and both > 30.0, found
-
-
-def test_what_cameras_see_of_a_floor() -> None:
-    """Beside a box, not within it nor beneath the floor; of the hole of a footprint that is left out."""
-    field = room(True)
-    sight = sight_of(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
-    asked = np.array([[0.1, 0.4, FLOOR], [0.1, 0.0, FLOOR - 0.15], [0.1, 0.0, 0.0]])
-    beside, beneath, within = sight.views_of(asked, 0.05)
-    assert beside >= 4 and beneath == within == 0
-    hole = np.zeros((9, 9), bool)
-    hole[1:8, 1:8] = True
-    support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.eye(3)[:2], np.zeros((0, 3), np.int64))
-    footprint = Footprint(support, np.zeros(2, np.int64), hole, np.zeros_like(hole), np.zeros(hole.shape))
-    all_but_one = np.ones(49, bool)
-    all_but_one[24] = False
-    left, known = footprint.without(all_but_one, np.zeros((9, 9, 9), bool))
-    assert not left.hole.any() and (known == hole).all()  # one alone shows through a gap
-    stands = np.zeros((9, 9, 9), bool)
-    stands[3:6, 3:6, 3] = True
-    left, known = footprint.without(np.ones(49, bool), stands)
-    assert left.hole[3:6, 3:6].all() and not left.hole[1, 1] and (left.hole ^ known == hole).all()
-    assert left.around[1, 1] and not left.around[4, 4]
 
 
 def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:

@@ -140,8 +140,7 @@ def test_scenes_fill_and_relight_splats_unless_told_not_to():
     assert isinstance(moving.patch, SplatPatch) and moving.patch.part is None
     # Without light a patch does not depend on where the part is put down.
     move = Edit(cage(), adjustment="discrete", relight="none").translate((0.5, 0.0, 0.0))
-    further = move.translate((0.1, 0.0, 0.0))
-    there, further = (scene.patcher.patched([each])[0] for each in (move, further))
+    there, further = (patcher.patched([each])[0] for each in (move, move.translate((0.1, 0.0, 0.0))))
     assert there.patch is further.patch is not None
 
 

@@ -20,9 +20,14 @@ from cagefield.edits import Edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import Block, block_of
+from cagefield.patches.block import SOLID, Block, block_of
 from cagefield.patches.extent import RIM, swept
-from cagefield.patches.light import Ambience, Lighting, distance_in
+from cagefield.patches.light import (
+    Ambience,
+    Lighting,
+    distance_in,
+    lit_vertices,
+)
 from cagefield.typing import Array, Mask
 from cagefield.warps.device_stack import DeviceStack
 from cagefield.warps.forward import to_deformed
@@ -48,17 +53,16 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, 
     """(a coarser block, what the light on it is multiplied by) once a continuous edit has bent a block."""
     assert edit.outer is not None
     coarse = block.pooled(max(1, -(-max(block.shape) // FINEST))).reaching(edit.outer.aabb)
-    old, new = distance_in(coarse, coarse.matter), distance_in(coarse, _matter_after(coarse, edit))
-
-    def change(points: Array, normals: Array) -> Array:
-        moved = to_deformed(edit.exact_warp, points, coarse=True)
-        # Normals go with the transposed inverse of the map's Jacobian.
-        turned = np.einsum("nji,nj->ni", np.linalg.inv(moved.jacobian), normals)
-        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
-        log = ambience.log_light(new, moved.points, turned) - ambience.log_light(old, points, normals)
-        return np.where(np.abs(log) < UNSEEN, 0.0, log)
-
-    return coarse, Lighting.on(coarse, np.ones(coarse.shape, bool), change)
+    where = lit_vertices(coarse)
+    points, normals = coarse.positions(where), coarse.normals[where].astype(np.float64)
+    moved = to_deformed(edit.exact_warp, points, coarse=True)
+    # Normals go with the transposed inverse of the map's Jacobian.
+    turned = np.einsum("nji,nj->ni", np.linalg.inv(moved.jacobian), normals)
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
+    old, new = distance_in(coarse, coarse.solid), distance_in(coarse, _solid_after(coarse, edit))
+    log = ambience.log_light(new, moved.points, turned) - ambience.log_light(old, points, normals)
+    log[np.abs(log) < UNSEEN] = 0.0
+    return coarse, Lighting(where, log).smoothed(coarse)
 
 
 def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Block:
@@ -96,17 +100,16 @@ def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:
     return Edit.delete(nothing, name=edit.name).replace(fill="none", relight="none", patch=patch)
 
 
-def _matter_after(block: Block, edit: Edit) -> Mask:
-    """Where there is matter [X,Y,Z] in a block once the edit has bent it."""
+def _solid_after(block: Block, edit: Edit) -> Mask:
+    """What is solid [X,Y,Z] of a block once the edit has bent it."""
     assert edit.outer is not None
-    matter = block.matter.copy()
-    points = block.positions(np.ones(matter.shape, bool))
+    solid = block.solid.copy()
+    points = block.positions(np.ones(solid.shape, bool))
     inside = np.flatnonzero(edit.outer.contains(points))
     stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=LATTICE)]))
     asked = points[inside].astype(np.float32)
     canonical, *_ = stack.to_canonical(
         asked, np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), asked.shape)
     )
-    there = block.lookup(block.matter.astype(np.float32), canonical.astype(np.float64)) > 0.5
-    matter.reshape(-1)[inside] = there
-    return matter
+    solid.reshape(-1)[inside] = block.lookup(block.depth, canonical.astype(np.float64)) > SOLID
+    return solid

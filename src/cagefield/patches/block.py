@@ -30,9 +30,6 @@ NOTICED = 0.01
 SOLID = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
-FOG = 0.12
-"""The same of a vertex that is more than air."""
-
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -69,22 +66,6 @@ class Block:
     def solid(self) -> Mask:
         """[X,Y,Z], True where the vertex is opaque."""
         return np.asarray(self.depth > SOLID)
-
-    @cached_property
-    def matter(self) -> Mask:
-        """[X,Y,Z], True where there is something: what is solid, the fog in its gaps, and what these enclose.
-
-        Photos say nothing of what is behind a surface: fields are hollow there, or foggy.
-        """
-        solid = np.pad(self.solid, 2)
-        closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
-        return np.asarray(ndimage.binary_fill_holes(self.solid | (closed & (self.depth > FOG))))
-
-    @cached_property
-    def surface(self) -> Mask:
-        """[X,Y,Z], the outermost solid vertices, where the normal is known."""
-        known = (self.normals**2).sum(axis=-1) > 0.25
-        return np.asarray(self.solid & ndimage.binary_dilation(~self.matter) & known)
 
     @cached_property
     def normals(self) -> Float32:

@@ -15,7 +15,7 @@ Source: Evans, "Fast approximations for global illumination on dynamic scenes" (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,14 +29,14 @@ from cagefield.patches.seen import SeenPairs
 from cagefield.patches.sun import Distance, Sun, sun_of
 from cagefield.typing import AnyArray, Array, Mask
 
-REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
+REACHES = (0.01, 0.02, 0.04, 0.08)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD = (0.05, 0.15, 0.2, 0.15, 0.1), 0.2
+USUAL, SPREAD = (0.1, 0.2, 0.2, 0.15), 0.2
 """Weights that are usual where light comes from all around, and their standard deviation."""
 
-ALIKE = 300.0
-"""Pairs that count as one: neighbours, and other views, see the same texture."""
+ALIKE = 10.0
+"""Pairs that count as one."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -53,11 +53,8 @@ FINEST = 128
 FAR = 1e9
 """A distance beyond all reaches."""
 
-SMOOTH, EVEN = 2.0, 1.0
-"""Standard deviations, in voxels along surfaces and even ones, by which light is smoothed."""
-
-DEEP, ABOVE = 5.0, 1.5
-"""How deep beneath an even surface, and how little above it, what is lit is lit as it is; voxels."""
+SMOOTH = 2.0
+"""Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
 
 
 @dataclass(frozen=True)
@@ -162,14 +159,13 @@ def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
     change = pairs.log_change
 
     usual = np.array(USUAL)
-    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826
+    # Neighbouring pairs see the same texture.
+    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826 * np.sqrt(ALIKE)
 
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / max(noise, 1e-3)
-        # Edges of textures are further off than noise: Cauchy's loss.
-        robust = np.sign(told) * np.sqrt(np.log1p(told**2) / ALIKE)
-        return np.concatenate([robust, (weights - usual) / SPREAD])
+        told = ambience.log_openness(second) - ambience.log_openness(first) - change
+        return np.concatenate([told / max(noise, 1e-3), (weights - usual) / SPREAD])
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
@@ -203,33 +199,15 @@ class Lighting:
     where: Mask
     log_ratio: Array
 
-    @classmethod
-    def on(
-        cls, block: Block, among: Mask, change: Callable[[Array, Array], Array], level: AnyArray | None = None
-    ) -> Lighting:
-        """The light on the coloured vertices of a mask [X,Y,Z], smoothed along the surface.
-
-        `change` gives logs [N] at points [N,3] with unit normals [N,3]. Normals [X,Y,Z,3] of an even surface
-        are in `level`, 0 elsewhere: what lies beneath it shows through it, and is lit as it is, as fields are
-        foggy there.
-        """
-        where = (block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25) & among
+    def smoothed(self, block: Block) -> Lighting:
+        """The same, smoothed along surfaces."""
+        weight = np.zeros(block.shape)
+        weight[self.where] = np.minimum(block.depth[self.where], 1.0) + 1e-3
         values = np.zeros(block.shape)
-        values[where] = change(block.positions(where), block.normals[where].astype(np.float64))
-        weight = np.where(where, np.minimum(block.depth, 1.0) + 1e-3, 0.0)
-        values[where] = _spread(values[where], where, SMOOTH, weight)
-        if level is not None and (even := block.surface & among & level.any(axis=-1)).any():
-            normals = level[even].astype(np.float64)
-            there = np.zeros(block.shape)
-            there[even] = _spread(change(block.positions(even), normals), even, EVEN)
-            away, nearest = ndimage.distance_transform_edt(~even, return_indices=True)
-            beneath = (block.slot >= 0) & among & (away <= DEEP)
-            nearest = nearest[:, beneath]
-            up = ((np.argwhere(beneath).T - nearest) * level[tuple(nearest)].T).sum(axis=0)
-            beneath[beneath] = up <= ABOVE
-            values[beneath] = there[tuple(nearest[:, up <= ABOVE])]
-            where |= beneath
-        return cls(where, values[where])
+        values[self.where] = self.log_ratio * weight[self.where]
+        total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
+        smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
+        return replace(self, log_ratio=smooth)
 
     def at(self, block: Block, points: Array) -> Array:
         """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
@@ -252,10 +230,6 @@ class Lighting:
         return out
 
 
-def _spread(values: AnyArray, where: Mask, sigma: float, weight: AnyArray | None = None) -> Array:
-    """Values [N] of the vertices of a mask [X,Y,Z], each the Gaussian mean of those around."""
-    each = where.astype(float) if weight is None else weight
-    dense = np.zeros(where.shape)
-    dense[where] = values
-    total = ndimage.gaussian_filter(each, sigma)[where]
-    return np.asarray(ndimage.gaussian_filter(dense * each, sigma)[where] / np.maximum(total, 1e-9))
+def lit_vertices(block: Block) -> Mask:
+    """Vertices [X,Y,Z] whose colour shows, also those beside a surface, and whose normal is known."""
+    return np.asarray((block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25))

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cages import Cage
@@ -15,28 +14,21 @@ from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import Block, block_of
+from cagefield.patches.block import SOLID, Block, block_of
 from cagefield.patches.cloning import cloned
 from cagefield.patches.extent import RIM, patch_box
 from cagefield.patches.feathering import feathered
-from cagefield.patches.light import Ambience, Lighting, distance_in
-from cagefield.patches.seen import Sight
+from cagefield.patches.light import Ambience, Lighting, distance_in, lit_vertices
 from cagefield.patches.sun import Distance
-from cagefield.patches.support import Support, footprint_of, rebuilt, support_of, with_seen
-from cagefield.typing import Array, Float32, Mask
+from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
+from cagefield.typing import Mask
 from cagefield.warps.inner_map import HexahedronMap
 
 CLOSE = 3.0
 """Surfaces are hidden by what comes this near to them, voxels."""
 
-UNSURE = 0.6
+UNSURE = 0.2
 """Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
-
-VIEWS = 2
-"""Cameras that see a surface from which on it counts as known."""
-
-BEFORE = 0.7
-"""What is so little behind what a camera shows, in voxels, is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +67,6 @@ def made_of(
     ambience: Ambience | None,
     *,
     settled: bool = True,
-    sight: Sight | None = None,
     preserve_opacity: bool = True,
     after: VoxelField | None = None,
 ) -> Made:
@@ -83,33 +74,24 @@ def made_of(
 
     A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
     is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away;
-    `after` is the field with it, where the edit does not say that. What cameras did see, by their `sight` of
-    the field without edits, is not filled.
+    `after` is the field with it, where the edit does not say that.
     """
     work = _Work.of(field, below, edit, ambience, settled, preserve_opacity, after)
-    lighting = part_light = footprint = None
-    fills = edit.fill == "surroundings" and not edit.keep_source
-    relights = ambience is not None and ambience.shows
-    under_part = work.support() if fills or relights else None
-    support = under_part if fills else None
-    ground, removed = work.emptied, work.inside
-    if support is not None:
-        near = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
-        footprint = footprint_of(ground, support, work.part, near)
-    if footprint is not None and sight is not None:
-        footprint, known = footprint.without(work.seen(footprint.points(ground), below, sight), work.part)
-        ground, removed = with_seen(ground, work.before, footprint, known, work.inside)
-    if ambience is not None and relights:
-        level = None if under_part is None else under_part.normals(ground)
-        lighting = work.light(ground, ambience, level)
+    lighting = part_light = None
+    support = work.support() if edit.fill == "surroundings" and not edit.keep_source else None
+    if ambience is not None and ambience.shows:
+        lighting = work.light(ambience)
         part_light = work.part_light(ambience) if work.settled and edit.source is None else None
-    under = _lit(ground, lighting)
-    if footprint is not None and lighting is not None:
-        footprint = footprint.with_hole(np.argwhere(work.rim & (lighting.dense(under) > UNSURE)))
-    if footprint is None or not footprint.hole.any():
-        support = None
-    else:
-        under = rebuilt(under, footprint, removed)
+    under = _lit(work.emptied, lighting)
+    if support is not None:
+        hidden = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
+        if lighting is not None:
+            hidden |= lighting.dense(under) > UNSURE
+        footprint = footprint_of(under, support, work.part, hidden)
+        if footprint is None:
+            support = None
+        else:
+            under = rebuilt(under, footprint, work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         cages = edit.inner, edit.fill.source
         under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
@@ -123,13 +105,10 @@ def patch_of(
     ambience: Ambience | None,
     *,
     settled: bool = True,
-    sight: Sight | None = None,
     preserve_opacity: bool = True,
 ) -> Patch:
     """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
-    made = made_of(
-        field, below, edit, ambience, settled=settled, sight=sight, preserve_opacity=preserve_opacity
-    )
+    made = made_of(field, below, edit, ambience, settled=settled, preserve_opacity=preserve_opacity)
     changed = made.under.differs(made.before) | made.inside
     region, under = made.under.around(changed, made.work.region)
     part = made.work.shown_part(made.part_light, made.under)
@@ -144,8 +123,8 @@ def _lit(block: Block, light: Lighting | None) -> Block:
 class _Work:
     """An edit's block: as it was, with V^c emptied, and masks [X,Y,Z] of V^c and of what was solid in it.
 
-    settled: the part is shown at its new place, and casts its shadow there. pasted [X,Y,Z]: where there
-    is matter with a paste, None of another edit.
+    settled: the part is shown at its new place, and casts its shadow there. pasted [X,Y,Z]: what is solid
+    with a paste, None of another edit.
     """
 
     edit: Edit
@@ -176,7 +155,7 @@ class _Work:
         region = Cage.box(box.mean(axis=0), box[1] - box[0] - 2.0 * voxel)
         if edit.source is not None:
             shown, stack = (field, below.append(edit)) if after is None else (after, EditStack())
-            pasted = block_of(shown, stack, box, preserve_opacity=preserve_opacity).matter
+            pasted = block_of(shown, stack, box, preserve_opacity=preserve_opacity).solid
             none = np.zeros(before.shape, bool)
             return cls(edit, region, before, before, none, none, settled, pasted)
         inside = edit.inner.contains(before.positions(np.ones(before.shape, bool))).reshape(before.shape)
@@ -188,7 +167,8 @@ class _Work:
     @cached_property
     def surface(self) -> Mask:
         """Surface vertices outside of V^c."""
-        return np.asarray(self.emptied.surface & ~self.inside)
+        solid = self.emptied.solid
+        return np.asarray(solid & ndimage.binary_dilation(~solid) & ~self.inside & lit_vertices(self.emptied))
 
     @cached_property
     def rim(self) -> Mask:
@@ -198,62 +178,49 @@ class _Work:
         size = np.median(self.edit.inner.aabb[1] - self.edit.inner.aabb[0])
         return np.asarray(self.surface & (away < max(RIM * max(spacing), 0.5 * float(size))))
 
-    def seen(self, points: Array, below: EditStack, sight: Sight) -> NDArray[np.bool_]:
-        """Which of some points [N,3], of surfaces as the edits below make them, cameras see well.
-
-        What an edit below made up is as good as it gets.
-        """
-        mapped = below.to_canonical(points)
-        within = BEFORE * float(self.before.field.voxel_size.max())
-        return np.asarray((sight.views_of(mapped.points, within) >= VIEWS) | (mapped.layer != 0))
-
     def support(self) -> Support | None:
         """What the part stood on."""
         return support_of(self.emptied, self.part, self.rim, self.surface)
 
     @cached_property
     def _distances(self) -> tuple[Distance, Distance]:
-        """Distances to what matter there was, and to what there is then."""
-        return distance_in(self.emptied, self.before.matter), distance_in(self.emptied, self.matter_after())
+        """Distances to what was solid, and to what is then."""
+        block = self.emptied
+        return distance_in(block, self.before.solid), distance_in(block, self.solid_after())
 
-    def matter_after(self) -> Mask:
-        """Where there is matter [X,Y,Z] once the part is where it is moved to, or gone."""
-        matter = self.emptied.matter.copy()
+    def solid_after(self) -> Mask:
+        """What is solid [X,Y,Z] once the part is where it is moved to, or gone."""
+        solid = self.emptied.solid.copy()
         if not self.settled:
-            return matter
+            return solid
         if self.pasted is not None:
             return self.pasted
         phi = HexahedronMap(self.edit.inner, self.edit.deformed)
-        inside, canonical, _ = phi(self.before.positions(np.ones(matter.shape, bool)))
-        matter.reshape(-1)[inside] = (
-            self.before.lookup(self.before.matter.astype(np.float32), canonical) > 0.5
-        )
-        return matter
+        inside, canonical, _ = phi(self.before.positions(np.ones(solid.shape, bool)))
+        solid.reshape(-1)[inside] = self.before.lookup(self.before.depth, canonical) > SOLID
+        return solid
 
-    def light(self, block: Block, ambience: Ambience, level: Float32 | None) -> Lighting:
-        """What the light on a block without the part is multiplied by."""
-        before, after = self._distances
-
-        def change(points: Array, normals: Array) -> Array:
-            return ambience.log_light(after, points, normals) - ambience.log_light(before, points, normals)
-
-        return Lighting.on(block, np.ones(block.shape, bool), change, level)
+    def light(self, ambience: Ambience) -> Lighting:
+        """What the light on everything but the part is multiplied by."""
+        block = self.emptied
+        where = lit_vertices(block)
+        points, normals = block.positions(where), block.normals[where]
+        logs = [ambience.log_light(distance, points, normals) for distance in self._distances]
+        return Lighting(where, logs[1] - logs[0]).smoothed(block)
 
     def part_light(self, ambience: Ambience) -> Lighting:
         """What the light on the content of V^c is multiplied by at its new place."""
+        block = self.before
+        where = lit_vertices(block) & self.inside
+        points, normals = block.positions(where), block.normals[where]
+        inside, moved, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(points)
+        turned = np.einsum("nji,nj->ni", np.linalg.inv(jacobian), normals[inside])
+        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
+        log = np.zeros(len(points))
         before, after = self._distances
-        phi = HexahedronMap(self.edit.deformed, self.edit.inner)
-
-        def change(points: Array, normals: Array) -> Array:
-            inside, moved, jacobian = phi(points)
-            turned = np.einsum("nji,nj->ni", np.linalg.inv(jacobian), normals[inside])
-            turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
-            log = np.zeros(len(points))
-            new = ambience.log_light(after, moved, turned)
-            log[inside] = new - ambience.log_light(before, points[inside], normals[inside])
-            return log
-
-        return Lighting.on(self.before, self.inside, change)
+        new = ambience.log_light(after, moved, turned)
+        log[inside] = new - ambience.log_light(before, points[inside], normals[inside])
+        return Lighting(where, log).smoothed(block)
 
     def shown_part(self, light: Lighting | None, there: Block) -> Block | None:
         """The content of V^c as it is put into `there`; no more has colours. None where it stays."""

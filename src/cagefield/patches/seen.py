@@ -1,4 +1,4 @@
-"""What of a field's surfaces its cameras see: where they are, and pairs of neighbours on them."""
+"""What of a field's surfaces its cameras see, in pairs of neighbours."""
 
 from __future__ import annotations
 
@@ -6,24 +6,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cameras import Camera
 from cagefield.rendering.render_result import RenderResult
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array
 
 VIEWS, PIXELS = 28, 200
 """Pictures, and their longer edge in pixels."""
 
-APART = (5, 30)
+APART = (5, 14)
 """Distance of a pair, in pixels."""
-
-WINDOW = 3
-"""Pixels along an edge of the window that normals are found in."""
-
-ENDS = 0.5
-"""Opacity from which on a pixel shows a surface."""
 
 EDGE = 0.03
 """A jump in depth between neighbouring pixels by this share of it is an edge."""
@@ -43,49 +36,18 @@ class SeenPairs:
     log_change: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """What some cameras of a field see of it.
-
-    pairs: neighbours on its surfaces. depths: of each camera the distance [H,W] along the pixels' rays at
-    which they end, inf where they do not.
-    """
-
-    pairs: SeenPairs
-    cameras: tuple[Camera, ...]
-    depths: tuple[Array, ...]
-
-    def views_of(self, points: Array, within: float) -> NDArray[np.int64]:
-        """How many of the cameras see each of some canonical points [N,3], or what is `within` before it."""
-        count = np.zeros(len(points), np.int64)
-        for camera, depth in zip(self.cameras, self.depths, strict=True):
-            image, ahead = camera.project(points)
-            shown = np.isfinite(image).all(axis=1) & (ahead > 0.0)
-            pixel = np.floor(np.where(shown[:, None], image, -1.0)).astype(np.int64)
-            shown &= ((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1)
-            away = np.linalg.norm(points[shown] - camera.origin, axis=1)
-            count[shown] += depth[pixel[shown, 1], pixel[shown, 0]] > away - within
-        return count
-
-
-def sight_of(
+def seen_pairs(
     render: Callable[[Camera], RenderResult], cameras: Sequence[Camera], bounds: Array, *, seed: int = 0
-) -> Sight:
-    """What some of a field's cameras see, by pictures.
+) -> SeenPairs:
+    """Pairs of neighbours in pictures with normals of a field, from some of its cameras.
 
     Without cameras it is looked at from around its bounds [2,3].
     """
     chance = np.random.default_rng(seed)
     picked = {int(n) for n in np.linspace(0, len(cameras) - 1, VIEWS)} if cameras else set()
-    chosen = tuple(smaller(camera) for camera in [cameras[n] for n in sorted(picked)] or around(bounds))
-    found, depths = [], []
-    for camera in chosen:
-        picture = render(camera)
-        found.append(_pairs(picture, camera, chance))
-        ends = (picture.opacity > ENDS) & np.isfinite(picture.depth)
-        depths.append(np.where(ends, picture.depth, np.inf).astype(np.float64))
-    pairs = (np.concatenate([getattr(pair, f.name) for pair in found]) for f in fields(SeenPairs))
-    return Sight(SeenPairs(*pairs), chosen, tuple(depths))
+    chosen = [cameras[n] for n in sorted(picked)] or around(bounds)
+    found = [_pairs(render(smaller(camera)), smaller(camera), chance) for camera in chosen]
+    return SeenPairs(*(np.concatenate([getattr(pair, f.name) for pair in found]) for f in fields(SeenPairs)))
 
 
 def smaller(camera: Camera) -> Camera:
@@ -109,13 +71,15 @@ def around(bounds: Array) -> list[Camera]:
 def _pairs(picture: RenderResult, camera: Camera, chance: np.random.Generator) -> SeenPairs:
     """The pairs of one picture."""
     opacity, depth = picture.opacity, picture.depth
+    if picture.normals is None:
+        raise ValueError("pairs are found in pictures with normals")
     solid = (opacity > 0.98) & np.isfinite(depth)
     filled = np.where(solid, depth, 1e6)
     jump = ndimage.maximum_filter(filled, 3) - ndimage.minimum_filter(filled, 3)
     solid &= ~ndimage.binary_dilation(jump > EDGE * np.where(solid, depth, 1.0), iterations=1)
     origins, directions = camera.rays()
     points = origins + np.where(solid, depth, 0.0).reshape(-1, 1) * directions
-    normals, rgb = _normals(points.reshape(*solid.shape, 3), origins[0], solid), picture.rgb.reshape(-1, 3)
+    normals, rgb = picture.normals.reshape(-1, 3), picture.rgb.reshape(-1, 3)
     log = np.log(np.clip(rgb, 0.02, 1.0).mean(axis=1))
     y, x = np.nonzero(solid)
     distance, angle = chance.integers(*APART, len(x)), chance.uniform(0.0, 2.0 * np.pi, len(x))
@@ -131,17 +95,3 @@ def _pairs(picture: RenderResult, camera: Camera, chance: np.random.Generator) -
     kept = solid.reshape(-1)[second] & flat & alike
     first, second = first[kept], second[kept]
     return SeenPairs(points[first], normals[first], points[second], normals[second], log[second] - log[first])
-
-
-def _normals(points: Array, eye: Array, solid: Mask) -> Array:
-    """Unit normals [H*W,3] of the surface that pixels' points [H,W,3] lie on, towards the eye [3].
-
-    Of points, as a field's density has noise of its own; across pixels that show nothing they are wrong.
-    """
-    share = np.maximum(ndimage.uniform_filter(solid.astype(float), WINDOW), 1e-9)[..., None]
-    smooth = ndimage.uniform_filter(np.where(solid[..., None], points, 0.0), (WINDOW, WINDOW, 1)) / share
-    down, right = np.gradient(smooth, WINDOW, axis=(0, 1))
-    normals = np.cross(right, down).reshape(-1, 3)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    away = ((points.reshape(-1, 3) - eye) * normals).sum(axis=1, keepdims=True) > 0.0
-    return np.where(away, -normals, normals)

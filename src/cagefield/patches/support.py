@@ -11,7 +11,7 @@ Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membra
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ from scipy import ndimage, sparse
 from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import factorized
 
-from cagefield.patches.block import Block, world_of
-from cagefield.typing import Array, Float32, Mask
+from cagefield.patches.block import Block
+from cagefield.typing import Array, Mask
 
 TRIALS = 200
 """Planes that are tried."""
@@ -31,20 +31,11 @@ NEAR = 1.5
 ALONG = 0.9
 """Least cosine between its normal and the plane's."""
 
-ROUGH = 0.6
-"""The same of one that lies on the plane, whose own normal is noise."""
-
 LEAST = 60
 """Vertices of a support, at least."""
 
 DEEP, HIGH = -4.0, 3.0
 """Heights over a support, in voxels, between which its density is made anew."""
-
-LEVEL = 1.5
-"""Height over a support, in voxels, up to which what is seen of it belongs to it."""
-
-BESIDE = 2
-"""Columns beside those that no camera sees that are filled too."""
 
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
@@ -63,16 +54,6 @@ class Support:
         """(u and v [N,2], height [N]) of block coordinates [N,3]."""
         away = at - self.point
         return away @ self.axes.T, away @ self.normal
-
-    def normals(self, block: Block) -> Float32:
-        """Normals [X,Y,Z,3] of a block's surface where it is the support's, 0 elsewhere."""
-        out = np.zeros((*block.shape, 3), np.float32)
-        at = np.argwhere(block.surface)
-        _, height = self.local(at.astype(np.float64))
-        mine = (np.abs(height) < 2.0 * NEAR) & (block.normals[block.surface] @ self.normal > ROUGH)
-        out[tuple(at[mine].T)] = self.normal / np.array(block.spacing)
-        out /= np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-9)
-        return out
 
 
 def support_of(block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0) -> Support | None:
@@ -134,43 +115,6 @@ class Footprint:
     hole: Mask
     around: Mask
     height: Array
-
-    def points(self, block: Block) -> Array:
-        """World positions [N,3] of the hole's columns on the surface."""
-        cells = np.argwhere(self.hole)
-        uv, height = cells + self.first, self.height[tuple(cells.T)]
-        at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
-        return world_of(block.field, at + block.low)
-
-    def without(self, seen: NDArray[np.bool_], part: Mask) -> tuple[Footprint, Mask]:
-        """(the footprint whose hole lacks what is seen [N] of its columns, those columns [U,V]).
-
-        What a part [X,Y,Z] stands on is not seen.
-        """
-        hole = self.stands(np.argwhere(part)) & self.hole
-        hole[tuple(np.argwhere(self.hole)[~seen].T)] = True
-        # What shows through gaps, and right beside the part, is of no use.
-        hole = ndimage.binary_dilation(ndimage.binary_opening(hole), iterations=BESIDE) & self.hole
-        known = self.hole & ~hole
-        return replace(self, hole=hole, around=self.around | known), known
-
-    def with_hole(self, at: NDArray[np.int64]) -> Footprint:
-        """The footprint whose hole also has the columns of block coordinates [N,3] on the support."""
-        uv, height = self.support.local(at.astype(np.float64))
-        cells = np.round(uv[np.abs(height) < 2.0 * NEAR]).astype(np.int64) - self.first
-        cells = cells[((cells >= 0) & (cells < self.hole.shape)).all(axis=1)]
-        more = np.zeros(self.hole.shape, bool)
-        more[tuple(cells.T)] = True
-        hole = self.hole | (ndimage.binary_closing(more, iterations=2) & self.around)
-        return replace(self, hole=hole, around=self.around & ~hole)
-
-    def stands(self, at: NDArray[np.int64]) -> Mask:
-        """Columns [U,V] that block coordinates [N,3] of a part stand on, or nearly."""
-        u, v, height = self.column(at.astype(np.float64))
-        low = (u >= 0) & (height > LEVEL) & (height < HIGH + 2.0)
-        out = np.zeros(self.hole.shape, bool)
-        out[u[low], v[low]] = True
-        return out
 
     def column(self, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(u [N], v [N], height over the support [N]) of block coordinates [N,3]; u is -1 outside."""
@@ -237,22 +181,8 @@ def _crossing(block: Block, support: Support) -> Array:
     return np.asarray(steps[last])
 
 
-def with_seen(
-    block: Block, before: Block, footprint: Footprint, known: Mask, removed: Mask
-) -> tuple[Block, Mask]:
-    """(the block with what was seen of a support in V^c, the vertices [X,Y,Z] of V^c without these).
-
-    `before` is the block with its V^c, `removed` [X,Y,Z], and `known` [U,V] are columns of the footprint.
-    """
-    voxels = np.argwhere(removed)
-    u, v, height = footprint.column(voxels.astype(np.float64))
-    back = np.zeros(block.shape, bool)
-    back[tuple(voxels[(u >= 0) & known[u, v] & (height < LEVEL)].T)] = True
-    return block.with_density(back, before.density[back]), removed & ~back
-
-
 def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
-    """The block with the support going on in its hole; `removed` [X,Y,Z]: V^c's vertices that are empty."""
+    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c."""
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
     known = u >= 0
