@@ -47,7 +47,7 @@ COLOUR = 0.15
 _MOST_RATIO = 1040
 """Deflate packs 1032 bytes into one at most; what claims to hold more is damaged."""
 
-_SMALL, _USUAL_RATIO = 1 << 24, 100
+_SMALL, _USUAL_RATIO = 1 << 20, 100
 """Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
 
 # Coordinate systems of the extension, by their number.
