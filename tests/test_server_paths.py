@@ -47,9 +47,11 @@ def key(**changed: Any) -> dict[str, Any]:
 def said(coordinator: Coordinator, hello: server_messages.Hello, text: str) -> str | None:
     """What the page's user is told of a message; None where it is followed."""
     try:
-        MessageHandlers(coordinator, coordinator.join(hello)).handle(
+        rest = MessageHandlers(coordinator, coordinator.join(hello)).handle(
             client_messages.page_messages.validate_json(text)
         )
+        if rest is not None:
+            asyncio.run(rest)
     except ValidationError as error:
         return refusal(error)
     except CagefieldError as error:

@@ -185,7 +185,7 @@ def test_jobs_write_their_pictures(renderers: RendererCache, tmp_path: Path) -> 
     asked = FrameTask(
         1, 1, 0, 1, "test_views", str(tmp_path), 24.0, Shown(values_of((MOVED,))), Still(CAMERA, {}), 0
     )
-    assert handlers.do(asked, lambda _: False) == Answered(1)
+    assert handlers.do(asked, lambda _: False) == Answered(1, True)
     written = np.asarray(Image.open(tmp_path / "0000.png"))
     assert np.array_equal(written, renderers.scene.with_edits(EditStack([MOVED])).render(CAMERA).rgb8())
 

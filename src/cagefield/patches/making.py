@@ -22,7 +22,7 @@ from cagefield.patches.feathering import feathered
 from cagefield.patches.light import Ambience, Lighting, distance_in
 from cagefield.patches.seen import Sight
 from cagefield.patches.sun import Distance
-from cagefield.patches.support import Support, footprint_of, rebuilt, support_of, with_seen
+from cagefield.patches.support import Support, footprint_of, rebuilt, support_of
 from cagefield.typing import Array, Float32, Mask
 from cagefield.warps.inner_map import HexahedronMap
 
@@ -92,13 +92,12 @@ def made_of(
     relights = ambience is not None and ambience.shows
     under_part = work.support() if fills or relights else None
     support = under_part if fills else None
-    ground, removed = work.emptied, work.inside
+    ground = work.emptied
     if support is not None:
         near = work.rim & (ndimage.distance_transform_edt(~work.part) < CLOSE)
         footprint = footprint_of(ground, support, work.part, near)
     if footprint is not None and sight is not None:
-        footprint, known = footprint.without(work.seen(footprint.points(ground), below, sight), work.part)
-        ground, removed = with_seen(ground, work.before, footprint, known, work.inside)
+        footprint = footprint.without(work.seen(footprint.points(ground), below, sight), work.part | near)
     if ambience is not None and relights:
         level = None if under_part is None else under_part.normals(ground)
         lighting = work.light(ground, ambience, level)
@@ -109,7 +108,7 @@ def made_of(
     if footprint is None or not footprint.hole.any():
         support = None
     else:
-        under = rebuilt(under, footprint, removed)
+        under = rebuilt(under, footprint, work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         cages = edit.inner, edit.fill.source
         under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
@@ -201,11 +200,12 @@ class _Work:
     def seen(self, points: Array, below: EditStack, sight: Sight) -> NDArray[np.bool_]:
         """Which of some points [N,3], of surfaces as the edits below make them, cameras see well.
 
-        What an edit below made up is as good as it gets.
+        What an edit below made up is as good as it gets. In V^c is the part, however flat it is.
         """
         mapped = below.to_canonical(points)
         within = BEFORE * float(self.before.field.voxel_size.max())
-        return np.asarray((sight.views_of(mapped.points, within) >= VIEWS) | (mapped.layer != 0))
+        known = (sight.views_of(mapped.points, within) >= VIEWS) | (mapped.layer != 0)
+        return np.asarray(known & ~self.edit.inner.contains(points))
 
     def support(self) -> Support | None:
         """What the part stood on."""

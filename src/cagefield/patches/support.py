@@ -40,9 +40,6 @@ LEAST = 60
 DEEP, HIGH = -4.0, 3.0
 """Heights over a support, in voxels, between which its density is made anew."""
 
-LEVEL = 1.5
-"""Height over a support, in voxels, up to which what is seen of it belongs to it."""
-
 BESIDE = 2
 """Columns beside those that no camera sees that are filled too."""
 
@@ -142,17 +139,16 @@ class Footprint:
         at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
         return world_of(block.field, at + block.low)
 
-    def without(self, seen: NDArray[np.bool_], part: Mask) -> tuple[Footprint, Mask]:
-        """(the footprint whose hole lacks what is seen [N] of its columns, those columns [U,V]).
+    def without(self, seen: NDArray[np.bool_], part: Mask) -> Footprint:
+        """The footprint whose hole lacks what is seen [N] of its columns.
 
-        What a part [X,Y,Z] stands on is not seen.
+        What a part [X,Y,Z] stands on, or comes close to, is not seen: its own crust is there.
         """
         hole = self.stands(np.argwhere(part)) & self.hole
         hole[tuple(np.argwhere(self.hole)[~seen].T)] = True
         # What shows through gaps, and right beside the part, is of no use.
         hole = ndimage.binary_dilation(ndimage.binary_opening(hole), iterations=BESIDE) & self.hole
-        known = self.hole & ~hole
-        return replace(self, hole=hole, around=self.around | known), known
+        return replace(self, hole=hole, around=self.around | (self.hole & ~hole))
 
     def with_hole(self, at: NDArray[np.int64]) -> Footprint:
         """The footprint whose hole also has the columns of block coordinates [N,3] on the support."""
@@ -167,7 +163,7 @@ class Footprint:
     def stands(self, at: NDArray[np.int64]) -> Mask:
         """Columns [U,V] that block coordinates [N,3] of a part stand on, or nearly."""
         u, v, height = self.column(at.astype(np.float64))
-        low = (u >= 0) & (height > LEVEL) & (height < HIGH + 2.0)
+        low = (u >= 0) & (height < HIGH + 2.0)
         out = np.zeros(self.hole.shape, bool)
         out[u[low], v[low]] = True
         return out
@@ -237,22 +233,8 @@ def _crossing(block: Block, support: Support) -> Array:
     return np.asarray(steps[last])
 
 
-def with_seen(
-    block: Block, before: Block, footprint: Footprint, known: Mask, removed: Mask
-) -> tuple[Block, Mask]:
-    """(the block with what was seen of a support in V^c, the vertices [X,Y,Z] of V^c without these).
-
-    `before` is the block with its V^c, `removed` [X,Y,Z], and `known` [U,V] are columns of the footprint.
-    """
-    voxels = np.argwhere(removed)
-    u, v, height = footprint.column(voxels.astype(np.float64))
-    back = np.zeros(block.shape, bool)
-    back[tuple(voxels[(u >= 0) & known[u, v] & (height < LEVEL)].T)] = True
-    return block.with_density(back, before.density[back]), removed & ~back
-
-
 def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
-    """The block with the support going on in its hole; `removed` [X,Y,Z]: V^c's vertices that are empty."""
+    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c."""
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
     known = u >= 0
