@@ -24,10 +24,9 @@ PATIENCE = 120.0
 
 
 @dataclass
-class EditorServer:
-    """A running `cagefield view`."""
+class EditorAt:
+    """An editor, by the link that it printed."""
 
-    process: subprocess.Popen[str]
     link: str
 
     @property
@@ -45,6 +44,13 @@ class EditorServer:
     def headers(self) -> dict[str, str]:
         """What a program sends that is let in."""
         return {"Authorization": f"Bearer {self.token}"}
+
+
+@dataclass
+class EditorServer(EditorAt):
+    """A running `cagefield view`."""
+
+    process: subprocess.Popen[str]
 
     def get(self, path: str) -> Any:
         """The answer to a request for a path, such as "/edits.yaml"."""
@@ -77,7 +83,7 @@ def editor_server(scene: Path, *options: str, errors: IO[str] | None = None) -> 
         line = process.stdout.readline()
         match = re.search(r"https?://\S+", line)
         assert match, line
-        yield EditorServer(process, match.group(0))
+        yield EditorServer(match.group(0), process)
     finally:
         process.terminate()
         process.wait(PATIENCE)

@@ -40,7 +40,7 @@ def server(scene: Path) -> Iterator[tuple[EditorServer, EditorServer]]:
         assert running.process.stdout is not None
         line = running.process.stdout.readline()
         assert line.startswith("to look only: http://")
-        yield running, EditorServer(running.process, line.split()[-1])
+        yield running, EditorServer(line.split()[-1], running.process)
 
 
 def status_of(server: EditorServer, path: str, method: str = "GET", **headers: str) -> int:

@@ -137,14 +137,7 @@ def _run(
     elif str(place / action.place) not in words or "\n" in words or ".part-" in words or ".new-" in words:
         found.line += 1
         found.faults.append(f"{where}: said {words!r}")
-    changed = sorted(key for key, value in before.items() if after.get(key, b"gone") != value)
-    if changed:
-        found.changed += 1
-        found.faults.append(f"{where}: changed {changed}")
-    added = [key for key in after if key not in before]
-    if added:
-        found.left += 1
-        found.faults.append(f"{where}: left {added}")
+    found.compare(where, before, after, [key for key in after if key not in before])
 
 
 def _asked(client: PageClient, action: EditorAction, number: int) -> tuple[bool, str]:

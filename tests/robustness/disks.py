@@ -36,6 +36,18 @@ class Filled:
     """Runs that left something of their own, of which they did not tell."""
     faults: list[str] = field(default_factory=list)
 
+    def compare(
+        self, where: str, before: dict[str, bytes], after: dict[str, bytes], added: list[str]
+    ) -> None:
+        """Counts a run that changed what had been there, or that left the files `added`."""
+        changed = sorted(key for key, value in before.items() if after.get(key, b"gone") != value)
+        if changed:
+            self.changed += 1
+            self.faults.append(f"{where}: changed {changed}")
+        if added:
+            self.left += 1
+            self.faults.append(f"{where}: left {added}")
+
 
 @contextlib.contextmanager
 def disk(folder: Path, size: int = 1 << 30) -> Iterator[Path]:
@@ -126,14 +138,9 @@ def fill(name: str, command: DiskCommand, source: Path, left: int, again: bool, 
         if problem and code == 2:
             found.line += 1
             found.faults.append(f"{where}: {problem}")
-        changed = sorted(key for key, value in before.items() if after.get(key, b"gone") != value)
-        if changed:
-            found.changed += 1
-            found.faults.append(f"{where}: changed {changed}")
-        added = [key for key in after if key not in before and not _is_told(key, command, place, lines)]
-        if added:
-            found.left += 1
-            found.faults.append(f"{where}: left {added}")
+        fresh = (key for key in after if key not in before)
+        added = [key for key in fresh if not _is_told(key, command, place, lines)]
+        found.compare(where, before, after, added)
         return True
 
 

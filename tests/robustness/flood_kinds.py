@@ -6,39 +6,14 @@ import contextlib
 import http.client
 import itertools
 import json
-import re
 import socket
 import threading
 import time
-import urllib.parse
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from websockets.sync.client import ClientConnection, connect
 
-
-@dataclass(frozen=True)
-class EditorAt:
-    """An editor, by the link that it printed."""
-
-    link: str
-
-    @property
-    def port(self) -> int:
-        match = re.search(r":(\d+)/", self.link)
-        assert match
-        return int(match.group(1))
-
-    @property
-    def token(self) -> str:
-        """What the link has after `?token=`."""
-        return urllib.parse.unquote(self.link.partition("?token=")[2])
-
-    @property
-    def headers(self) -> dict[str, str]:
-        """What a program sends that is let in."""
-        return {"Authorization": f"Bearer {self.token}"}
-
+from editor_server import EditorAt
 
 Flood = Callable[[EditorAt, threading.Event], None]
 """Floods an editor until the event is set."""
