@@ -23,7 +23,8 @@ from cagefield.patches.block import block_of, interpolated
 from cagefield.patches.light import Ambience
 from cagefield.patches.making import patch_of
 from cagefield.patches.patcher import wants_patch
-from cagefield.patches.support import membrane
+from cagefield.patches.seen import sight_of
+from cagefield.patches.support import Footprint, Support, membrane
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
@@ -105,6 +106,38 @@ def test_a_box_leaves_no_trace(scenes: tuple[Scene, Scene]) -> None:
         found[fill, relight] = db(seen(scene.with_edits(EditStack([edit]))), seen(truth))
     none, filled, both = found.values()
     assert filled > none + 2.0 and both > filled + 4.0 and both > 30.0, found
+
+
+def test_what_cameras_see_of_a_floor() -> None:
+    """Beside a box, not within it nor beneath the floor; of the hole of a footprint that is left out."""
+    field = room(True)
+    sight = sight_of(lambda camera: Renderer(field).render(camera), cameras(), field.bounds)
+    asked = np.array([[0.1, 0.4, FLOOR], [0.1, 0.0, FLOOR - 0.15], [0.1, 0.0, 0.0]])
+    beside, beneath, within = sight.views_of(asked, 0.05)
+    assert beside >= 4 and beneath == within == 0
+    hole = np.zeros((9, 9), bool)
+    hole[1:8, 1:8] = True
+    support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.eye(3)[:2], np.zeros((0, 3)))
+    footprint = Footprint(
+        support, np.zeros(2, np.int64), hole, ~hole, np.ones_like(hole), np.zeros(hole.shape)
+    )
+    nothing = np.zeros((9, 9, 9), bool)
+    all_but_one = np.ones(49, bool)
+    all_but_one[24] = False
+    left = footprint.without(all_but_one, nothing)
+    assert not left.hole.any() and left.around.all()  # one alone shows through a gap
+    stands = nothing.copy()
+    stands[3:6, 3:6, 3] = True
+    left = footprint.without(np.ones(49, bool), stands)
+    assert left.hole[3:6, 3:6].all() and not left.hole[1, 1] and (left.hole ^ left.around).all()
+    # Where the support has no surface nothing is known of it.
+    bare = dataclasses.replace(footprint, surfaced=~hole)
+    assert (bare.without(np.ones(49, bool), nothing).hole == hole).all()
+    # Where cameras look through it, it does not go on.
+    air = np.zeros((7, 7), bool)
+    air[:, :3] = air[6, 6] = True
+    left = footprint.without_air(air.reshape(-1))
+    assert not left.hole[2:7, 1:4].any() and left.hole[1:8, 4:8].all()
 
 
 def test_units_make_no_difference(scenes: tuple[Scene, Scene]) -> None:

@@ -292,7 +292,7 @@ def shaded() -> Scene:
     """A ball of small voxels, whose colours are said to follow its openness."""
     field = ball_field(resolution=65)
     scene = Scene(field)
-    scene.patcher.__dict__["ambience"] = Ambience(reaches_of(field), (0.1, 0.2, 0.3, 0.3))
+    scene.patcher.__dict__["ambience"] = Ambience(reaches_of(field), (0.1, 0.2, 0.2, 0.2, 0.2))
     return scene
 
 

@@ -20,23 +20,15 @@ from cagefield.edits import Edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import SOLID, Block, block_of
+from cagefield.patches.block import Block, block_of
 from cagefield.patches.extent import RIM, swept
-from cagefield.patches.light import (
-    Ambience,
-    Lighting,
-    distance_in,
-    lit_vertices,
-)
-from cagefield.typing import Array, Mask
-from cagefield.warps.device_stack import DeviceStack
+from cagefield.patches.light import Ambience, Lighting
+from cagefield.patches.surfels import surfels_of
+from cagefield.typing import Array
 from cagefield.warps.forward import to_deformed
 
 FINEST = 128
 """Vertices along the longest axis of the grid that the light is worked out on."""
-
-LATTICE = 32
-"""Nodes an axis of the map by which it is found out what is solid in deformed space."""
 
 UNSEEN = 0.03
 """The log of a change of light that is left out."""
@@ -53,16 +45,14 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, 
     """(a coarser block, what the light on it is multiplied by) once a continuous edit has bent a block."""
     assert edit.outer is not None
     coarse = block.pooled(max(1, -(-max(block.shape) // FINEST))).reaching(edit.outer.aabb)
-    where = lit_vertices(coarse)
-    points, normals = coarse.positions(where), coarse.normals[where].astype(np.float64)
-    moved = to_deformed(edit.exact_warp, points, coarse=True)
-    # Normals go with the transposed inverse of the map's Jacobian.
-    turned = np.einsum("nji,nj->ni", np.linalg.inv(moved.jacobian), normals)
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)
-    old, new = distance_in(coarse, coarse.solid), distance_in(coarse, _solid_after(coarse, edit))
-    log = ambience.log_light(new, moved.points, turned) - ambience.log_light(old, points, normals)
-    log[np.abs(log) < UNSEEN] = 0.0
-    return coarse, Lighting(where, log).smoothed(coarse)
+    surface = surfels_of(coarse)
+    if not len(surface.points):
+        return coarse, Lighting(np.zeros(coarse.shape, bool), np.zeros(0))
+    moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
+    bent = surface.turned(moved.points, moved.jacobian)
+    log = ambience.log_light([bent], bent) - ambience.log_light([surface], surface)
+    log = np.where(np.abs(log) < UNSEEN, 0.0, log)
+    return coarse, Lighting.of(coarse, surface, log, 2.0 * max(coarse.spacing))
 
 
 def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Block:
@@ -98,18 +88,3 @@ def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:
     low, high = patch.region.aabb
     nothing = Cage.box(low, 1e-6 * (high - low))
     return Edit.delete(nothing, name=edit.name).replace(fill="none", relight="none", patch=patch)
-
-
-def _solid_after(block: Block, edit: Edit) -> Mask:
-    """What is solid [X,Y,Z] of a block once the edit has bent it."""
-    assert edit.outer is not None
-    solid = block.solid.copy()
-    points = block.positions(np.ones(solid.shape, bool))
-    inside = np.flatnonzero(edit.outer.contains(points))
-    stack = DeviceStack.from_stack(EditStack([edit.replace(lattice=LATTICE)]))
-    asked = points[inside].astype(np.float32)
-    canonical, *_ = stack.to_canonical(
-        asked, np.broadcast_to(np.array([0.0, 0.0, 1.0], np.float32), asked.shape)
-    )
-    solid.reshape(-1)[inside] = block.lookup(block.depth, canonical.astype(np.float64)) > SOLID
-    return solid

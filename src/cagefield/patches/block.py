@@ -30,6 +30,9 @@ NOTICED = 0.01
 SOLID = 0.3
 """Optical depth per voxel from which on a vertex counts as solid."""
 
+FOG = 0.12
+"""The same of a vertex that is more than air."""
+
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -68,6 +71,22 @@ class Block:
         return np.asarray(self.depth > SOLID)
 
     @cached_property
+    def matter(self) -> Mask:
+        """[X,Y,Z], True where there is something: what is solid, the fog in its gaps, and what these enclose.
+
+        Photos say nothing of what is behind a surface: fields are hollow there, or foggy.
+        """
+        solid = np.pad(self.solid, 2)
+        closed = ndimage.binary_closing(solid, ndimage.generate_binary_structure(3, 2))[2:-2, 2:-2, 2:-2]
+        return np.asarray(ndimage.binary_fill_holes(self.solid | (closed & (self.depth > FOG))))
+
+    @cached_property
+    def surface(self) -> Mask:
+        """[X,Y,Z], the outermost solid vertices, where the normal is known."""
+        known = (self.normals**2).sum(axis=-1) > 0.25
+        return np.asarray(self.solid & ndimage.binary_dilation(~self.matter) & known)
+
+    @cached_property
     def normals(self) -> Float32:
         """Unit normals [X,Y,Z,3], against the gradient of a smoothed opacity; 0 where that is flat."""
         if min(self.shape) < 3:
@@ -84,9 +103,13 @@ class Block:
 
     def lookup(self, values: AnyField, points: Array, outside: float = 0.0) -> NDArray[np.float64]:
         """Values [X,Y,Z] of the block interpolated at world positions [N,3]."""
+        at = self.coordinates(points).T
+        return np.asarray(ndimage.map_coordinates(values, at, np.float64, order=1, cval=outside))
+
+    def coordinates(self, points: Array) -> Array:
+        """Coordinates [N,3] of world positions [N,3] in the block, its vertices apart by 1."""
         middle = 0.5 * (self.stride - 1)
-        g = (self.field.grid_coordinates(points) - self.low - middle) / self.stride
-        return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=outside))
+        return np.asarray((self.field.grid_coordinates(points) - self.low - middle) / self.stride)
 
     @property
     def spacing(self) -> tuple[float, float, float]:
@@ -197,8 +220,8 @@ def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacit
     """The block that holds a world-space box [2,3], as edits make the field.
 
     Where these leave the field alone its vertices are taken as they are. Where they move it, density and
-    colours are interpolated, and colours turned; where they leave nothing, density is 0. What they stretch is
-    thinner where they `preserve_opacity`, by the mean over directions, |det J|^(1/3).
+    colours are interpolated, and colours turned; where they leave nothing there is neither. What they stretch
+    is thinner where they `preserve_opacity`, by the mean over directions, |det J|^(1/3).
     """
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
     g = field.grid_coordinates(corners)
@@ -215,7 +238,9 @@ def block_of(field: VoxelField, below: EditStack, box: Array, *, preserve_opacit
         for first in range(0, block.density.size, AT_ONCE)
     ]
     rows, raw, sh = (np.concatenate(column) for column in zip(*parts, strict=True))
-    density, slot, stored = block.density.copy(), block.slot.copy(), raw > 0.0
+    # Empty vertices beside a surface keep their colours, and what makes it sharp: densities below zero.
+    stored = (raw != 0.0) | sh.any(axis=(1, 2))
+    density, slot = block.density.copy(), block.slot.copy()
     density.flat[rows], slot.flat[rows] = raw, -1
     slot.flat[rows[stored]] = len(block.sh) + np.arange(int(stored.sum()))
     return replace(block, density=density, slot=slot, sh=np.concatenate([block.sh, sh[stored]]))

@@ -1,7 +1,8 @@
 """The rim of a part blends into what it is put into: no seam where cuts go through matter.
 
 In a rim along the faces of V^c, so many voxels wide, the part's density and colour fade into those of the
-place where it is put down: w of its own and 1 - w of that place's, w rising from 0 at the faces to 1.
+place where it is put down: w of its own and 1 - w of that place's, w rising from 0 at the faces to 1. The
+part gets no thinner by this: what ends in the rim, or stands free at its new place, stays whole.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from cagefield.warps.inner_map import HexahedronMap
 
 BESIDE = 2
 """Vertices beyond the faces that are read between vertices within, and two more."""
+
+OWN = 0.05
+"""How much of its own colour what stays whole has at the faces, at least, beside matter as dense."""
 
 
 def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Mask, width: float) -> Block:
@@ -50,12 +54,14 @@ def feathered(part: Block, there: Block, inner: Cage, deformed: Cage, inside: Ma
     u, _, v = np.linalg.svd(jacobian)
     sh = rotated_sh(sh, np.asarray(np.swapaxes(u @ v, 1, 2)))
     share = own[rim]
-    before = np.maximum(part.density[rim], 0.0) * share
-    new = (1.0 - share) * density
-    mixed = part.with_density(rim, (before + new).astype(np.float32), slots=True)
+    whole = np.maximum(part.density[rim], 0.0)
+    before, new = whole * share, (1.0 - share) * density
+    # Beside nothing it is left alone, also below zero, which makes its surface sharp.
+    dense = np.where(new > 0.0, np.maximum(before + new, whole), part.density[rim])
+    mixed = part.with_density(rim, dense.astype(np.float32), slots=True)
     rows, had = mixed.slot[rim], part.slot[rim] >= 0
     # What is empty there has no colour that would count: a surface beside it keeps its own.
-    weight = np.where(had, np.maximum(before, 1e-6), 0.0)
+    weight = np.where(had, np.maximum(before, OWN * whole + 1e-6), 0.0)
     other = np.where(new > 1e-6, new, np.where(had, 0.0, 1e-6))
     coefficients = mixed.sh.copy()
     total = np.maximum(weight + other, 1e-12)

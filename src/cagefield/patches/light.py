@@ -20,23 +20,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, optimize
+from scipy import optimize
 
 from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
-from cagefield.patches.seen import SeenPairs
-from cagefield.patches.sun import Distance, Sun, sun_of
-from cagefield.typing import AnyArray, Array, Mask
+from cagefield.patches.seen import Sight
+from cagefield.patches.sun import Sun, sun_of
+from cagefield.patches.surfels import Surfels, distance_to, gridded
+from cagefield.typing import Array, Mask
 
-REACHES = (0.01, 0.02, 0.04, 0.08)
+REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD = (0.1, 0.2, 0.2, 0.15), 0.2
+USUAL, SPREAD = (0.05, 0.15, 0.2, 0.15, 0.1), 0.2
 """Weights that are usual where light comes from all around, and their standard deviation."""
 
-ALIKE = 10.0
-"""Pairs that count as one."""
+ALIKE = 300.0
+"""Pairs that count as one: neighbours, and other views, see the same texture."""
+
+HUBER = 3.0
+"""Standard deviations of noise from which on a change counts by its size, no longer by its square."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -47,14 +51,14 @@ SHOWING = 0.1
 ENOUGH = 150
 """Pairs from which weights are fitted, at least."""
 
-FINEST = 128
-"""Vertices along the longest axis of the grid on which distances in a whole field are found."""
+FINE = 0.4
+"""Cells of surfaces that light is found out about with, as a share of the smallest reach."""
 
-FAR = 1e9
-"""A distance beyond all reaches."""
+AMONG = 8
+"""Surface elements that the light on a vertex is the mean of."""
 
-SMOOTH = 2.0
-"""Standard deviation, in voxels along the surface, by which ratios of openness are smoothed."""
+DEEP = 10.0
+"""How far from a surface what shows is lit as it is; voxels."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +87,13 @@ class Ambience:
         """Directions [K,3] in which shadows fall that go along."""
         return np.zeros((0, 3)) if self.sun is None else -np.array([self.sun.direction])
 
-    def log_light(self, distance: Distance, points: Array, normals: AnyArray) -> Array:
-        """The log of how bright surface points [N,3] with normals [N,3] are, [N]."""
-        log = np.zeros(len(points))
+    def log_light(self, around: Sequence[Surfels], at: Surfels) -> Array:
+        """The log of how bright surface elements [N] are among all the surfaces around, [N]."""
+        log = np.zeros(len(at.points))
         if sum(self.weights) > SHOWING:
-            log += self.log_openness(nearness(distance, points, normals, self.reaches))
+            log += self.log_openness(nearness(around, at, self.reaches))
         if self.sun is not None:
-            log += self.sun.log_light(distance, points, normals)
+            log += self.sun.log_light(gridded(around, FINE * self.sun.near), at.points, at.normals)
         return log
 
     def log_openness(self, nearness: Array) -> Array:
@@ -97,36 +101,10 @@ class Ambience:
         return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
 
 
-def distance_in(block: Block, solid: Mask) -> Distance:
-    """The distance to what is solid [X,Y,Z] of a block; far outside of the block."""
-    if not solid.any():
-        return lambda points: np.full(len(points), FAR)
-    values = ndimage.distance_transform_edt(~solid, sampling=block.spacing)
-    return lambda points: block.lookup(values, points, outside=FAR)
-
-
-def distance_in_field(field: VoxelField) -> Distance:
-    """The distance to what is solid in all of a field, on a grid of at most FINEST vertices an axis."""
-    stride = -(-max(field.resolution) // FINEST)
-    solid = np.zeros(field.resolution, bool)
-    solid.reshape(-1)[_solid_vertices(field)] = True
-    solid = np.pad(solid, [(0, -n % stride) for n in field.resolution])
-    nx, ny, nz = (n // stride for n in solid.shape)
-    pooled = solid.reshape(nx, stride, ny, stride, nz, stride).any(axis=(1, 3, 5))
-    values = np.full(pooled.shape, FAR)
-    if pooled.any():
-        values = ndimage.distance_transform_edt(~pooled, sampling=tuple(stride * field.voxel_size))
-
-    def lookup(points: Array) -> NDArray[np.float64]:
-        g = (field.grid_coordinates(points) - 0.5 * (stride - 1)) / stride
-        return np.asarray(ndimage.map_coordinates(values, g.T, np.float64, order=1, cval=FAR))
-
-    return lookup
-
-
-def nearness(distance: Distance, points: Array, normals: AnyArray, reaches: Sequence[float]) -> Array:
-    """max(0, 1 - D(p + r n) / r) [N,R] at points [N,3] with normals [N,3], for each reach r."""
-    found = [distance(points + reach * normals) / reach for reach in reaches]
+def nearness(around: Sequence[Surfels], at: Surfels, reaches: Sequence[float]) -> Array:
+    """max(0, 1 - D(p + r n) / r) [N,R] at surface elements (p, n) [N], for each reach r."""
+    distance = distance_to(around)
+    found = [distance(at.points + reach * at.normals, reach) / reach for reach in reaches]
     return np.clip(1.0 - np.stack(found, axis=1), 0.0, 1.0)
 
 
@@ -147,25 +125,26 @@ def reaches_of(field: VoxelField) -> tuple[float, ...]:
     return tuple(share * float(np.linalg.norm(span)) for share in REACHES)
 
 
-def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
+def ambience_of(field: VoxelField, sight: Sight) -> Ambience:
     """The weights that explain the colours of a field's surfaces, as they are seen."""
-    nothing = Ambience((), ())
-    if len(pairs.points) < ENOUGH or _solid_vertices(field).size < ENOUGH:
-        return nothing
+    pairs = sight.pairs
+    if len(pairs.log_change) < ENOUGH or _solid_vertices(field).size < ENOUGH:
+        return Ambience((), ())
     reaches = reaches_of(field)
-    distance = distance_in_field(field)
-    first = nearness(distance, pairs.points, pairs.normals, reaches)
-    second = nearness(distance, pairs.other_points, pairs.other_normals, reaches)
+    around = [sight.surface.thinned(FINE * reaches[0])]
+    first, second = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
     change = pairs.log_change
 
     usual = np.array(USUAL)
-    # Neighbouring pairs see the same texture.
-    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826 * np.sqrt(ALIKE)
+    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826
 
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        told = ambience.log_openness(second) - ambience.log_openness(first) - change
-        return np.concatenate([told / max(noise, 1e-3), (weights - usual) / SPREAD])
+        told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / max(noise, 1e-3)
+        # Edges of textures are further off than noise, of either sign: Huber's loss, smoothed.
+        edge = HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (told / HUBER) ** 2) - 1.0) / ALIKE)
+        robust = np.sign(told) * edge
+        return np.concatenate([robust, (weights - usual) / SPREAD])
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
@@ -173,23 +152,23 @@ def ambience_of(field: VoxelField, pairs: SeenPairs) -> Ambience:
 
 
 def with_sun(
-    ambience: Ambience, field: VoxelField, pairs: SeenPairs, direction: Sequence[float] | None
+    ambience: Ambience, field: VoxelField, sight: Sight, direction: Sequence[float] | None
 ) -> Ambience:
     """The ambience and the dominant light that explains what openness does not, if one does.
 
     `direction` [3] is that to the light, None where it is to be found.
     """
-    reaches = reaches_of(field)
-    if len(pairs.points) < ENOUGH or not reaches:
+    reaches, pairs = reaches_of(field), sight.pairs
+    if len(pairs.log_change) < ENOUGH or not reaches:
         return ambience
-    distance = distance_in_field(field)
     change = pairs.log_change
     if sum(ambience.weights) > SHOWING:
-        near = nearness(distance, pairs.points, pairs.normals, reaches)
-        other = nearness(distance, pairs.other_points, pairs.other_normals, reaches)
+        around = [sight.surface.thinned(FINE * reaches[0])]
+        near, other = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
         change = change - (ambience.log_openness(other) - ambience.log_openness(near))
-    both = pairs.points, pairs.normals, pairs.other_points, pairs.other_normals
-    return replace(ambience, sun=sun_of(distance, both, change, reaches, direction))
+    distance = gridded([sight.surface], reaches[0])
+    sun = sun_of(distance, pairs.first, pairs.second, change, reaches, direction)
+    return replace(ambience, sun=sun)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,15 +178,38 @@ class Lighting:
     where: Mask
     log_ratio: Array
 
-    def smoothed(self, block: Block) -> Lighting:
-        """The same, smoothed along surfaces."""
-        weight = np.zeros(block.shape)
-        weight[self.where] = np.minimum(block.depth[self.where], 1.0) + 1e-3
-        values = np.zeros(block.shape)
-        values[self.where] = self.log_ratio * weight[self.where]
-        total = ndimage.gaussian_filter(weight, SMOOTH)[self.where]
-        smooth = ndimage.gaussian_filter(values, SMOOTH)[self.where] / np.maximum(total, 1e-9)
-        return replace(self, log_ratio=smooth)
+    @classmethod
+    def of(cls, block: Block, surface: Surfels, logs: Array, apart: float) -> Lighting:
+        """The light on a block's coloured vertices, by the logs [N] of its surface, so far apart.
+
+        What lies within DEEP of a surface, mostly beneath it, shows through it, as fields are foggy there.
+        """
+        changed = np.flatnonzero(logs)
+        where, log = np.zeros(block.shape, bool), np.zeros(0)
+        if len(changed):
+            reach = DEEP * max(block.spacing)
+            g = block.coordinates(surface.points[changed])
+            low = np.maximum(np.floor(g.min(axis=0) - DEEP).astype(np.int64), 0)
+            high = np.ceil(g.max(axis=0) + DEEP).astype(np.int64) + 1
+            part = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
+            where[part] = block.slot[part] >= 0
+            found, rows = surface.nearest(block.positions(where), AMONG, reach)
+            near = np.isfinite(found[:, 0])
+            found, rows = found[near], rows[near]
+            where[where] = near
+            rows = np.where(np.isfinite(found), rows, rows[:, :1])
+            # Both sides of what is thin: its colours are those of all vertices around.
+            weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / apart**2)
+            log = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
+        return cls(where, log)
+
+    def plus(self, other: Lighting) -> Lighting:
+        """Both lights, on vertices of the same block."""
+        where = self.where | other.where
+        dense = np.zeros(where.shape)
+        for each in (self, other):
+            dense[each.where] += each.log_ratio
+        return Lighting(where, dense[where])
 
     def at(self, block: Block, points: Array) -> Array:
         """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
@@ -228,8 +230,3 @@ class Lighting:
         out = np.zeros(block.shape)
         out[self.where] = self.log_ratio
         return out
-
-
-def lit_vertices(block: Block) -> Mask:
-    """Vertices [X,Y,Z] whose colour shows, also those beside a surface, and whose normal is known."""
-    return np.asarray((block.slot >= 0) & ((block.normals**2).sum(axis=-1) > 0.25))

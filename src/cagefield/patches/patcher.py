@@ -19,7 +19,7 @@ from cagefield.patches.joining import joined
 from cagefield.patches.light import Ambience, ambience_of, with_sun
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
-from cagefield.patches.seen import SeenPairs, seen_pairs
+from cagefield.patches.seen import Sight, sight_of
 from cagefield.patches.splats import bent_splats, splat_patch_of
 from cagefield.patches.voxelised import voxelised_whole
 from cagefield.rendering.render_result import RenderResult
@@ -112,7 +112,7 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness."""
-        return ambience_of(self._voxels, self._pairs)
+        return ambience_of(self._voxels, self._sight)
 
     def _lit(self, edit: Edit) -> Ambience | None:
         """What goes along of the light of an edit; None where all stays."""
@@ -122,7 +122,7 @@ class Patcher:
             return self.ambience
         direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
         if direction not in self._suns:
-            self._suns[direction] = with_sun(self.ambience, self._voxels, self._pairs, direction)
+            self._suns[direction] = with_sun(self.ambience, self._voxels, self._sight, direction)
         return self._suns[direction]
 
     @cached_property
@@ -131,8 +131,8 @@ class Patcher:
         return self._field if isinstance(self._field, VoxelField) else voxelised_whole(self._field)
 
     @cached_property
-    def _pairs(self) -> SeenPairs:
-        return seen_pairs(self._render, self._cameras, self._field.bounds)
+    def _sight(self) -> Sight:
+        return sight_of(self._render, self._cameras, self._field.bounds)
 
     def _patch(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
@@ -156,13 +156,21 @@ class Patcher:
         if not wants_patch(edit, moving, feathers=isinstance(self._field, VoxelField)):
             return None
         ambience = lit if relit else None
+        looks = relit or (edit.fill == "surroundings" and not edit.keep_source)
+        sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
         patch: Patch | SplatPatch
         if isinstance(self._field, VoxelField):
             patch = patch_of(
-                self._field, stack, edit, ambience, settled=not moving, preserve_opacity=preserve_opacity
+                self._field,
+                stack,
+                edit,
+                ambience,
+                settled=not moving,
+                sight=sight,
+                preserve_opacity=preserve_opacity,
             )
         else:
-            patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving)
+            patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving, sight=sight)
         self._keep(key, patch)
         return patch
 

@@ -30,6 +30,7 @@ from cagefield.patches.block import Block, block_of, interpolated, world_of
 from cagefield.patches.extent import patch_box
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.making import Made, made_of
+from cagefield.patches.seen import Sight
 from cagefield.patches.support import KNOTS, Support
 from cagefield.patches.voxelised import voxel_for, voxelised
 from cagefield.quaternions import rotation_matrices
@@ -72,7 +73,13 @@ GAINS = (0.1, 10.0)
 
 
 def splat_patch_of(
-    field: SplatField, below: EditStack, edit: Edit, ambience: Ambience | None, *, settled: bool = True
+    field: SplatField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    sight: Sight | None = None,
 ) -> SplatPatch:
     """The patch of a discrete edit of splats under the edits below it; arguments as for `making.made_of`."""
     # Splats overlap: their seams are soft.
@@ -93,7 +100,9 @@ def splat_patch_of(
     if edit.source is not None:
         pasted = _around(field, moved_splats(field, below.append(edit)), box)
         after = voxelised(where_they_are(field, pasted), _box_of(edit, box), voxel)
-    made = made_of(grid, EditStack(), edit, ambience, settled=settled, after=after)
+    made = made_of(
+        grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
+    )
     return _Splats.of(field, splats, grid, moved).patch(field, edit, made)
 
 

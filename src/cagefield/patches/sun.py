@@ -15,16 +15,13 @@ shadows in raymarched SDFs" (2010), for V.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cagefield.patches.surfels import Distance, Surfels
 from cagefield.typing import AnyArray, Array
-
-Distance = Callable[[Array], NDArray[np.float64]]
-"""Distances [N] in world units of points [N,3] to the nearest solid."""
 
 SOFT = 0.12
 """Width of the light: the tangent of the half angle that it takes of the sky."""
@@ -86,20 +83,20 @@ def visible(
 
 def sun_of(
     distance: Distance,
-    pairs: tuple[Array, Array, Array, Array],
+    first: Surfels,
+    second: Surfels,
     change: Array,
     reaches: Sequence[float],
     direction: Sequence[float] | None = None,
 ) -> Sun | None:
-    """The light that explains changes [N] of log colour between surface points; None where none does.
+    """The light that explains changes [N] of log colour between surface elements [N]; None where none does.
 
-    pairs: points and normals [N,3] of the first, and of the second. `direction` [3]: where that is known, its
-    share is found.
+    `direction` [3]: where that is known, its share is found.
     """
     near, far = reaches[0], 6.0 * reaches[-1]
     every = np.arange(len(change))
     some = np.random.default_rng(0).choice(every, min(PAIRS, len(every)), replace=False)
-    first, first_n, second, second_n = (part[some] for part in pairs)
+    pairs = first.take(some), second.take(some)
     wanted = change[some]
     wanted = wanted - np.median(wanted)
     wanted = np.clip(wanted, -MOST, MOST)
@@ -107,8 +104,8 @@ def sun_of(
     best, least = None, np.inf
     for s in tried / np.linalg.norm(tried, axis=1, keepdims=True):
         light = [
-            np.maximum(n @ s, 0.0) * visible(distance, p, n, s, near, far)
-            for p, n in ((first, first_n), (second, second_n))
+            np.maximum(at.normals @ s, 0.0) * visible(distance, at.points, at.normals, s, near, far)
+            for at in pairs
         ]
         for share in SHARES:
             a, b = (np.log(1.0 - share + share * each) for each in light)

@@ -11,7 +11,7 @@ Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,9 @@ from scipy import ndimage, sparse
 from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import factorized
 
-from cagefield.patches.block import Block
-from cagefield.typing import Array, Mask
+from cagefield.patches.block import Block, world_of
+from cagefield.sh import sh_basis
+from cagefield.typing import AnyArray, Array, Float32, Mask
 
 TRIALS = 200
 """Planes that are tried."""
@@ -31,11 +32,29 @@ NEAR = 1.5
 ALONG = 0.9
 """Least cosine between its normal and the plane's."""
 
+ROUGH = 0.6
+"""The same of all that lie on it, where normals may be noise."""
+
+AGAIN = 4
+"""Planes that are looked at."""
+
+WIDE = 3
+"""Half the least width of a support, voxels."""
+
 LEAST = 60
 """Vertices of a support, at least."""
 
 DEEP, HIGH = -4.0, 3.0
 """Heights over a support, in voxels, between which its density is made anew."""
+
+BESIDE = 2
+"""Columns beside those that no camera sees that are filled too."""
+
+VIEWS = 32
+"""Directions from which colours are looked at."""
+
+FIRM = 0.01
+"""How firmly colours are held to be the same from all of them."""
 
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
@@ -48,7 +67,7 @@ class Support:
     point: Array
     normal: Array
     axes: Array
-    members: NDArray[np.int64]
+    members: Array
 
     def local(self, at: Array) -> tuple[Array, Array]:
         """(u and v [N,2], height [N]) of block coordinates [N,3]."""
@@ -56,17 +75,31 @@ class Support:
         return away @ self.axes.T, away @ self.normal
 
 
-def support_of(block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int = 0) -> Support | None:
-    """The plane through surface vertices of the ring [X,Y,Z] that the part [X,Y,Z] stands on, or just over.
+def support_of(
+    part: Mask, at: Array, normals: Array, ring: NDArray[np.bool_], *, seed: int = 0
+) -> Support | None:
+    """The plane through surfaces of the ring [N] that the part [X,Y,Z] stands on, or just over.
 
-    Each vertex counts by how near the part comes to it from above. All vertices of the surface [X,Y,Z] on
-    the plane are its members.
+    at, normals [N,3]: block coordinates of all surfaces, and their normals. Each counts by how near the part
+    comes to it from above. All that are on the plane are its members.
     """
-    at = np.argwhere(ring).astype(np.float64)
-    content = np.argwhere(part)
-    if len(at) < LEAST or not len(content):
-        return None
-    normals = block.normals[ring]
+    ring, content = ring.copy(), np.argwhere(part).astype(np.float64)
+    for _ in range(AGAIN):
+        if ring.sum() < LEAST or not len(content):
+            break
+        found = _plane_of(part, content, at[ring], normals[ring], seed)
+        if found is None:
+            break
+        on = np.abs((at - found[0]) @ found[1]) < NEAR
+        support = _support(*found, at, normals)
+        if _is_wide(support.local(at[on & (normals @ found[1] > ROUGH)])[0]):
+            return support
+        ring &= ~on
+    return None
+
+
+def _plane_of(part: Mask, content: Array, at: Array, normals: Array, seed: int) -> tuple[Array, Array] | None:
+    """(a point [3], the normal [3]) of the plane of surfaces [N] that the part's content [M,3] stands on."""
     size = float(np.median(np.ptp(content, axis=0))) + 1.0
     reach = max(4.0, 0.25 * size)
     from_part = ndimage.distance_transform_edt(~part)
@@ -96,25 +129,87 @@ def support_of(block: Block, part: Mask, ring: Mask, surface: Mask, *, seed: int
         centre = at[member].mean(axis=0)
         spread = np.linalg.eigh(np.cov((at[member] - centre).T))[1][:, 0]
         n = spread if spread @ n > 0.0 else -spread
+    return centre, n
+
+
+def _support(centre: Array, n: Array, at: Array, normals: Array) -> Support:
+    """The support on a plane with normal n [3], of surfaces [N]."""
     aside = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     aside /= np.linalg.norm(aside)
-    every = np.argwhere(surface)
-    member = (np.abs((every - centre) @ n) < 2.0 * NEAR) & (block.normals[surface] @ n > ALONG)
+    member = (np.abs((at - centre) @ n) < 2.0 * NEAR) & (normals @ n > ROUGH)
     # Columns begin at a vertex: between two of them, half of the vertices would share a column.
-    vertex = at[np.argmin(((at - centre) ** 2).sum(axis=1))]
+    vertex = np.round(centre)
     point = vertex + ((centre - vertex) @ n) * n
-    return Support(point, n, np.stack([aside, np.cross(n, aside)]), every[member])
+    return Support(point, n, np.stack([aside, np.cross(n, aside)]), at[member])
+
+
+def _is_wide(uv: Array) -> bool:
+    """False for columns [N,2] that form nothing but strips: a plane that leans on edges."""
+    cell = np.round(uv).astype(np.int64)
+    cell -= cell.min(axis=0)
+    found = np.zeros(cell.max(axis=0) + 2 * WIDE + 1, bool)
+    found[tuple((cell + WIDE).T)] = True
+    found = ndimage.binary_closing(found, iterations=2)
+    return int(ndimage.binary_opening(found, iterations=WIDE).sum()) >= LEAST
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """Columns of a support on a grid [U,V] a voxel apart: those in the hole, and those around it."""
+    """Columns of a support on a grid [U,V] a voxel apart: those in the hole, and those around it.
+
+    surfaced [U,V]: those where the support has a surface; height [U,V] of that, also where it goes on.
+    """
 
     support: Support
     first: NDArray[np.int64]
     hole: Mask
     around: Mask
+    surfaced: Mask
     height: Array
+
+    def points(self, block: Block) -> Array:
+        """World positions [N,3] of the hole's columns on the surface."""
+        cells = np.argwhere(self.hole)
+        uv, height = cells + self.first, self.height[tuple(cells.T)]
+        at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
+        return world_of(block.field, at + block.low)
+
+    def without_air(self, air: NDArray[np.bool_]) -> Footprint:
+        """The footprint whose hole lacks columns [N] where cameras see that no support goes on."""
+        gone = np.zeros(self.hole.shape, bool)
+        gone[tuple(np.argwhere(self.hole)[air].T)] = True
+        # Single rays that pass are noise.
+        gone = ndimage.binary_opening(ndimage.binary_closing(gone)) & self.hole
+        return replace(self, hole=self.hole & ~gone)
+
+    def without(self, known: NDArray[np.bool_], part: Mask) -> Footprint:
+        """The footprint whose hole lacks what is known [N] of its columns.
+
+        Only columns where the support has a surface can be. What a part [X,Y,Z] stands on, or comes close to,
+        is not: its own crust is there.
+        """
+        kept = np.zeros(self.hole.shape, bool)
+        kept[tuple(np.argwhere(self.hole)[known].T)] = True
+        kept &= self.surfaced & ~self.stands(np.argwhere(part))
+        # What shows through gaps, and right beside the part, is of no use.
+        wide = np.pad(kept | self.around, BESIDE + 1, mode="edge")
+        kept = ndimage.binary_opening(ndimage.binary_closing(wide), iterations=BESIDE)
+        kept = kept[BESIDE + 1 : -BESIDE - 1, BESIDE + 1 : -BESIDE - 1]
+        hole = ndimage.binary_dilation(self.hole & ~kept, iterations=BESIDE) & self.hole
+        return replace(self, hole=hole, around=self.around | (self.hole & ~hole))
+
+    def holds(self, at: Array) -> NDArray[np.bool_]:
+        """Which block coordinates [N,3] lie at the surface of the hole's columns, or near it."""
+        u, v, height = self.column(at)
+        return np.asarray((u >= 0) & self.hole[u, v] & (np.abs(height) < HIGH))
+
+    def stands(self, at: NDArray[np.int64]) -> Mask:
+        """Columns [U,V] that block coordinates [N,3] of a part stand on, or nearly."""
+        u, v, height = self.column(at.astype(np.float64))
+        low = (u >= 0) & (height < HIGH + 2.0)
+        out = np.zeros(self.hole.shape, bool)
+        out[u[low], v[low]] = True
+        return out
 
     def column(self, at: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """(u [N], v [N], height over the support [N]) of block coordinates [N,3]; u is -1 outside."""
@@ -126,28 +221,41 @@ class Footprint:
         return np.where(inside, cell[:, 0], -1), cell[:, 1], height
 
 
-def footprint_of(block: Block, support: Support, part: Mask, shaded: Mask) -> Footprint | None:
-    """The columns under the part, and of the surface vertices [X,Y,Z] that it shaded from close by."""
-    uv, own = support.local(support.members.astype(np.float64))
+def footprint_of(support: Support, part: Mask, close: Array, unsure: Array) -> Footprint | None:
+    """The columns under the part, and those of the surfaces close to it, and of those in deep shade.
+
+    close, unsure: block coordinates [N,3] of these.
+    """
+    uv, own = support.local(support.members)
     content = np.argwhere(part).astype(np.float64)
     where, above = support.local(content)
     tall = float(np.percentile(above, 98))
     low = where[above < max(4.0, 0.25 * tall)]
-    dark = support.local(np.argwhere(shaded).astype(np.float64))
+    dark = support.local(close)
     low = np.concatenate([low, dark[0][np.abs(dark[1]) < 2.0 * NEAR]])
     if len(low) < 4:
         return None
-    every = np.concatenate([uv, low])
+    deep, above = support.local(unsure)
+    deep = deep[np.abs(above) < 2.0 * NEAR]
+    every = np.concatenate([uv, low, deep])
     first = np.floor(every.min(axis=0)).astype(np.int64) - 3
     size = np.ceil(every.max(axis=0)).astype(np.int64) + 4 - first
     hole, around = np.zeros(size, bool), np.zeros(size, bool)
     hole[tuple((np.round(low).astype(np.int64) - first).T)] = True
-    hole = ndimage.binary_dilation(ndimage.binary_closing(hole, iterations=2), iterations=2)
+    # Parts are hollow.
+    hole = ndimage.binary_fill_holes(ndimage.binary_closing(hole, iterations=2))
+    hole = ndimage.binary_dilation(hole, iterations=2)
+    shade = np.zeros(size, bool)
+    shade[tuple((np.round(deep).astype(np.int64) - first).T)] = True
     around[tuple((np.round(uv).astype(np.int64) - first).T)] = True
-    around = ndimage.binary_closing(np.pad(around, 2), iterations=2)[2:-2, 2:-2] & ~hole
-    # What the support closes around belongs to it: a disc as wide as the hole is deep decides.
+    around = ndimage.binary_closing(np.pad(around, 2), iterations=2)[2:-2, 2:-2]
+    surfaced = around
+    hole |= ndimage.binary_closing(shade, iterations=2) & around
+    # What the support closes around belongs to it: a disc as wide as the hole is deep decides. Its own
+    # surface in the hole counts: beside an edge of the support there may be none around.
     reach = int(np.ceil(ndimage.distance_transform_edt(np.pad(hole, 1)).max())) + 3
     wide = np.pad(around, reach)
+    around = around & ~hole
     grown = ndimage.distance_transform_edt(~wide) <= reach
     closed = (ndimage.distance_transform_edt(grown) > reach)[reach:-reach, reach:-reach]
     hole &= closed
@@ -159,26 +267,11 @@ def footprint_of(block: Block, support: Support, part: Mask, shaded: Mask) -> Fo
     if len(knots) < LEAST:
         return None
     knots = chance.choice(knots, min(KNOTS, len(knots)), replace=False)
-    surface = own + _crossing(block, support)
-    spline = RBFInterpolator(uv[knots], surface[knots], neighbors=64, smoothing=4.0)
+    spline = RBFInterpolator(uv[knots], own[knots], neighbors=64, smoothing=4.0)
     cells = np.argwhere(hole | around)
     height = np.zeros(size)
     height[tuple(cells.T)] = spline((cells + first).astype(np.float64))
-    return Footprint(support, first, hole, around, height)
-
-
-def _crossing(block: Block, support: Support) -> Array:
-    """How far above each member [N] its surface is, voxels: where the optical depth falls to a half."""
-    steps = np.arange(-2.0, 3.5, 0.5)
-    depth = []
-    for step in steps:
-        at = support.members + step * support.normal
-        depth.append(ndimage.map_coordinates(block.depth, at.T, order=1, mode="nearest"))
-    rows = np.stack(depth)
-    most = np.maximum(rows[:5].max(axis=0), 1e-6)
-    full = rows > 0.5 * np.minimum(most, 2.0)
-    last = np.where(full.any(axis=0), len(steps) - 1 - np.argmax(full[::-1], axis=0), 4)
-    return np.asarray(steps[last])
+    return Footprint(support, first, hole, around, surfaced, height)
 
 
 def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
@@ -246,13 +339,14 @@ def _coloured(
     shape = footprint.hole.shape
     slot = block.slot[tuple(known.T)]
     rows = (np.abs(height) < 1.6) & (slot >= 0)
-    weight = (block.depth[tuple(known.T)] + 1e-4)[rows]
     cell = np.ravel_multi_index((u[rows], v[rows]), shape)
+    weight = _shown(cell, height[rows], block.depth[tuple(known[rows].T)])
     total = np.bincount(cell, weight, minlength=int(np.prod(shape)))
     given = total > 0.0
     width = int(np.prod(block.sh.shape[1:]))
     table = np.zeros((len(total), width))
-    values = block.sh[slot[rows]].reshape(-1, width)
+    values = _as_seen(block.sh[slot[rows]], footprint.support.normal / np.array(block.spacing))
+    values = values.reshape(-1, width)
     for channel in range(width):
         table[:, channel] = np.bincount(cell, weight * values[:, channel], minlength=len(total))
     table[given] /= total[given][:, None]
@@ -264,6 +358,40 @@ def _coloured(
     cells = np.ravel_multi_index((column[0][kept], column[1][kept]), shape)
     sh[place[kept]] = table[cells].reshape(-1, *block.sh.shape[1:])
     return Block(block.field, block.low, block.density, block.slot, sh)
+
+
+def _shown(column: NDArray[np.int64], height: Array, depth: AnyArray) -> Array:
+    """The share [N] that vertices have in what is seen of their columns [N] from above.
+
+    height, depth [N]: theirs over the support, and their optical depth.
+    """
+    order = np.lexsort((-height, column))
+    passed = np.cumsum(depth[order].astype(np.float64)) - depth[order]
+    first = np.r_[True, np.diff(column[order]) > 0]
+    passed -= np.maximum.accumulate(np.where(first, passed, 0.0))
+    share = np.zeros(len(column))
+    share[order] = np.exp(-passed) * (1.0 - np.exp(-depth[order])) + 1e-6
+    return share
+
+
+def _as_seen(sh: Float32, normal: Array) -> Array:
+    """Coefficients [N,K,3] that are as sh [N,K,3] seen from the normal's side [3], and never below black.
+
+    Those of single vertices may be far below, where nothing shows of it; their means would be darker than
+    what is seen.
+    """
+    count = np.arange(VIEWS)
+    up = (count + 0.5) / VIEWS
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * count
+    across = np.sqrt(1.0 - up**2)
+    u, v = np.linalg.svd(normal[None])[2][1:]
+    n = normal / np.linalg.norm(normal)
+    views = -(np.outer(up, n) + np.outer(across * np.cos(angle), u) + np.outer(across * np.sin(angle), v))
+    basis = sh_basis(views, int(np.sqrt(sh.shape[1])) - 1)
+    seen = np.maximum(0.5 + np.einsum("dk,nkc->ndc", basis, sh), 0.0) - 0.5
+    firm = np.eye(sh.shape[1]) * FIRM * VIEWS
+    firm[0, 0] = 0.0
+    return np.einsum("kd,ndc->nkc", np.linalg.solve(basis.T @ basis + firm, basis.T), seen)
 
 
 def membrane(hole: Mask, given: Mask, table: Array) -> Array:

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from cagefield.fields.splat import SplatField
 from cagefield.fields.splat_mixture import SplatMixture
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.light import FINEST
 from cagefield.quaternions import rotation_matrices
 from cagefield.sh import C0
 from cagefield.typing import Array, Mask
+
+FINEST = 128
+"""Voxels along the longest edge of the bounds of splats of which light is found out about."""
 
 WIDEST = 0.6
 """Least standard deviation of a splat, voxels: a thinner one would be missed between vertices."""

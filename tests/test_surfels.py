@@ -1,0 +1,161 @@
+"""Surface elements, and the planes that they are put on: where light is worked out."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit, EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import block_of
+from cagefield.patches.light import Ambience
+from cagefield.patches.planes import flattened
+from cagefield.patches.surfels import FAR, Surfels, distance_to, gridded, joined, surfels_of, with_seen
+from cagefield.scene import Scene
+from cagefield.typing import Array
+
+C0 = 0.28209479177387814
+VOXEL = 0.05
+DENSE = 60.0
+"""Density of what is solid, per world unit."""
+
+TOP = VOXEL - float(np.sqrt(2.0 * np.log(2.0) * VOXEL / DENSE))
+"""Where the slab stops half of a ray from above: its density grows evenly from z = VOXEL down to 0, and its
+integral over the way s into it is DENSE s^2 / (2 VOXEL)."""
+
+
+def slab(*, sharp: bool = False) -> VoxelField:
+    """A slab up to z = 0, and a box that hangs over it.
+
+    `sharp`: what is empty beside them has a density below zero, as in a trained field.
+    """
+    axis = np.arange(-20, 21) * VOXEL
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    box = (np.abs(x) < 0.16) & (np.abs(y) < 0.16) & (np.abs(z - 0.5) < 0.16)
+    density = np.where(box | ((z < 1e-9) & (z > -0.3)), DENSE, 0.0)
+    if sharp:
+        density = np.where(density == 0.0, -40.0, density)
+    vertices = np.flatnonzero(density)
+    rgb = np.broadcast_to([0.6, 0.5, 0.3], (len(vertices), 3))
+    return VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]),
+        (41, 41, 41),
+        vertices,
+        density.reshape(-1)[vertices].astype(np.float32),
+        ((rgb - 0.5) / C0).astype(np.float32)[:, None],
+    )
+
+
+def plane(count: int, noise: float, seed: int) -> Surfels:
+    """A level square, whose points and normals have noise."""
+    chance = np.random.default_rng(seed)
+    points = np.concatenate([chance.uniform(-1, 1, (count, 2)), noise * chance.normal(size=(count, 1))], 1)
+    normals = np.array([0.0, 0.0, 1.0]) + 0.25 * chance.normal(size=(count, 3))
+    return Surfels(points, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def sphere(count: int, centre: Array, radius: float, seed: int) -> Surfels:
+    normals = np.random.default_rng(seed).normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Surfels(centre + radius * normals, normals)
+
+
+def test_surfaces_are_where_half_of_the_light_is_stopped() -> None:
+    block = block_of(slab(), EditStack(), np.array([[-0.5, -0.5, -0.2], [0.5, 0.5, 0.25]]))
+    surface = surfels_of(block)
+    up = surface.normals[:, 2] > 0.99
+    assert up.sum() > 300
+    # A step of the walk inwards is a quarter of a voxel.
+    assert np.abs(surface.points[up, 2] - TOP).max() < 0.25 * VOXEL
+    above = np.array([[0.1, 0.2, TOP + 0.2], [0.1, 0.2, TOP - 0.1], [9.0, 0.0, 0.0]])
+    found = surface.distance(above, 0.3)
+    assert abs(found[0] - 0.2) < 0.25 * VOXEL and found[1] == 0.0 and found[2] == FAR
+
+
+def test_a_block_of_nothing_has_no_surface() -> None:
+    block = block_of(slab(), EditStack(), np.array([[0.5, 0.5, 0.5], [0.9, 0.9, 0.9]]))
+    surface = surfels_of(block)
+    assert len(surface.points) == 0 and (surface.distance(np.zeros((2, 3))) == FAR).all()
+    assert (gridded([surface], 0.1)(np.zeros((2, 3))) == FAR).all()
+    assert surface.thinned(0.1) is surface
+
+
+def test_distances_on_a_grid_are_those_to_the_nearest() -> None:
+    ball = sphere(20_000, np.zeros(3), 0.5, 0)
+    asked = np.random.default_rng(1).uniform(-0.9, 0.9, (500, 3))
+    asked = asked[np.linalg.norm(asked, axis=1) > 0.55]
+    exact, fast = distance_to([ball])(asked), gridded([ball], 0.02)(asked)
+    np.testing.assert_allclose(exact, np.linalg.norm(asked, axis=1) - 0.5, atol=0.02)
+    within = (np.abs(asked) < 0.5).all(axis=1)
+    np.testing.assert_allclose(fast[within], exact[within], atol=0.035)  # a cell's diagonal
+    # Beyond the grid it is the way to the grid, and the distance there: at most a bit more.
+    assert (fast > exact - 0.035).all() and (fast < 1.25 * exact + 0.035).all()
+
+
+def test_thinned_surfaces_keep_both_sides() -> None:
+    both = joined(
+        [plane(4000, 0.0, 0), Surfels(plane(4000, 0.0, 1).points, np.tile([0.0, 0.0, -1.0], (4000, 1)))]
+    )
+    thin = both.thinned(0.2)
+    assert len(thin.points) < 400
+    down = thin.normals[:, 2] < 0.0
+    assert down.sum() > 80 and (~down).sum() > 80 and (np.abs(thin.normals[down, 2]) > 0.99).all()
+
+
+def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
+    floor, ball = plane(6000, 0.004, 2), sphere(3000, np.array([0.0, 0.0, 0.6]), 0.3, 3)
+    flat, on = flattened(joined([floor, ball]), 0.01)
+    assert on[:6000].mean() > 0.8 and on[6000:].mean() < 0.12
+    assert np.degrees(np.arccos(flat.normals[:6000][on[:6000], 2])).max() < 0.5
+    assert np.abs(flat.points[:6000][on[:6000], 2]).max() < 0.001
+    stays = ~on[6000:]
+    np.testing.assert_array_equal(flat.normals[6000:][stays], ball.normals[stays])
+
+
+def test_what_cameras_see_replaces_what_lies_beneath() -> None:
+    seen, beneath = plane(3000, 0.0, 4), plane(500, 0.0, 5)
+    hidden = Surfels(beneath.points - [0.0, 0.0, 0.03], beneath.normals)
+    aside = Surfels(beneath.points - [0.0, 0.0, -0.5], beneath.normals)
+    level = Surfels(seen.points, np.tile([0.0, 0.0, 1.0], (3000, 1)))
+    found = with_seen(joined([hidden, aside]), level, 0.01)
+    assert len(found.points) == 3500 and (found.points[:, 2] > -0.01).all()
+
+
+def test_a_rigid_motion_leaves_a_parts_shade_on_itself() -> None:
+    part = joined([sphere(2000, np.zeros(3), 0.3, 6), sphere(2000, np.array([0.7, 0.0, 0.0]), 0.3, 7)])
+    light = Ambience((0.1, 0.3), (0.3, 0.4))
+    turn = Rotation.from_euler("XYZ", (0.4, -0.8, 1.1)).as_matrix()
+    moved = part.turned(part.points @ turn.T + [3.0, -2.0, 1.0], np.broadcast_to(turn, (4000, 3, 3)))
+    before, after = light.log_light([part], part), light.log_light([moved], moved)
+    assert before.min() < -0.2
+    np.testing.assert_allclose(after, before, atol=1e-6)
+
+
+def test_stacked_edits_keep_densities_below_zero() -> None:
+    """They make the surfaces beside them sharp, and their colours show there."""
+    field = slab(sharp=True)
+    moved = Edit(Cage.box((0.0, 0.0, 0.5), 0.5), adjustment="discrete").translate((0.3, 0.1, 0.2))
+    block = block_of(field, EditStack([moved]), np.array([[-0.1, -0.3, 0.3], [0.7, 0.5, 0.95]]))
+    inside = moved.deformed.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
+    empty = inside & (block.density < -1.0)
+    assert empty.sum() > 50 and (block.slot[empty] >= 0).all()
+
+
+def test_a_part_that_stands_free_is_not_thinned_by_its_seam() -> None:
+    scene = Scene(slab(sharp=True))
+    camera = Camera.look_at((1.6, -1.2, 1.5), (0.2, 0.3, 0.6), width=64, height=64, fov_x=0.7)
+    # A cage that holds the box as closely as can be.
+    edit = Edit(Cage.box((0.0, 0.0, 0.5), 0.36), adjustment="discrete", fill="none", relight="none")
+    edit = edit.translate((0.3, 0.3, 0.1))
+    hard, soft = (
+        scene.with_edits(EditStack([dataclasses.replace(edit, feather=width)])).render(
+            camera, background="white"
+        )
+        for width in (0.0, 3.0)
+    )
+    error = float(((hard.rgb - soft.rgb) ** 2).mean())
+    assert -10.0 * np.log10(max(error, 1e-9)) > 36.0
