@@ -23,6 +23,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import Block, block_of
 from cagefield.patches.extent import RIM, swept
 from cagefield.patches.light import Ambience, Lighting
+from cagefield.patches.planes import flattened
 from cagefield.patches.surfels import surfels_of
 from cagefield.typing import Array
 from cagefield.warps.forward import to_deformed
@@ -45,7 +46,7 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, 
     """(a coarser block, what the light on it is multiplied by) once a continuous edit has bent a block."""
     assert edit.outer is not None
     coarse = block.pooled(max(1, -(-max(block.shape) // FINEST))).reaching(edit.outer.aabb)
-    surface = surfels_of(coarse)
+    surface, _ = flattened(surfels_of(coarse), max(coarse.spacing))
     if not len(surface.points):
         return coarse, Lighting(np.zeros(coarse.shape, bool), np.zeros(0))
     moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
