@@ -106,6 +106,13 @@ def test_thinned_surfaces_keep_both_sides() -> None:
     assert down.sum() > 80 and (~down).sum() > 80 and (np.abs(thin.normals[down, 2]) > 0.99).all()
 
 
+def test_surfaces_far_away_are_thinned_too() -> None:
+    near = plane(500, 0.0, 8)
+    far = Surfels(np.array([[1e9, -1e9, 1e9], [-1e9, 1e9, -1e9]]), np.tile([0.0, 0.0, 1.0], (2, 1)))
+    thin = joined([near, far]).thinned(0.01)
+    assert len(thin.points) > 400 and (np.abs(thin.points).max(axis=1) > 1e8).sum() == 2
+
+
 def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
     floor, ball = plane(6000, 0.004, 2), sphere(3000, np.array([0.0, 0.0, 0.6]), 0.3, 3)
     flat, on = flattened(joined([floor, ball]), 0.01)

@@ -108,7 +108,8 @@ class Surfels:
             return self
         # Surfaces often lie at whole numbers, where rounding would decide on their cells.
         cell = np.floor(self.points / edge + ASIDE).astype(np.int64)
-        cell -= cell.min(axis=0)
+        # Ranks in place of numbers: what is seen of an unbounded scene may be millions of cells away.
+        cell = np.stack([np.unique(column, return_inverse=True)[1] for column in cell.T], axis=1)
         axis = np.argmax(np.abs(self.normals), axis=1)
         side = 2 * axis + (np.take_along_axis(self.normals, axis[:, None], axis=1)[:, 0] > 0.0)
         size = cell.max(axis=0) + 1
