@@ -488,6 +488,10 @@ def test_a_camera_path_is_recorded_played_and_rendered(editor: EditorPage, folde
     # The first keyframe half a second before the second, and without the edit.
     seconds = page.locator('.key input[type="number"]').first
     seconds.fill("0.5")
+    # What others change meanwhile (a script's click leaves the focus where it is) takes nothing typed away.
+    editor.changed(lambda: page.evaluate("document.querySelector('.edit.chosen .lock').click()"))
+    editor.changed(lambda: page.evaluate("document.querySelector('.edit.chosen .lock').click()"))
+    assert seconds.input_value() == "0.5"
     editor.changed(lambda: seconds.press("Enter"))
     editor.changed(lambda: page.locator('.key input[type="range"]').first.fill("0"))
     assert editor.state["keys"][0]["seconds"] == 0.5

@@ -3,7 +3,7 @@ import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } fr
 import type { Actions } from "../actions";
 import type { App } from "../app";
 import { duration } from "../path";
-import type { Key, Vec3 } from "../protocol";
+import type { EditState, Key, Vec3 } from "../protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
 export function pathList(app: App, actions: Actions, dialogs: { render: (what: "test_views" | "camera_path") => void }): HTMLElement {
@@ -20,36 +20,50 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   const file = iconLink(Download, "Download the camera path, as nerfstudio has it", `camera_path.json${location.search}`, "camera_path.json");
   const views = h("button", { type: "button", class: "text", onclick: () => dialogs.render("test_views") }, "Render test views…");
 
+  const row = (key: Key, index: number, edits: EditState[]): HTMLElement => {
+    const seconds = h("input", { type: "number", min: "0.1", max: "3600", step: "0.5", value: String(key.seconds), title: "Seconds to the next keyframe" });
+    seconds.onchange = () => send(replaced(index, { seconds: Math.max(0.1, Number(seconds.value) || 2) }));
+    const parts = edits.map((edit) => {
+      const at = key.parts[String(edit.id)] ?? 1;
+      const slider = h("input", { type: "range", min: "0", max: "1", step: "0.05", value: String(at), title: `How far “${edit.name}” has gone here` });
+      slider.style.accentColor = edit.colour;
+      slider.onchange = () => {
+        slider.blur();
+        send(replaced(index, { parts: { ...key.parts, [edit.id]: Number(slider.value) } }));
+      };
+      return h("label", { class: "part" }, h("span", {}, edit.name || `edit ${edit.id}`), slider);
+    });
+    return h(
+      "li",
+      { class: "key" },
+      h("div", { class: "row" },
+        h("span", { class: "number" }, String(index + 1)),
+        seconds, h("span", { class: "quiet" }, "s"), h("span", { class: "space" }),
+        iconButton(Crosshair, "Look from here", () => lookFrom(app, key.c2w, key.fov_y_deg), "go"),
+        iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.viewport.c2w })), "update"),
+        iconButton(Trash2, "Remove this keyframe", () => send(keys().filter((_, i) => i !== index)), "drop"),
+      ),
+      ...parts,
+    );
+  };
+
+  // Rows that show the same stay where they are: what is being typed into one that was made anew is lost.
+  let rows = new Map<string, HTMLElement>();
   app.store.watch(["state"], ({ state }) => {
     if (state === null || (document.activeElement instanceof HTMLInputElement && list.contains(document.activeElement) && document.activeElement.type === "range")) return;
-    list.replaceChildren(
-      ...state.keys.map((key, index) => {
-        const seconds = h("input", { type: "number", min: "0.1", max: "3600", step: "0.5", value: String(key.seconds), title: "Seconds to the next keyframe" });
-        seconds.onchange = () => send(replaced(index, { seconds: Math.max(0.1, Number(seconds.value) || 2) }));
-        const parts = state.edits.map((edit) => {
-          const at = key.parts[String(edit.id)] ?? 1;
-          const slider = h("input", { type: "range", min: "0", max: "1", step: "0.05", value: String(at), title: `How far “${edit.name}” has gone here` });
-          slider.style.accentColor = edit.colour;
-          slider.onchange = () => {
-            slider.blur();
-            send(replaced(index, { parts: { ...key.parts, [edit.id]: Number(slider.value) } }));
-          };
-          return h("label", { class: "part" }, h("span", {}, edit.name || `edit ${edit.id}`), slider);
-        });
-        return h(
-          "li",
-          { class: "key" },
-          h("div", { class: "row" },
-            h("span", { class: "number" }, String(index + 1)),
-            seconds, h("span", { class: "quiet" }, "s"), h("span", { class: "space" }),
-            iconButton(Crosshair, "Look from here", () => lookFrom(app, key.c2w, key.fov_y_deg), "go"),
-            iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.viewport.c2w })), "update"),
-            iconButton(Trash2, "Remove this keyframe", () => send(keys().filter((_, i) => i !== index)), "drop"),
-          ),
-          ...parts,
-        );
+    const named = state.edits.map(({ id, name, colour }) => [id, name, colour]);
+    const kept = rows;
+    rows = new Map(
+      state.keys.map((key, index) => {
+        const shown = JSON.stringify([index, key, named]);
+        return [shown, kept.get(shown) ?? row(key, index, state.edits)];
       }),
     );
+    const made = [...rows.values()];
+    made.forEach((item, index) => {
+      if (list.children[index] !== item) list.insertBefore(item, list.children[index] ?? null);
+    });
+    while (list.children.length > made.length) list.lastElementChild?.remove();
     const total = duration(state.keys, state.loop);
     length.textContent = state.keys.length === 0 ? "no keyframes" : `${total.toFixed(1)} s`;
     play.disabled = film.disabled = state.keys.length < 2;
