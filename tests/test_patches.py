@@ -20,11 +20,13 @@ from cagefield.errors import EditError, EditFileError
 from cagefield.fields.layers import ALIGNED, places_of, slices_of
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import block_of, interpolated
+from cagefield.patches.footprint import Footprint
 from cagefield.patches.light import Ambience
 from cagefield.patches.making import patch_of
 from cagefield.patches.patcher import wants_patch
+from cagefield.patches.rebuilding import membrane
 from cagefield.patches.seen import sight_of
-from cagefield.patches.support import Footprint, Support, membrane
+from cagefield.patches.support import Support
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene

@@ -33,10 +33,11 @@ from cagefield.typing import Array, Mask
 REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
 
-USUAL, SPREAD = (0.05, 0.15, 0.2, 0.15, 0.1), 0.2
-"""Weights that are usual where light comes from all around, and their standard deviation."""
+USUAL, SPREAD, CORNER = (0.05, 0.2, 0.25, 0.2, 0.15), 0.2, 0.15
+"""Weights that are usual where light comes from all around: little of it is left in the deepest corner. And
+the standard deviations of each and of their sum."""
 
-ALIKE = 300.0
+ALIKE = 1000.0
 """Pairs that count as one: neighbours, and other views, see the same texture."""
 
 HUBER = 3.0
@@ -144,7 +145,8 @@ def ambience_of(field: VoxelField, sight: Sight) -> Ambience:
         # Edges of textures are further off than noise, of either sign: Huber's loss, smoothed.
         edge = HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (told / HUBER) ** 2) - 1.0) / ALIKE)
         robust = np.sign(told) * edge
-        return np.concatenate([robust, (weights - usual) / SPREAD])
+        corner = (weights.sum() - usual.sum()) / CORNER
+        return np.concatenate([robust, (weights - usual) / SPREAD, [corner]])
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))

@@ -28,10 +28,11 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import bending_light, light_box, light_edit
 from cagefield.patches.block import Block, block_of, interpolated, world_of
 from cagefield.patches.extent import patch_box
+from cagefield.patches.footprint import KNOTS
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.making import Made, made_of
 from cagefield.patches.seen import Sight
-from cagefield.patches.support import KNOTS, Support
+from cagefield.patches.support import Support
 from cagefield.patches.voxelised import voxel_for, voxelised
 from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.baked_splats import where_they_are

@@ -1,0 +1,54 @@
+"""A part's cut end is closed: where it was held, or stood, its own surface goes on.
+
+The part and what it was cut from change roles: what touches the part from outside stands on one of the part's
+faces, as `support_of` finds it, and that face is rebuilt under it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from cagefield.edits.stack import EditStack
+from cagefield.patches.block import Block
+from cagefield.patches.extent import RIM
+from cagefield.patches.footprint import footprint_of
+from cagefield.patches.light import Lighting
+from cagefield.patches.planes import flattened
+from cagefield.patches.rebuilding import rebuilt
+from cagefield.patches.seen import Sight
+from cagefield.patches.support import support_of
+from cagefield.patches.work import CLOSE, UNSURE, Work
+
+TOUCHES = 4
+"""What comes this near to a part touches it; voxels."""
+
+
+def capped(work: Work, block: Block, light: Lighting | None, below: EditStack, sight: Sight | None) -> Block:
+    """The part's block, which is in its new light, with its face going on where it was held.
+
+    As it is, where the part has no face that something stood on.
+    """
+    held = work.before.solid & ~work.inside
+    held &= ndimage.binary_dilation(work.part, iterations=TOUCHES)
+    part = work.gone
+    if not held.any() or not len(part.points):
+        return block
+    at = work.before.coordinates(part.points)
+    away = ndimage.distance_transform_edt(~held)
+    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, mode="nearest"))
+    near = away < max(RIM, 0.5 * float(np.median(np.ptp(at, axis=0))))
+    flat, on = flattened(part.take(near), work.voxel)
+    normals, ring = part.normals.copy(), np.zeros(len(near), bool)
+    normals[near], ring[near] = flat.normals, on
+    support = support_of(held, at, normals, ring)
+    if support is None:
+        return block
+    log = np.zeros(len(at)) if light is None else light.at(block, part.points)
+    footprint = footprint_of(support, held, at[near & (away < CLOSE)], at[log > UNSURE])
+    if footprint is None:
+        return block
+    points = footprint.points(block)
+    if sight is not None:
+        footprint = footprint.without(work.known(points, below, sight, block, light), held)
+    return rebuilt(block, footprint, ~work.inside) if footprint.hole.any() else block
