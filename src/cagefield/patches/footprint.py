@@ -23,6 +23,9 @@ HIGH = 3.0
 BESIDE = 2
 """Columns beside those that no camera sees that are filled too."""
 
+GAP = 3
+"""Half the width of a gap amid a support from which on it is one; columns."""
+
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
 
@@ -52,8 +55,10 @@ class Footprint:
         """The footprint whose hole lacks columns [N] where cameras see that no support goes on."""
         gone = np.zeros(self.hole.shape, bool)
         gone[tuple(np.argwhere(self.hole)[air].T)] = True
-        # Single rays that pass are noise.
+        # Single rays that pass are noise, and so are small gaps amid the support: dark corners are foggy.
         gone = ndimage.binary_opening(ndimage.binary_closing(gone)) & self.hole
+        sure = ndimage.binary_opening(gone, iterations=GAP) | ~(self.hole | self.around)
+        gone = ndimage.binary_propagation(sure, mask=sure | gone) & gone
         return replace(self, hole=self.hole & ~gone)
 
     def without(self, known: NDArray[np.bool_], part: Mask) -> Footprint:

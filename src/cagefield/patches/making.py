@@ -19,6 +19,7 @@ from cagefield.patches.footprint import footprint_of
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.rebuilding import rebuilt
 from cagefield.patches.seen import Sight
+from cagefield.patches.strength import strength_of
 from cagefield.patches.support import Support
 from cagefield.patches.work import UNSURE, VIEWS, Work, lit_by
 from cagefield.typing import Mask
@@ -77,13 +78,16 @@ def made_of(
     work = Work.of(field, below, edit, ambience, settled, preserve_opacity, after, sight)
     lighting = part_light = footprint = support = None
     lit = ambience if ambience is not None and ambience.shows else None
-    under, logs = work.emptied, np.zeros(len(work.lit.points))
+    under, logs, strength = work.emptied, np.zeros(len(work.lit.points)), 1.0
+    found = work.support() if edit.source is None else None
     if lit is not None:
-        logs = work.without_part(lit)
+        if found is not None:
+            strength = strength_of(work, lit, found)
+        logs = strength * work.without_part(lit)
         lighting = Lighting.of(under, work.lit, logs, work.apart)
         under = lit_by(under, lighting)
     if edit.fill == "surroundings" and not edit.keep_source:
-        support = work.support()
+        support = found
     if support is not None:
         footprint = footprint_of(
             support, work.part, work.close, under.coordinates(work.lit.points[logs > UNSURE])
@@ -103,7 +107,7 @@ def made_of(
         cages = edit.inner, edit.fill.source
         under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
     if lit is not None and lighting is not None and work.settled:
-        cast, part_light = work.cast(under, footprint, lit)
+        cast, part_light = work.cast(under, footprint, lit, strength)
         under = lit_by(under, cast)
         lighting = lighting.plus(cast)
     return Made(work, under, lighting, part_light, support)

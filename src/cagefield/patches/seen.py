@@ -49,12 +49,14 @@ class SeenPairs:
 class Sight:
     """What some cameras of a field see of it.
 
-    pairs: neighbours on its surfaces; surface: what of these is seen at all. depths: of each camera the
-    distance [H,W] along the pixels' rays at which they end, inf where they do not.
+    pairs: neighbours on its surfaces; surface: what of these is seen at all, and bright [N] the log of its
+    mean colours. depths: of each camera the distance [H,W] along the pixels' rays at which they end, inf
+    where they do not.
     """
 
     pairs: SeenPairs
     surface: Surfels
+    bright: Array
     cameras: tuple[Camera, ...]
     depths: tuple[Array, ...]
 
@@ -81,22 +83,24 @@ def sight_of(
     chance = np.random.default_rng(seed)
     picked = {int(n) for n in np.linspace(0, len(cameras) - 1, VIEWS)} if cameras else set()
     chosen = tuple(smaller(camera) for camera in [cameras[n] for n in sorted(picked)] or around(bounds))
-    pairs, surfaces, depths = [], [], []
+    pairs, surfaces, bright, depths = [], [], [], []
     for camera in chosen:
         picture = render(camera)
         surface, solid = _surface(picture, camera)
-        pairs.append(_pairs(picture, surface, solid, chance))
+        log = np.log(np.clip(picture.rgb.reshape(-1, 3), 0.02, 1.0).mean(axis=1))
+        pairs.append(_pairs(log, surface, solid, chance))
         known = solid.reshape(-1) & ((surface.normals**2).sum(axis=1) > 0.5)
         surfaces.append(surface.take(known))
+        bright.append(log[known])
         ends = (picture.opacity > ENDS) & np.isfinite(picture.depth)
         depths.append(np.where(ends, picture.depth, np.inf).astype(np.float64))
     first, second = (joined([getattr(pair, name) for pair in pairs]) for name in ("first", "second"))
     seen = SeenPairs(first, second, np.concatenate([pair.log_change for pair in pairs]))
     surface = joined(surfaces)
-    surface = surface.take(_some(len(surface.points), SURFACE, chance))
+    shown = _some(len(surface.points), SURFACE, chance)
     rows = _some(len(seen.log_change), PAIRS, chance)
     seen = SeenPairs(first.take(rows), second.take(rows), seen.log_change[rows])
-    return Sight(seen, surface, chosen, tuple(depths))
+    return Sight(seen, surface.take(shown), np.concatenate(bright)[shown], chosen, tuple(depths))
 
 
 def _some(count: int, most: int, chance: np.random.Generator) -> NDArray[np.int64]:
@@ -136,10 +140,9 @@ def _surface(picture: RenderResult, camera: Camera) -> tuple[Surfels, Mask]:
     return Surfels(points, _normals(points.reshape(*solid.shape, 3), origins[0], solid)), solid
 
 
-def _pairs(picture: RenderResult, surface: Surfels, solid: Mask, chance: np.random.Generator) -> SeenPairs:
-    """The pairs of one picture, of whose pixels the `solid` ones [H,W] show the surface [H*W]."""
-    points, normals, rgb = surface.points, surface.normals, picture.rgb.reshape(-1, 3)
-    log = np.log(np.clip(rgb, 0.02, 1.0).mean(axis=1))
+def _pairs(log: Array, surface: Surfels, solid: Mask, chance: np.random.Generator) -> SeenPairs:
+    """The pairs of one picture, by its pixels' logs [H*W]: the `solid` ones [H,W] show the surface [H*W]."""
+    points, normals = surface.points, surface.normals
     y, x = np.nonzero(solid)
     distance, angle = chance.integers(*APART, len(x)), chance.uniform(0.0, 2.0 * np.pi, len(x))
     to_x = np.round(x + distance * np.cos(angle)).astype(int)

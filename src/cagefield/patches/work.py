@@ -173,14 +173,20 @@ class Work:
     @cached_property
     def rest(self) -> Surfels:
         """The surfaces of all but the part; all, where that is kept."""
-        surface, part = self._surface
-        return surface if self.edit.keep_source else surface.take(~part)
+        surface, _ = self._surface
+        return surface if self.edit.keep_source else self.others
 
     @cached_property
     def gone(self) -> Surfels:
         """The surfaces of the part."""
         surface, part = self._surface
         return surface.take(part)
+
+    @cached_property
+    def others(self) -> Surfels:
+        """The surfaces of all but the part, also where that is kept."""
+        surface, part = self._surface
+        return surface.take(~part)
 
     @cached_property
     def lit(self) -> Surfels:
@@ -194,11 +200,12 @@ class Work:
         return _change(ambience, self.lit, [self.rest], [self.rest, self.gone], self.gone, self.voxel)
 
     def cast(
-        self, under: Block, filled: Footprint | None, ambience: Ambience
+        self, under: Block, filled: Footprint | None, ambience: Ambience, strength: float
     ) -> tuple[Lighting, Lighting | None]:
         """What the light on a block, and on the part, is multiplied by once the part is at its new place.
 
-        `under` is the block without the part, some of it `filled`. A paste keeps its own light.
+        `under` is the block without the part, some of it `filled`. The part's shade on it has a strength. A
+        paste keeps its own light.
         """
         rest = self.rest
         if filled is not None:
@@ -210,15 +217,13 @@ class Work:
             new = self.pasted.take(rest.distance(self.pasted.points) > 0.5 * self.voxel)
             log = _change(ambience, lit, [rest, new], [rest], new, self.voxel)
             return Lighting.of(under, lit, log, self.apart), None
-        surface, mine = self._surface
         part = self.gone
         inside, points, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(part.points)
         part = part.take(inside)
         moved = part.turned(points, jacobian)
-        cast = Lighting.of(
-            under, lit, _change(ambience, lit, [rest, moved], [rest], moved, self.voxel), self.apart
-        )
-        before = [surface.take(~mine), self.gone]
+        log = strength * _change(ambience, lit, [rest, moved], [rest], moved, self.voxel)
+        cast = Lighting.of(under, lit, log, self.apart)
+        before = [self.others, self.gone]
         log = ambience.log_light([rest, moved], moved) - ambience.log_light(before, part)
         on_part = Lighting.of(self.before, part, log, self.apart)
         where = on_part.where & self.inside
