@@ -34,7 +34,8 @@ KNOTS = 1500
 class Footprint:
     """Columns of a support on a grid [U,V] a voxel apart: those in the hole, and those around it.
 
-    surfaced [U,V]: those where the support has a surface; height [U,V] of that, also where it goes on.
+    surfaced [U,V]: those where the support has a surface; height [U,V] of that, also where it goes on. changed
+    [U,V]: the log of by how much light on the columns around was changed, None where it was not.
     """
 
     support: Support
@@ -43,10 +44,11 @@ class Footprint:
     around: Mask
     surfaced: Mask
     height: Array
+    changed: Array | None = None
 
-    def points(self, block: Block) -> Array:
-        """World positions [N,3] of the hole's columns on the surface."""
-        cells = np.argwhere(self.hole)
+    def points(self, block: Block, columns: Mask | None = None) -> Array:
+        """World positions [N,3] of some columns [U,V] on the surface, the hole's unless others are given."""
+        cells = np.argwhere(self.hole if columns is None else columns)
         uv, height = cells + self.first, self.height[tuple(cells.T)]
         at = self.support.point + uv @ self.support.axes + height[:, None] * self.support.normal
         return world_of(block.field, at + block.low)

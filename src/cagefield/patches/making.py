@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import Block
 from cagefield.patches.capping import capped
 from cagefield.patches.cloning import cloned
-from cagefield.patches.footprint import footprint_of
+from cagefield.patches.footprint import Footprint, footprint_of
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.rebuilding import rebuilt
 from cagefield.patches.seen import Sight
@@ -102,7 +102,7 @@ def made_of(
     if footprint is None or not footprint.hole.any():
         support = footprint = None
     else:
-        under = rebuilt(under, footprint, work.inside)
+        under = rebuilt(under, _changed(footprint, under, lighting), work.inside)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         cages = edit.inner, edit.fill.source
         under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
@@ -111,6 +111,15 @@ def made_of(
         under = lit_by(under, cast)
         lighting = lighting.plus(cast)
     return Made(work, under, lighting, part_light, support)
+
+
+def _changed(footprint: Footprint, block: Block, light: Lighting | None) -> Footprint:
+    """The footprint that knows by how much the light on the columns around was changed."""
+    if light is None:
+        return footprint
+    changed = np.zeros(footprint.hole.shape)
+    changed[footprint.around] = light.at(block, footprint.points(block, footprint.around))
+    return replace(footprint, changed=changed)
 
 
 def patch_of(

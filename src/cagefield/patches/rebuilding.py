@@ -21,6 +21,16 @@ from cagefield.typing import AnyArray, Array, Float32, Mask
 DEEP = -4.0
 """Height over a support, voxels, from which on it is made anew, up to HIGH."""
 
+TOP = 1.6
+"""Height over a support, voxels, up to which its colours are."""
+
+EDGE = 2
+"""Columns at the edge of a support whose colours do not go on."""
+
+RING, UNSURE, DOUBTED = 5.0, 0.3, 0.1
+"""Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and fade
+into their own. From this share on they do not hold the membrane."""
+
 VIEWS = 32
 """Directions from which colours are looked at."""
 
@@ -92,7 +102,7 @@ def _coloured(
     u, v, height = above
     shape = footprint.hole.shape
     slot = block.slot[tuple(known.T)]
-    rows = (np.abs(height) < 1.6) & (slot >= 0)
+    rows = (np.abs(height) < TOP) & (slot >= 0)
     cell = np.ravel_multi_index((u[rows], v[rows]), shape)
     weight = _shown(cell, height[rows], block.depth[tuple(known[rows].T)])
     total = np.bincount(cell, weight, minlength=int(np.prod(shape)))
@@ -105,13 +115,38 @@ def _coloured(
         table[:, channel] = np.bincount(cell, weight * values[:, channel], minlength=len(total))
     table[given] /= total[given][:, None]
     given &= footprint.around.reshape(-1)
-    table = membrane(footprint.hole, given.reshape(shape), table)
+    # The edge of the support is of another colour, often.
+    inner = ndimage.binary_erosion(footprint.around | footprint.hole, iterations=EDGE).reshape(-1)
+    given = given & inner if (given & inner).any() else given
+    share = _doubt(footprint).reshape(-1)
+    sure = given & (share < DOUBTED)
+    given = sure if sure.any() else given
+    own, table = (
+        table,
+        membrane((footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape), given.reshape(shape), table),
+    )
     sh = block.sh.copy()
+    beside = np.ravel_multi_index((u, v), shape)
+    rows = (slot >= 0) & (share[beside] > 0.0) & (height < TOP) & (total[beside] > 0.0)
+    change = share[:, None] * (table - own)
+    sh[slot[rows]] += change[beside[rows]].reshape(-1, *block.sh.shape[1:])
     place = block.slot[tuple(new.T)]
     kept = place >= 0
     cells = np.ravel_multi_index((column[0][kept], column[1][kept]), shape)
     sh[place[kept]] = table[cells].reshape(-1, *block.sh.shape[1:])
     return Block(block.field, block.low, block.density, block.slot, sh)
+
+
+def _doubt(footprint: Footprint) -> Array:
+    """The share [U,V] that the membrane has in colours right beside the hole.
+
+    What is close to where something stood is dark, so that the new light on it is the least sure.
+    """
+    if footprint.changed is None:
+        return np.zeros(footprint.hole.shape)
+    away = ndimage.distance_transform_edt(~footprint.hole)
+    near = np.clip(1.0 - away / RING, 0.0, 1.0) * footprint.around
+    return np.asarray(near * np.clip(np.abs(footprint.changed) / UNSURE, 0.0, 1.0))
 
 
 def _shown(column: NDArray[np.int64], height: Array, depth: AnyArray) -> Array:
