@@ -26,6 +26,8 @@ MOST_PIXELS = 100 << 20
 _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
+_TILE = 1 << 16
+
 DAMAGED = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
     RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
@@ -47,6 +49,19 @@ def check_pixels(image: Image.Image, size: int | None = None) -> None:
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
+def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
+    """Boxes (x, y, end x, end y) that cover a picture, of some ten thousand pixels each.
+
+    Pictures are converted by them: what that takes is no more for large ones. Their sides are multiples of
+    `multiple`, but for those at the right and at the bottom.
+    """
+    across = max(multiple, _TILE // multiple // multiple * multiple)
+    down = max(multiple, _TILE // min(width, across) // multiple * multiple)
+    for y in range(0, height, down):
+        for x in range(0, width, across):
+            yield x, y, min(x + across, width), min(y + down, height)
+
+
 def read_image(path: str | os.PathLike[str]) -> UInt8:
     """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
 
@@ -59,10 +74,16 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
             image: Image.Image = file
             check_pixels(image, path.stat().st_size)
             image.load()
-            if image.mode.startswith("I"):
-                image = Image.fromarray((np.asarray(image) / 257.0 + 0.5).astype(np.uint8))
+            deep = image.mode.startswith("I")
             transparent = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
-            return np.array(image.convert("RGBA" if transparent else "RGB"))
+            mode = "RGBA" if transparent and not deep else "RGB"
+            pixels = np.empty((image.height, image.width, len(mode)), np.uint8)
+            for x, y, end_x, end_y in tiles(image.width, image.height):
+                part = image.crop((x, y, end_x, end_y))
+                if deep:
+                    part = Image.fromarray((np.asarray(part) / 257.0 + 0.5).astype(np.uint8))
+                pixels[y:end_y, x:end_x] = np.asarray(part.convert(mode))
+            return pixels
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: there is no such image") from error
     except DAMAGED as error:
