@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import DAMAGED, check_pixels, tiles
+from cagefield.rendering.images import DAMAGED, opened_picture, tiles
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
@@ -129,19 +131,20 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
     return int(downscale)
 
 
-def _opened(path: Path) -> Image.Image:
-    try:
-        image = Image.open(path)
-        check_pixels(image, path.stat().st_size)
-    except DAMAGED as error:
-        raise DatasetError(
-            f"{path}: not a readable image ({error}); replace the file or remove its frame"
-        ) from error
-    if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
-        raise DatasetError(
-            f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
-        )
-    return image
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    with contextlib.ExitStack() as stack:
+        try:
+            image = stack.enter_context(opened_picture(path))
+        except DAMAGED as error:
+            raise DatasetError(
+                f"{path}: not a readable image ({error}); replace the file or remove its frame"
+            ) from error
+        if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
+            raise DatasetError(
+                f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
+            )
+        yield image
 
 
 def _has_alpha(image: Image.Image) -> bool:

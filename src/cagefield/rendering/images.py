@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import struct
 import zlib
@@ -49,6 +50,33 @@ def check_pixels(image: Image.Image, size: int | None = None) -> None:
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
+class _PictureFile(io.BufferedReader):
+    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self._size = os.fstat(self.fileno()).st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
+            size = min(size, max(0, self._size - self.tell()))
+        return super().read(size)
+
+    def __repr__(self) -> str:
+        return repr(str(self.name))
+
+
+@contextmanager
+def opened_picture(path: Path) -> Iterator[Image.Image]:
+    """The picture in a file, of which the header is read, and at most MOST_PIXELS can be.
+
+    Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
+    """
+    with _PictureFile(path) as file, Image.open(file) as image:
+        check_pixels(image, path.stat().st_size)
+        yield image
+
+
 def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
     """Boxes (x, y, end x, end y) that cover a picture, of some ten thousand pixels each.
 
@@ -70,9 +98,7 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
     """
     path = Path(path)
     try:
-        with Image.open(path) as file:
-            image: Image.Image = file
-            check_pixels(image, path.stat().st_size)
+        with opened_picture(path) as image:
             image.load()
             deep = image.mode.startswith("I")
             transparent = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
