@@ -148,6 +148,15 @@ def photo_of_textures(camera: Camera, cut_out: bool = False) -> np.ndarray:
     return np.rint(255 * rgb.clip(0, 1)).astype(np.uint8).reshape(camera.height, camera.width, -1)
 
 
+def photos_alone(folder: Path, n: int = 4, size: tuple[int, int] = (320, 240)) -> Path:
+    """Photos of `photo_of_textures` without poses, which are found in a second."""
+    width, height = size
+    for index, pose in enumerate(ring(n, radius=3.2, sweep=n / 6)):
+        camera = Camera(pose, width, height, 1.1 * width, 1.1 * width, width / 2, height / 2)
+        save(folder / f"{index:02}.png", photo_of_textures(camera))
+    return folder
+
+
 def distance_to_textures(points: np.ndarray) -> np.ndarray:
     """How far points [N,3] lie from the ball and the floor of `photo_of_textures`, whichever is nearer."""
     return np.minimum(np.abs(np.linalg.norm(points, axis=1) - 1.0), np.abs(points[:, 2] + 1.0))

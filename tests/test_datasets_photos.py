@@ -10,10 +10,11 @@ import pytest
 from PIL import Image
 
 from cagefield.cameras import Camera
-from cagefield.datasets import Dataset, View, photos
+from cagefield.datasets import Dataset, View
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders, read_header, read_photo
 from cagefield.datasets.views import hold_out, report_missing
 from cagefield.errors import DatasetError
+from cagefield.rendering import images
 from posed_photos import save
 
 RNG = np.random.default_rng(5)
@@ -62,22 +63,30 @@ def test_composite_of_shrunk_cut_out_is_the_shrunk_composite(tmp_path):
     np.testing.assert_allclose(on_white(small), direct, atol=1.6)  # alpha and colour each rounded once
 
 
-def test_cut_outs_are_shrunk_in_bands(tmp_path, monkeypatch):
-    """The same as at once, for heights that no band divides, and with little memory."""
-    save(tmp_path / "a.png", RNG.integers(0, 256, (47, 20, 4), dtype=np.uint8))
-    whole = read_photo(tmp_path / "a.png", 3)
-    for pixels in (1, 200, 400):
-        monkeypatch.setattr(photos, "_BAND", pixels)
-        np.testing.assert_array_equal(read_photo(tmp_path / "a.png", 3), whole)
-    monkeypatch.undo()
-    save(tmp_path / "b.png", np.zeros((1000, 1000, 4), np.uint8))
+@pytest.mark.parametrize("channels", [3, 4])
+@pytest.mark.parametrize("factor", [1, 3])
+def test_photos_are_converted_in_tiles(tmp_path, monkeypatch, channels, factor):
+    """The same as at once, for sides that no tile divides."""
+    save(tmp_path / "a.png", RNG.integers(0, 256, (47, 20, channels), dtype=np.uint8))
+    whole = read_photo(tmp_path / "a.png", factor)
+    for pixels in (1, 50, 200, 400):
+        monkeypatch.setattr(images, "_TILE", pixels)
+        np.testing.assert_array_equal(read_photo(tmp_path / "a.png", factor), whole)
+
+
+@pytest.mark.parametrize("shape", [(1000, 1000), (2, 500_000)], ids=["square", "wide"])
+@pytest.mark.parametrize("factor", [1, 2])
+def test_photos_are_read_with_little_memory(tmp_path, shape, factor):
+    save(tmp_path / "a.png", np.zeros((*shape, 4), np.uint8))
     tracemalloc.start()
     try:
-        read_photo(tmp_path / "b.png", 2)
+        found = read_photo(tmp_path / "a.png", factor)
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert most < 10_000_000  # 40 at once; the result has 1 MB, Pillow's own is not counted
+    # Means of a tile take 40 bytes a pixel: 4 MB with lists and names; 12 to 40 at once. Pillow's own is not
+    # counted.
+    assert most < found.nbytes + 4_000_000
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from cagefield.errors import CagefieldError, DatasetError
+from cagefield.rendering import images
 from cagefield.rendering.images import read_image, side_by_side, write_png, write_video
 from cagefield.rendering.render_result import RenderResult, background_rgb, to_uint8
 
@@ -36,6 +39,41 @@ def test_grey_palette_and_16_bit_files_become_rgb(tmp_path):
 def test_16_bit_values_are_rounded(tmp_path):
     Image.fromarray(np.array([[128, 129, 65535]], np.uint16)).save(tmp_path / "a.png")
     np.testing.assert_array_equal(read_image(tmp_path / "a.png")[0, :, 0], [0, 1, 255])
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "RGB", "L", "LA", "P", "1", "I;16"])
+def test_pictures_are_converted_in_tiles(tmp_path, monkeypatch, mode):
+    """The same as at once, with transparency of palettes too, and with little memory."""
+    values = np.random.default_rng(1).integers(0, 256, (41, 30, 4), dtype=np.uint8)
+    rgba = Image.fromarray(values)
+    deep = Image.fromarray(values[..., 0].astype(np.uint16) * 250 + values[..., 1])
+    picture = (
+        deep if mode == "I;16" else rgba.convert("RGB").convert(mode) if mode == "P" else rgba.convert(mode)
+    )
+    picture.save(tmp_path / "a.png", **({"transparency": bytes(range(200))} if mode == "P" else {}))
+    whole = read_image(tmp_path / "a.png")
+    assert whole.shape == (41, 30, 4 if mode in ("RGBA", "LA", "P") else 3)
+    for pixels in (1, 100, 300):
+        monkeypatch.setattr(images, "_TILE", pixels)
+        np.testing.assert_array_equal(read_image(tmp_path / "a.png"), whole)
+    monkeypatch.undo()
+    picture.resize((1000, 1000), Image.Resampling.NEAREST).save(tmp_path / "b.png")
+    tracemalloc.start()
+    try:
+        found = read_image(tmp_path / "b.png")
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < found.nbytes + 3_500_000  # the file, and a tile; all at once took 8 to 24 MB
+
+
+def test_tiles_cover_a_picture_once():
+    for width, height, multiple in ((1, 1, 1), (500_000, 2, 2), (300, 900, 3), (5000, 4000, 8)):
+        covered = np.zeros((height, width), np.uint8)
+        for x, y, end_x, end_y in images.tiles(width, height, multiple):
+            covered[y:end_y, x:end_x] += 1
+            assert x % multiple == y % multiple == 0 and (end_x - x) * (end_y - y) <= 1 << 16
+        assert (covered == 1).all()
 
 
 def test_floats_are_rounded_and_clipped(tmp_path):

@@ -16,11 +16,19 @@ from scipy.ndimage import gaussian_filter
 from cagefield.cameras import Camera
 from cagefield.cli import main
 from cagefield.cli import poses as poses_command
-from cagefield.datasets import features, load_dataset, structure_from_motion
+from cagefield.datasets import features, left_out, load_dataset, poses_work, structure_from_motion
 from cagefield.datasets.dataset import has_photos_alone
 from cagefield.datasets.folds import Fold
-from cagefield.datasets.raw_photos import find_raw_photos, sharpest_frames, sharpness, upright, video_frames
-from cagefield.datasets.structure_from_motion import PosesReport, is_made_of, make_poses, work_folder
+from cagefield.datasets.poses_work import work_folder
+from cagefield.datasets.raw_photos import (
+    RawPhoto,
+    find_raw_photos,
+    sharpest_frames,
+    sharpness,
+    upright,
+    video_frames,
+)
+from cagefield.datasets.structure_from_motion import PosesReport, is_made_of, make_poses
 from cagefield.errors import DatasetError
 from commands import refused
 from posed_photos import distance_to_textures, photo_of_textures, ring, save
@@ -154,7 +162,7 @@ def test_an_interrupted_run_goes_on(photos, tmp_path, monkeypatch, capfd):
         make_poses(source, target, on_progress=stop)
     assert work_folder(target).is_dir() and not target.exists()
     notes = []
-    monkeypatch.setattr(structure_from_motion, "upright", None)  # no photo is read again
+    monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
     report = make_poses(source, target, on_progress=lambda done, note: notes.append(note))
     assert report.placed == 4 and not any("read" in note for note in notes)
     assert capfd.readouterr() == ("", "")  # COLMAP's log stays silent
@@ -235,7 +243,7 @@ def test_sources_that_are_none(tmp_path):
 
 
 def test_reasons_why_photos_found_no_place():
-    raw = [structure_from_motion.RawPhoto(f"{i}", None, 9, 9, None, s, False) for i, s in
+    raw = [RawPhoto(f"{i}", None, 9, 9, None, s, False) for i, s in
            enumerate([1.0, 1.0, 0.1, 1.2, 0.9, 1.0, 1.0])]  # fmt: skip
     counts = np.zeros((7, 7), dtype=int)
     counts[3, 0], counts[4, 1], counts[5, 1], counts[6, 0] = 12, 100, 90, 80
@@ -249,9 +257,7 @@ def test_reasons_why_photos_found_no_place():
         def reg_image_ids(self):
             return [7]
 
-    found = structure_from_motion.reasons_left_out(
-        raw, {0, 1}, [Other()], structure_from_motion._Matches(counts, flat)
-    )
+    found = left_out.reasons_left_out(raw, {0, 1}, [Other()], left_out.Matches(counts, flat))
     assert found == {
         "2": "blurred (10% of the sharpness of the others)",
         "3": "too few matches (at most 12 with a photo that found its place)",

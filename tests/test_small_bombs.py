@@ -19,6 +19,7 @@ from cagefield.fields.files import write_tensors
 from cagefield.fields.nerf_file import load_nerf
 from cagefield.fields.voxel import VoxelField
 from cagefield.keyframe_files import load_keys
+from cagefield.rendering import images
 from cagefield.rendering.images import read_image
 from cagefield.scene_files import is_scene, read_cameras
 from cagefield.server.editor.document import Document
@@ -45,6 +46,22 @@ def test_a_grid_that_holds_next_to_nothing_is_refused(tmp_path: Path) -> None:
         VoxelField.load(grid(tmp_path, 2048, 10))
     assert VoxelField.load(grid(tmp_path, 512, 10)).resolution == (512,) * 3
     assert VoxelField.load(grid(tmp_path, 640, 300_000)).resolution == (640,) * 3
+
+
+def test_a_picture_is_not_asked_for_more_than_its_file_holds(tmp_path: Path) -> None:
+    """A chunk that claims 4 GB: pillow asks for them, and Python fetches memory before it reads.
+
+    A petabyte is a MemoryError on every machine.
+    """
+    content = bytearray(_png(16, 12))
+    at = content.index(b"IDAT") - 4
+    content[at : at + 4] = struct.pack(">I", 0xFFFF0017)
+    (tmp_path / "a.png").write_bytes(content)
+    with images.opened_picture(tmp_path / "a.png") as picture:
+        file = picture.fp
+        file.seek(0)
+        assert file.read(1 << 50) == bytes(content) and file.read(1 << 50) == b""
+        assert file.read(10) == b"" and file.seek(8) == 8 and file.read() == bytes(content[8:])
 
 
 def _png(width: int, height: int) -> bytes:

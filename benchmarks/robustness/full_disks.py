@@ -61,7 +61,7 @@ def _fill(name: str, source: Path, found: disks.Filled, levels: int) -> int:
     command = disk_commands.DISK_COMMANDS[name]
     need = disks.room_for(command, source)
     for again in (True,) if command.on_disk else (False, True):
-        for left in disks.levels(need, levels):
+        for left in disks.levels(round(need * command.on_the_way), levels):
             disks.fill(name, command, source, left, again, found)
     return need
 

@@ -1,6 +1,7 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
-python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10] [--out FILE.md]
+python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
+    [--step 1] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
 wanted, and at random moments. Editors (`cagefield view`) are killed while a page sends changes, saves and
@@ -51,6 +52,7 @@ def main() -> None:
     parser.add_argument("--random", type=int, default=40, help="kills at random, of each command")
     parser.add_argument("--slow", type=int, default=10, help="the same of each command with kernels")
     parser.add_argument("--servers", type=int, default=10)
+    parser.add_argument("--step", type=int, default=1, help="kills at every such call only")
     parser.add_argument("--only", nargs="*", default=None)
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
@@ -78,7 +80,7 @@ def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -
     command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
     with tempfile.TemporaryDirectory() as folder:
         calls, seconds = kills.calls_of(name, Path(folder))
-    points = [*range(1, calls + 1)] * (1 if slow else options.rounds)
+    points = [*range(1, calls + 1, options.step)] * (1 if slow else options.rounds)
     random.Random(name).shuffle(points)
     for at in points:
         with tempfile.TemporaryDirectory() as folder:

@@ -8,6 +8,7 @@ from pathlib import Path
 from cagefield import Scene
 from cagefield.datasets.procedural import make_scene
 from cagefield.formats.splat_files import write_splats
+from posed_photos import photos_alone
 from scenes import ball_scene
 from splat_scenes import ball_of_splats
 
@@ -20,11 +21,15 @@ EDITS = """edits:
 
 
 def sources(folder: Path) -> None:
-    """What commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits."""
+    """What commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
+
+    And photos without poses.
+    """
     ball_scene().save(folder / "voxels")
     Scene(ball_of_splats(4000), cameras=ball_scene().cameras).save(folder / "splats")
     write_splats(ball_of_splats(4000), folder / "x.ply")
     make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
+    photos_alone(folder / "photos_alone")
     (folder / "e.yaml").write_text(EDITS)
 
 
@@ -41,6 +46,8 @@ class DiskCommand:
     """The folder of `sources` that is copied to `out` and changed there; else nothing, or an old result."""
     keeps: bool = False
     """Pictures that fit stay, without an old result: they can be looked at."""
+    on_the_way: float = 1.0
+    """Room that the command takes meanwhile, over that of its result."""
 
     def arguments(self, source: Path, disk: Path, again: bool) -> list[str]:
         """The command line; `again` where its result is there."""
@@ -84,6 +91,7 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "demo": DiskCommand(
         "demo -o {out} --views 3 --size 32 --steps 3 --resolution 16 --frames 2", "made", keeps=True
     ),
+    "poses": DiskCommand("poses {s}/photos_alone -o {out}", "data", on_the_way=3.0),
     "bench speed": DiskCommand(
         "bench speed {s}/voxels -o {out} --size 24 --cameras 1 --rounds 1", "speed.json"
     ),

@@ -155,8 +155,10 @@ def _line_problem(lines: list[str], out: Path) -> str | None:
 
 
 def _is_told(name: str, command: DiskCommand, place: Path, lines: list[str]) -> bool:
-    """Whether something new may be there: what the line names, and pictures that fitted."""
-    if any(str(place / name) in line for line in lines if name != command.out):
+    """Whether something new may be there: what the line names, all in it, and pictures that fitted."""
+    told = [place / name, *(place / name).parents]
+    told = told[: told.index(place)]
+    if any(str(each) in line for each in told for line in lines if each != place / command.out):
         return True
     return command.keeps and name.split("/")[0] == command.out and "/." not in f"/{name}"
 

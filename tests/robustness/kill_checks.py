@@ -110,3 +110,22 @@ def photos_problem(folder: Path, said: int) -> str | None:
     except Exception as error:
         return f"unreadable: {error}"
     return None
+
+
+def poses_problem(folder: Path, said: int) -> str | None:
+    """What is wrong with the data set, of which an old one was there: not whole, or the user's file gone."""
+    from cagefield import datasets
+    from cagefield.datasets.colmap_files import check_whole
+    from cagefield.rendering.images import read_image
+
+    data = folder / "data"
+    if not (data / "notes.txt").is_file():
+        return "lost: the user's file"
+    try:
+        check_whole(data / "sparse" / "0")
+        views = datasets.load_dataset(data, holdout=0).train
+        for view in views:
+            read_image(view.image_path)
+    except Exception as error:
+        return f"unreadable: {error}"
+    return None if len(views) == 4 else f"lost: {4 - len(views)} photos of 4"

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
+import io
 import shutil
+import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from kill_checks import (
@@ -15,6 +19,7 @@ from kill_checks import (
     new_problem,
     photos_problem,
     pictures_problem,
+    poses_problem,
     scene_problem,
     trained_problem,
     video_problem,
@@ -24,6 +29,7 @@ from kill_points import Say
 from cagefield import Scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
+from posed_photos import photos_alone
 from scenes import ball_scene
 from splat_scenes import ball_of_splats
 
@@ -51,11 +57,11 @@ class Command:
 def _cli(*arguments: object) -> None:
     from cagefield.cli import main
 
-    with open(os.devnull, "w") as nowhere:
-        sys.stdout = sys.stderr = nowhere
+    said = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
         code = main([str(argument) for argument in arguments])
     if code != 0:
-        raise RuntimeError(f"exit code {code}")
+        raise RuntimeError(f"exit code {code}: {said.getvalue().splitlines()[-1:]}")
 
 
 def _make(folder: Path) -> None:
@@ -195,6 +201,29 @@ def _make_scene(folder: Path, say: Say) -> None:
     say(1)
 
 
+@cache
+def _posed() -> tempfile.TemporaryDirectory[str]:
+    """Photos without poses, and the data set that was made of them; made once, by another process."""
+    folder = tempfile.TemporaryDirectory(prefix="cagefield-posed-")
+    photos = photos_alone(Path(folder.name) / "photos")
+    command = [sys.executable, "-m", "cagefield", "poses", str(photos), "-o", f"{folder.name}/data"]
+    subprocess.run(command, check=True, capture_output=True)
+    return folder
+
+
+def _make_posed(folder: Path) -> None:
+    shutil.copytree(_posed().name, folder, dirs_exist_ok=True)
+    (folder / "data" / "notes.txt").write_text("mine")
+
+
+def _poses(folder: Path, say: Say) -> None:
+    from cagefield.datasets import matching
+
+    matching._FEW = 3  # six pairs are matched in two processes, as those of many photos are
+    _cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
+    say(1)
+
+
 COMMANDS: dict[str, Command] = {
     "edit --overwrite": Command(_make, _edit, scene_problem),
     "edit -o": Command(_make, _edit_new, new_problem),
@@ -215,5 +244,6 @@ SLOW_COMMANDS: dict[str, Command] = {
     "bake": Command(_make_splats, _bake, trained_problem),
     "export --as mesh": Command(_make, _mesh, mesh_problem),
     "make-scene": Command(_make, _make_scene, photos_problem),
+    "poses": Command(_make_posed, _poses, poses_problem),
 }
 """Others: seconds for each kill."""

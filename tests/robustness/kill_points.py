@@ -200,7 +200,19 @@ def _changes(event: str, arguments: tuple[Any, ...], root: str) -> bool:
         return (
             isinstance(path, (str, bytes)) and bool(flags & _WRITING) and os.fsdecode(path).startswith(root)
         )
-    return event in _EVENTS and any(
-        isinstance(path, (str, bytes, os.PathLike)) and os.fsdecode(path).startswith(root)
-        for path in arguments
-    )
+    if event not in _EVENTS:
+        return False
+    paths = [os.fsdecode(path) for path in arguments if isinstance(path, (str, bytes, os.PathLike))]
+    if any(path.startswith(root) for path in paths):
+        return True
+    # A name in a folder that is open, as in a tree that is removed.
+    handles = [handle for handle in arguments if isinstance(handle, int) and handle > 2]
+    return any(_path_of(handle).startswith(root) for handle in handles)
+
+
+def _path_of(handle: int) -> str:
+    """The path of an open file, where the system tells."""
+    try:
+        return os.readlink(f"/proc/self/fd/{handle}")
+    except OSError:
+        return ""

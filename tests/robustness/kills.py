@@ -72,10 +72,14 @@ def kill(
 
 
 def hidden(folder: Path) -> list[str]:
-    """Hidden files and folders, beside locks, whose files may stay, and the marks of folders of pictures."""
+    """Hidden files and folders, beside locks, whose files may stay, and the marks of folders of pictures.
+
+    And the folders of poses that are half found.
+    """
     return [
         str(file.relative_to(folder))
-        for file in folder.rglob(".*")
+        for pattern in (".*", "*.work")
+        for file in folder.rglob(pattern)
         if not file.name.endswith(("cagefield-lock", "cagefield-pictures"))
     ]
 

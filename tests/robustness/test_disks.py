@@ -39,6 +39,16 @@ def test_a_command_on_a_full_disk(source: Path, name: str) -> None:
     assert found.runs - found.fitted >= 3  # what stays as it is takes no room
 
 
+def test_poses_on_a_full_disk(source: Path) -> None:
+    """COLMAP's database fills the disk, over an old data set: that stays, and what is done is kept."""
+    pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
+    command, found = DISK_COMMANDS["poses"], Filled()
+    need = room_for(command, source)
+    for share in (0.9, 1.2):
+        disks.fill("poses", command, source, round(share * need / PAGE) * PAGE, True, found)
+    assert found.faults == [] and found.runs - found.fitted == 2
+
+
 def test_what_is_wrong_is_seen(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The checks themselves: a command that ends well, changes a file, leaves one, and says nothing."""
     found = Filled()

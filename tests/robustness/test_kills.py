@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from kill_points import Ended, Say, adopted, children, forked
-from kills import COMMANDS, Killed, calls_of, kill
+from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="this system forks no processes"),
@@ -47,6 +48,35 @@ def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     session.make(tmp_path / "other")
     assert (session.check(tmp_path / "other", 4) or "").startswith("lost: change 2 was kept")
+
+
+def test_poses_that_would_be_lost_are_seen(tmp_path: Path) -> None:
+    """The checks of data sets: a photo, a model, or the user's file that is gone, and work that is left."""
+    pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
+    command = SLOW_COMMANDS["poses"]
+    command.make(tmp_path)
+    assert command.check(tmp_path, 0) is None and hidden(tmp_path) == []
+    (tmp_path / "data.work").mkdir()
+    assert hidden(tmp_path) == ["data.work"]
+    points = tmp_path / "data" / "sparse" / "0" / "points3D.bin"
+    content = points.read_bytes()
+    points.write_bytes(content[:-5])
+    assert (command.check(tmp_path, 0) or "").startswith("unreadable")
+    points.write_bytes(content)
+    (tmp_path / "data" / "images" / "02.png").write_bytes(b"half")
+    assert (command.check(tmp_path, 0) or "").startswith("unreadable")
+    (tmp_path / "data" / "notes.txt").unlink()
+    assert command.check(tmp_path, 0) == "lost: the user's file"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system does not tell what is open")
+def test_calls_in_open_folders_are_kill_points(tmp_path: Path) -> None:
+    """Trees are removed by names in folders that are open: one call for each file."""
+    (tmp_path / "tree").mkdir()
+    for name in "abc":
+        (tmp_path / "tree" / name).touch()
+    ended = forked(lambda say: shutil.rmtree(tmp_path / "tree"), tmp_path, 3)
+    assert ended.killed and len(list((tmp_path / "tree").iterdir())) == 1
 
 
 def test_processes_that_go_on_are_seen(tmp_path: Path) -> None:

@@ -63,7 +63,8 @@ class Poses:
 
 def make(photos: Path, target: Path, frames: int = 80) -> str:
     """Writes the data set `target` of photos or a video, with a progress bar; returns lines about it."""
-    from cagefield.datasets.structure_from_motion import make_poses, work_folder
+    from cagefield.datasets.poses_work import work_folder
+    from cagefield.datasets.structure_from_motion import make_poses
 
     start = time.monotonic()
     try:

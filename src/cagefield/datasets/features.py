@@ -6,6 +6,9 @@ COLMAP measures pixels as cagefield does: the first pixel has its centre at (.5,
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
+import shutil
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +18,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.errors import DatasetError
+from cagefield.datasets import colmap_process
+from cagefield.datasets.colmap_process import StoppedError
+from cagefield.errors import CagefieldError, DatasetError
 
 FloatArray = npt.NDArray[np.float64]
 Pairs = Sequence[tuple[int, int]]
@@ -31,6 +36,9 @@ _FATAL = 3  # glog's level that only ends the process
 # pycolmap's own in one process would break each other's locks (sqlite.org, "How To Corrupt An SQLite
 # Database File", 2.2).
 _PHOTOS_AT_ONCE = 8
+
+_LITTLE = 8_000_000
+"""Bytes free on a disk, under which they are told where a database fails: COLMAP does not always say why."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
 
     `poll` is called several times a second meanwhile.
 
-    Raises DatasetError with the reason where COLMAP fails.
+    Raises StoppedError with the reason where COLMAP fails.
     """
     token = engine().CancellationToken()
     result: list[Any] = []
@@ -97,18 +105,36 @@ def call(function: Callable[..., Any], *args: Any, poll: Callable[[], None] | No
             raise
     if failure:
         reason = " ".join(str(failure[0]).split())
-        raise DatasetError(f"COLMAP stopped at {function.__name__}: {reason}") from failure[0]
+        raise StoppedError(f"COLMAP stopped at {function.__name__}: {reason}") from failure[0]
     return result[0]
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """The database in a file, silently. Raises StoppedError with the reason where COLMAP fails."""
+    try:
+        with quiet(), contextlib.closing(engine().Database.open(path)) as database:
+            yield database
+    except (OSError, CagefieldError):
+        raise
+    except (RuntimeError, ValueError) as error:
+        free = shutil.disk_usage(path.parent).free
+        left = f", and {free // 1000} kB are free on its disk" if free < _LITTLE else ""
+        reason = " ".join(str(error).split())
+        raise StoppedError(f"COLMAP stopped at its database {path}: {reason}{left}") from error
 
 
 def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo]) -> None:
     """Writes a database with these pycolmap cameras and photos; photo i becomes image i + 1, frame i + 1.
 
-    Camera and rig numbers count from 1 too.
+    Camera and rig numbers count from 1 too. It is at `path` whole, or not at all.
     """
     pycolmap = engine()
-    path.unlink(missing_ok=True)
-    with quiet(), contextlib.closing(pycolmap.Database.open(path)) as database:
+    draft = path.with_suffix(".new")
+    journals = [draft.with_name(draft.name + ending) for ending in ("-wal", "-shm")]
+    for file in (draft, *journals):
+        file.unlink(missing_ok=True)
+    with opened(draft) as database:
         for index, camera in enumerate(cameras, start=1):
             camera.camera_id = index
             database.write_camera(camera, use_camera_id=True)
@@ -121,6 +147,10 @@ def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo])
             frame = pycolmap.Frame(frame_id=index, rig_id=photo.camera + 1)
             frame.add_data_id(image.data_id)
             database.write_frame(frame, use_frame_id=True)
+    if any(journal.is_file() and journal.stat().st_size for journal in journals):
+        # SQLite closes a database that did not take in its journal, and says nothing.
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    draft.replace(path)
 
 
 def extract(
@@ -137,28 +167,55 @@ def extract(
 
     At most `features` a photo, in photos shrunk to `longer_side` pixels (positions are of the whole photo).
     `masks` holds an 8-bit image NAME.png for photos where only features on white count.
+
+    Raises StoppedError where COLMAP fails.
     """
+    count = max(1, len(names))
+
+    def progress(done: int) -> None:
+        if on_progress is not None:
+            on_progress(done / count, f"features of {done} of {len(names)} photos")
+
+    task = {
+        "task": "extract",
+        "database": str(database),
+        "images": str(images),
+        "names": list(names),
+        "features": features,
+        "longer_side": longer_side,
+        "masks": None if masks is None else str(masks),
+    }
+    colmap_process.run("finding features", [task], progress)
+
+
+def extract_here(
+    database: str,
+    images: str,
+    names: Sequence[str],
+    features: int,
+    longer_side: int,
+    masks: str | None,
+    on_done: Callable[[int], None],
+) -> None:
+    """The same in this process, which COLMAP ends where it cannot write; `on_done` has the photos done."""
     pycolmap = engine()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, max_image_size=longer_side)
     options.sift.max_num_features = features
     reader = pycolmap.ImageReaderOptions()
     if masks is not None:
-        reader.mask_path = str(masks)
-
+        reader.mask_path = masks
     for start in range(0, len(names), _PHOTOS_AT_ONCE):
         batch = list(names[start : start + _PHOTOS_AT_ONCE])
         call(
             pycolmap.extract_features,
-            database,
-            images,
+            Path(database),
+            Path(images),
             image_names=batch,
             reader_options=reader,
             extraction_options=options,
             device=pycolmap.Device.cpu,
         )
-        if on_progress is not None:
-            done = start + len(batch)
-            on_progress(done / len(names), f"features of {done} of {len(names)} photos")
+        on_done(start + len(batch))
 
 
 def all_pairs(count: int) -> list[tuple[int, int]]:
@@ -181,7 +238,7 @@ def likely_pairs(
 
     steps = [*range(1, neighbours + 1), 16, 32, 64]
     pairs = {(i, i + step) for i in range(count) for step in steps if i + step < count}
-    with quiet(), contextlib.closing(engine().Database.open(database)) as source:
+    with opened(database) as source:
         descriptors = [_descriptors(source, index + 1) for index in range(count)]
     sample = np.concatenate([d[:: max(1, len(d) * count // 20000)] for d in descriptors])
     if len(sample) >= 64:

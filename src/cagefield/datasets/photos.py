@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,13 +13,10 @@ import numpy.typing as npt
 from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import DAMAGED, check_pixels
+from cagefield.rendering.images import DAMAGED, opened_picture, tiles
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
-
-_BAND = 1 << 16
-"""Pixels of a photo with alpha that are averaged at a time."""
 
 _DEEP_MODES = ("I", "F")  # and "I;16...": more than 8 bits a channel
 
@@ -66,29 +65,29 @@ def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     Raises DatasetError where the file cannot be read.
     """
     with _opened(path) as image:
+        mode = "RGBA" if _has_alpha(image) else "RGB"
+        width, height = image.width // factor, image.height // factor
+        if min(width, height) < 1:
+            raise DatasetError(
+                f"{path}: {image.width}x{image.height} pixels are too few to shrink by {factor}; use less"
+            )
+        pixels = np.empty((height, width, len(mode)), np.uint8)
         try:
-            pixels = image.convert("RGBA" if _has_alpha(image) else "RGB")
+            image.load()
+            for box in tiles(width * factor, height * factor, factor):
+                x, y, end_x, end_y = (side // factor for side in box)
+                pixels[y:end_y, x:end_x] = _shrunk(image.crop(box).convert(mode), factor)
         except DAMAGED as error:
             raise DatasetError(f"{path}: the image cannot be decoded ({error}); replace the file") from error
-    if factor == 1:
-        return np.array(pixels)
-    if min(pixels.size) < factor:
-        raise DatasetError(
-            f"{path}: {pixels.width}x{pixels.height} pixels are too few to shrink by {factor}; use less"
-        )
-    box = (0, 0, pixels.width // factor * factor, pixels.height // factor * factor)
-    if pixels.mode == "RGB":
-        return np.array(pixels.reduce(factor, box))
-    rows = factor * max(1, _BAND // (factor * max(1, pixels.width)))
-    shrunk = np.empty((box[3] // factor, box[2] // factor, 4), np.uint8)
-    for first in range(0, box[3], rows):
-        end = min(first + rows, box[3])
-        shrunk[first // factor : end // factor] = _shrunk(pixels.crop((0, first, box[2], end)), factor)
-    return shrunk
+    return pixels
 
 
 def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
-    """Means of an RGBA picture, whose sides are multiples of `factor`: 40 bytes for each of its pixels."""
+    """Means of a part of a photo, whose sides are multiples of `factor`: 40 bytes for each of its pixels."""
+    if factor == 1:
+        return np.asarray(pixels)
+    if pixels.mode == "RGB":
+        return np.asarray(pixels.reduce(factor))
     straight = np.asarray(pixels, dtype=np.float32)
     blocks = straight.reshape(pixels.height // factor, factor, pixels.width // factor, factor, 4)
     alpha = blocks[..., 3:].mean(axis=(1, 3))
@@ -132,19 +131,20 @@ def choose_downscale(longer_side: int, downscale: int | None, stored: dict[int, 
     return int(downscale)
 
 
-def _opened(path: Path) -> Image.Image:
-    try:
-        image = Image.open(path)
-        check_pixels(image, path.stat().st_size)
-    except DAMAGED as error:
-        raise DatasetError(
-            f"{path}: not a readable image ({error}); replace the file or remove its frame"
-        ) from error
-    if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
-        raise DatasetError(
-            f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
-        )
-    return image
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    with contextlib.ExitStack() as stack:
+        try:
+            image = stack.enter_context(opened_picture(path))
+        except DAMAGED as error:
+            raise DatasetError(
+                f"{path}: not a readable image ({error}); replace the file or remove its frame"
+            ) from error
+        if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
+            raise DatasetError(
+                f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
+            )
+        yield image
 
 
 def _has_alpha(image: Image.Image) -> bool:

@@ -13,7 +13,6 @@ Source: the problem in Cai et al., "Doppelgangers: Learning to Disambiguate Imag
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -52,9 +51,9 @@ def are_in_order(counts: Counts) -> bool:
 
 def remove_pairs(database: Path, pairs: set[tuple[int, int]]) -> None:
     """Takes the verified matches of pairs (i, j) out of a database."""
-    with features.quiet(), contextlib.closing(features.engine().Database.open(database)) as opened:
+    with features.opened(database) as source:
         for i, j in sorted(pairs):
-            opened.delete_two_view_geometry(i + 1, j + 1)
+            source.delete_two_view_geometry(i + 1, j + 1)
 
 
 def far_pairs(counts: Counts) -> set[tuple[int, int]]:
@@ -69,15 +68,15 @@ def relative_rotations(
     """R_j R_i^T [3,3] of the pairs whose photos are in the model `chain`, from their own matches alone."""
     pycolmap = features.engine()
     found = {}
-    with features.quiet(), contextlib.closing(pycolmap.Database.open(database)) as opened:
+    with features.opened(database) as source:
         placed = {number - 1 for number in chain.reg_image_ids()}
         used = {index for pair in pairs for index in pair} & placed
-        keypoints = {i: np.asarray(opened.read_keypoints(i + 1), dtype=np.float64)[:, :2] for i in used}
+        keypoints = {i: np.asarray(source.read_keypoints(i + 1), dtype=np.float64)[:, :2] for i in used}
         cameras = {i: chain.camera(chain.image(i + 1).camera_id) for i in used}
         for i, j in sorted(pairs):
             if i not in used or j not in used:
                 continue
-            geometry = opened.read_two_view_geometry(i + 1, j + 1)
+            geometry = source.read_two_view_geometry(i + 1, j + 1)
             if len(geometry.inlier_matches) < LEAST_MATCHES:
                 continue
             if pycolmap.estimate_two_view_geometry_pose(

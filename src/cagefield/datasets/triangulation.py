@@ -11,7 +11,6 @@ epipolar plane) small, both ways round.
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -209,7 +208,7 @@ def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[_Shrunk]) -> list
     """
     keypoints: list[FloatArray] = []
     directions: list[FloatArray] = []
-    with features.quiet(), contextlib.closing(pycolmap.Database.open(path)) as database:
+    with features.opened(path) as database:
         for index, one in enumerate(shrunk, start=1):
             camera = one.camera
             found = (

@@ -102,6 +102,8 @@ def read_splats(
             array[done : done + len(batch)] = part
         done += len(batch)
         on_progress(done / count)
+    for array in arrays:
+        array.setflags(write=False)  # a field copies what may be written to
     means, log_scales, quaternions, opacities, sh = (array[:done] for array in arrays)
     return SplatField(
         means, log_scales, quaternions, opacities, sh, antialiased=source.antialiased, discs=source.discs

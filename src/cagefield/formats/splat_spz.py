@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import AXES, Axes
-from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.formats.splat_table import SplatBatch, SplatSource
 from cagefield.typing import AnyArray
 
 SPZ_AXES: Axes = "rub"
@@ -49,6 +49,9 @@ _MOST_RATIO = 1040
 
 _SMALL, _USUAL_RATIO = 1 << 20, 100
 """Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
+
+_DECODED = 1 << 15
+"""Splats that are decoded at a time: each takes 600 bytes meanwhile."""
 
 # Coordinate systems of the extension, by their number.
 _SYSTEMS = (None, "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf")
@@ -192,8 +195,8 @@ def _source(
         return np.frombuffer(spool.read((last - first) * widths[number]), np.uint8).reshape(last - first, -1)
 
     def batches() -> Iterator[SplatBatch]:
-        for first in range(0, count, BATCH):
-            last = min(first + BATCH, count)
+        for first in range(0, count, _DECODED):
+            last = min(first + _DECODED, count)
             positions, alpha, colours, scales, turns, rest = (
                 column(number, first, last) if widths[number] else np.zeros((last - first, 0), np.uint8)
                 for number in range(6)

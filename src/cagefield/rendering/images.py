@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import struct
 import zlib
@@ -26,6 +27,8 @@ MOST_PIXELS = 100 << 20
 _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
+_TILE = 1 << 16
+
 DAMAGED = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
     RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
@@ -47,6 +50,46 @@ def check_pixels(image: Image.Image, size: int | None = None) -> None:
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
+class _PictureFile(io.BufferedReader):
+    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self._size = os.fstat(self.fileno()).st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
+            size = min(size, max(0, self._size - self.tell()))
+        return super().read(size)
+
+    def __repr__(self) -> str:
+        return repr(str(self.name))
+
+
+@contextmanager
+def opened_picture(path: Path) -> Iterator[Image.Image]:
+    """The picture in a file, of which the header is read, and at most MOST_PIXELS can be.
+
+    Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
+    """
+    with _PictureFile(path) as file, Image.open(file) as image:
+        check_pixels(image, path.stat().st_size)
+        yield image
+
+
+def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
+    """Boxes (x, y, end x, end y) that cover a picture, of some ten thousand pixels each.
+
+    Pictures are converted by them: what that takes is no more for large ones. Their sides are multiples of
+    `multiple`, but for those at the right and at the bottom.
+    """
+    across = max(multiple, _TILE // multiple // multiple * multiple)
+    down = max(multiple, _TILE // min(width, across) // multiple * multiple)
+    for y in range(0, height, down):
+        for x in range(0, width, across):
+            yield x, y, min(x + across, width), min(y + down, height)
+
+
 def read_image(path: str | os.PathLike[str]) -> UInt8:
     """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
 
@@ -55,14 +98,18 @@ def read_image(path: str | os.PathLike[str]) -> UInt8:
     """
     path = Path(path)
     try:
-        with Image.open(path) as file:
-            image: Image.Image = file
-            check_pixels(image, path.stat().st_size)
+        with opened_picture(path) as image:
             image.load()
-            if image.mode.startswith("I"):
-                image = Image.fromarray((np.asarray(image) / 257.0 + 0.5).astype(np.uint8))
+            deep = image.mode.startswith("I")
             transparent = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
-            return np.array(image.convert("RGBA" if transparent else "RGB"))
+            mode = "RGBA" if transparent and not deep else "RGB"
+            pixels = np.empty((image.height, image.width, len(mode)), np.uint8)
+            for x, y, end_x, end_y in tiles(image.width, image.height):
+                part = image.crop((x, y, end_x, end_y))
+                if deep:
+                    part = Image.fromarray((np.asarray(part) / 257.0 + 0.5).astype(np.uint8))
+                pixels[y:end_y, x:end_x] = np.asarray(part.convert(mode))
+            return pixels
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: there is no such image") from error
     except DAMAGED as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 K = TypeVar("K")
@@ -34,3 +35,12 @@ class IdentityCache(Generic[K, V]):
         if len(self._items) > self._capacity:
             del self._items[next(iter(self._items))]
         return value
+
+    def keep_only(self, keys: Iterable[K]) -> None:
+        """Forgets all other objects."""
+        known = {id(key) for key in keys}
+        self._items = {number: item for number, item in self._items.items() if number in known}
+
+    def values(self) -> list[V]:
+        """What is remembered, the oldest first."""
+        return [value for _, value in self._items.values()]

@@ -44,6 +44,10 @@ class EditedRenderers:
         """The exact renderers that are ready, the newest last."""
         return [kept.renderer for kept in self._exact]
 
+    def keep_only(self, edits: Sequence[Edit]) -> None:
+        """Forgets what was made of other edits, which nobody else keeps; but for the renderers."""
+        self._coarse.keep_only(edits)
+
     def renderer(
         self,
         edits: Sequence[Edit],

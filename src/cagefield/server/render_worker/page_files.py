@@ -53,6 +53,8 @@ class PageFiles:
         """The edits' file, or the part of it that the page has not. Raises EditError, CagefieldError."""
         began = time.perf_counter()
         edits = self._renderers.edits(task.shown.edits)
+        self._for_page.keep_only(self._renderers.known_edits)
+        self._own.keep_only([*self._for_page.values()])
         field = self._renderers.scene.field
         if isinstance(field, SplatField):
             return self._splat_edits(field, edits, task, stop)

@@ -17,6 +17,7 @@ from typing import Any
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.server.render_worker.lifeline import end_with_parent
 from cagefield.server.render_worker.tasks import Failed, Ready, Result, Task
+from cagefield.server.render_worker.unused_memory import UnusedMemory
 
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
@@ -41,8 +42,10 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
     except CagefieldError as error:
         _sent(connection, Failed(0, str(error)))
         return
+    unused = UnusedMemory()
     going_on = _sent(connection, Ready())
     while going_on:
+        unused.give_back()
         try:
             task = connection.recv()
         except _LOST:

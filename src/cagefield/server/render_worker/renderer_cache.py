@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -42,6 +43,9 @@ MOVING_QUALITY, REST_QUALITY = 85, 95
 
 KEPT_EDITS = 64
 """Edits whose maps are kept for when they are shown again."""
+
+KEPT_BYTES = 256 << 20
+"""Bytes of the lattices of those of them that are not shown, at most."""
 
 MOST_DEPTHS = 120_000
 """Depths sent with a picture, at most."""
@@ -135,14 +139,25 @@ class RendererCache:
         return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, exact, proceed)
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
-        """The edits with these fields; those that were there before are the same objects."""
+        """The edits with these fields; those that were there before are the same objects.
+
+        Those shown last are kept, as far as `KEPT_EDITS` and `KEPT_BYTES` allow.
+        """
         found = []
         for fields in values:
             edit = Edit(**fields)
             found.append(next((known for known in self._edits if known == edit), edit))
         others = [known for known in self._edits if not any(known is edit for edit in found)]
-        self._edits = [*found, *others][:KEPT_EDITS]
+        sizes = itertools.accumulate(_lattice_bytes(edit) for edit in others)
+        others = [edit for edit, size in zip(others, sizes, strict=True) if size <= KEPT_BYTES]
+        self._edits = [*found, *others][: max(KEPT_EDITS, len(found))]
+        self.edited.keep_only(self._edits)
         return found
+
+    @property
+    def known_edits(self) -> Sequence[Edit]:
+        """The edits that are kept, those shown last first."""
+        return self._edits
 
     def reach(self, camera: Camera) -> tuple[float, float]:
         """(nearest, farthest) distance of the field's box from a camera."""
@@ -181,6 +196,11 @@ class RendererCache:
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
         return min(max(shown, least), LONGEST_STEP)
+
+
+def _lattice_bytes(edit: Edit) -> int:
+    """Bytes of the lattice of an edit, whether it has been made or not."""
+    return 12 * (edit.lattice or 0) ** 3 if edit.adjustment == "continuous" else 0
 
 
 def _warm_splats(stage: WarmStage) -> None:

@@ -1,0 +1,157 @@
+"""The folder of what structure from motion has done so far, from which an interrupted run continues.
+
+It holds upright photos, their copies under plain names for COLMAP, masks, the database of features and
+matches, and what it was made of. Each file in it is whole, or not there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from cagefield import json_text
+from cagefield.atomic_files import replaced_file, replaced_folder
+from cagefield.datasets.colmap_process import StoppedError
+from cagefield.datasets.features import OnProgress
+from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
+from cagefield.errors import DatasetError, line_of
+from cagefield.leftovers import hidden_name, remove_leftovers
+
+_VERSION = 1
+
+
+def work_folder(target: Path) -> Path:
+    """The folder beside `target` that an interrupted run leaves."""
+    return target.with_name(target.name + ".work")
+
+
+def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
+    """The work folder, emptied where it is of other photos."""
+    remove_leftovers(work)
+    note = work / "made_of.json"
+    text = json.dumps(record)
+    if work.exists():
+        if note.is_file() and note.read_text(encoding="utf-8") == text:
+            return
+        if not note.is_file() and any(work.iterdir()):
+            raise DatasetError(f"folder {work} is in the way and holds something else; move it away")
+        remove_work(work)
+    with replaced_folder(work, ()) as draft:
+        (draft / note.name).write_text(text, encoding="utf-8")
+
+
+def remove_work(work: Path) -> None:
+    """Removes the work folder: hidden first, so that what an end leaves of it is nobody's work."""
+    hidden = work.with_name(hidden_name(work, "new"))
+    try:
+        work.rename(hidden)
+    except OSError:
+        hidden = work
+    shutil.rmtree(hidden, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def kept_work(work: Path) -> Iterator[None]:
+    """An error of the system's or of COLMAP's says that the work folder stays, where there is one."""
+    try:
+        yield
+    except (OSError, StoppedError) as error:
+        if not work.is_dir():
+            raise
+        reason = line_of(error) if isinstance(error, OSError) else str(error)
+        raise StoppedError(
+            f"{reason}; what is done so far is kept in {work}, the same command continues"
+        ) from error
+
+
+def work_photos(
+    source: Path, work: Path, frames: int, on_progress: OnProgress
+) -> tuple[list[RawPhoto], dict[str, str]]:
+    """The upright photos in the work folder, and those that cannot be read with the reason."""
+    note = work / "photos.json"
+    if note.is_file():
+        kept = json_text.loads(note.read_text(encoding="utf-8"))
+        known = [RawPhoto(**{**one, "path": work / "images" / one["name"]}) for one in kept["photos"]]
+        return known, kept["unreadable"]
+    shutil.rmtree(work / "images", ignore_errors=True)
+    if source.is_file():
+        base = work / "frames"
+        shutil.rmtree(base, ignore_errors=True)
+        files = video_frames(source, frames, base, on_progress)
+    else:
+        base = _base(source)
+        files = find_raw_photos(base)
+    photos, unreadable = [], {}
+    for index, file in enumerate(files, start=1):
+        name = file.relative_to(base).as_posix()
+        try:
+            photos.append(upright(file, name, work / "images"))
+        except DatasetError as error:
+            unreadable[name] = str(error).removeprefix(f"{file}: ")
+        on_progress(index / len(files), f"{index} of {len(files)} photos read")
+    listing = [{**asdict(photo), "path": ""} for photo in photos]
+    with replaced_file(note) as draft:
+        draft.write_text(json.dumps({"photos": listing, "unreadable": unreadable}), encoding="utf-8")
+    return photos, unreadable
+
+
+def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
+    """Plain names of the photos for COLMAP, in the folder `colmap`; masks of cut-outs in `masks`.
+
+    COLMAP's lists of pairs hold no names with spaces, and it does not read every format.
+    """
+    folder = work / "colmap"
+    folder.mkdir(exist_ok=True)
+    names = []
+    for index, photo in enumerate(photos):
+        simple = photo.path.suffix.lower() in (".jpg", ".jpeg", ".png") and not photo.alpha
+        name = f"{index:06}{photo.path.suffix.lower() if simple else '.png'}"
+        names.append(name)
+        if (folder / name).exists():
+            continue
+        if simple:
+            try:
+                os.link(photo.path, folder / name)
+            except OSError:
+                with replaced_file(folder / name) as draft:
+                    shutil.copyfile(photo.path, draft)
+            continue
+        with Image.open(photo.path) as image:
+            pixels = image.convert("RGBA")
+        if photo.alpha:
+            mask = pixels.getchannel("A").point(lambda value: 255 if value > 127 else 0)
+            (work / "masks").mkdir(exist_ok=True)
+            mask.save(work / "masks" / f"{name}.png")
+        grey = Image.new("RGBA", pixels.size, (127, 127, 127, 255))
+        with replaced_file(folder / name) as draft:
+            Image.alpha_composite(grey, pixels).convert("RGB").save(draft, compress_level=1)
+    return names
+
+
+def record_of(source: Path, frames: int) -> dict[str, Any]:
+    """What tells one set of photos from another: names, sizes in bytes, times of change."""
+    if not source.exists():
+        raise DatasetError(f"{source} does not exist; give a folder of photos or a video")
+    if source.is_file() and not is_video(source):
+        raise DatasetError(
+            f"{source} is no video that is known by its name; give a folder of photos or an MP4"
+        )
+    base = source.parent if source.is_file() else _base(source)
+    files = [source] if source.is_file() else find_raw_photos(base)
+    if not files:
+        raise DatasetError(f"{base}: no photos in it; give a folder of photos or a video")
+    listing = [[f.relative_to(base).as_posix(), f.stat().st_size, f.stat().st_mtime_ns] for f in files]
+    return {"version": _VERSION, "files": listing, **({"frames": frames} if source.is_file() else {})}
+
+
+def _base(source: Path) -> Path:
+    """The folder of the photos: `images` in `source` where there is one, whose neighbours may be masks."""
+    return source / "images" if (source / "images").is_dir() else source

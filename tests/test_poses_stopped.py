@@ -1,0 +1,197 @@
+"""Structure from motion that the system stops: full disks, kills, and COLMAP ending its process."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cagefield.datasets import colmap_process, features, load_dataset, poses_work, structure_from_motion
+from cagefield.datasets.colmap_process import StoppedError
+from cagefield.datasets.poses_work import plainly_named, prepare_work, remove_work, work_folder
+from cagefield.datasets.raw_photos import RawPhoto
+from cagefield.datasets.structure_from_motion import make_poses
+from cagefield.errors import DatasetError
+from posed_photos import photos_alone
+
+pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
+
+
+def _instead_of_python(folder: Path, lines: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`sys.executable` becomes a shell's script."""
+    script = folder / "python"
+    script.write_text(f"#!/bin/sh\nread task\n{lines}\n")
+    script.chmod(0o755)
+    monkeypatch.setattr(colmap_process.sys, "executable", str(script))
+
+
+@pytest.mark.parametrize(
+    ("lines", "reason"),
+    [
+        (
+            "echo terminate called >&2; echo '  what():  [d.cc:7] disk is full' >&2\n"
+            "echo '*** Aborted'\nkill -6 $$",
+            r"finding features stopped with status -6: \[d.cc:7\] disk is full",
+        ),
+        ("echo failed a reason; exit 1", "finding features stopped with status 1: a reason"),
+        ("echo last words; exit 3", "finding features stopped with status 3: last words"),
+        ("exit 4", "finding features stopped with status 4: no words"),
+    ],
+)
+def test_a_process_that_colmap_ends_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: str, reason: str
+) -> None:
+    _instead_of_python(tmp_path, lines, monkeypatch)
+    with pytest.raises(StoppedError, match=f"^{reason}$"):
+        features.extract(tmp_path / "d.db", tmp_path, ["a.png"], features=9, longer_side=9)
+
+
+def test_one_that_fails_ends_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _instead_of_python(
+        tmp_path, f'case "$task" in *slow*) touch {tmp_path}/begun; exec sleep 600;; esac\n'
+        f"while [ ! -e {tmp_path}/begun ]; do sleep 0.1; done; exit 5", monkeypatch
+    )  # fmt: skip
+    with pytest.raises(StoppedError, match="work stopped with status 5"):
+        colmap_process.run("work", [{"task": "slow"}, {"task": "quick"}], lambda done: None)
+
+
+def test_what_processes_have_done_is_summed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _instead_of_python(tmp_path, "echo done 1; echo COLMAP says done; echo done 4", monkeypatch)
+    seen: list[int] = []
+    colmap_process.run("work", [{}, {}], seen.append)
+    assert seen[-1] == 8
+
+
+def test_a_process_ends_with_the_one_that_started_it() -> None:
+    program = (
+        "import time\nfrom cagefield.datasets import colmap_tasks\n"
+        "def work(on_done):\n    on_done(1)\n    time.sleep(600)\n"
+        "colmap_tasks._TASKS['wait'] = work\ncolmap_tasks.main()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write('{"task": "wait"}\n')
+        process.stdin.flush()
+        assert process.stdout.readline() == "done 1\n"
+        process.stdin.close()
+        assert process.wait(60) == 1
+
+
+def test_a_stop_says_what_is_kept_and_the_same_command_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photos, target = photos_alone(tmp_path / "photos"), tmp_path / "data"
+    with monkeypatch.context() as patch:
+
+        def stops(*args: Any, **options: Any) -> None:
+            raise OSError(errno.ENOSPC, "No space left on device", str(work_folder(target) / "database.db"))
+
+        patch.setattr(structure_from_motion, "match", stops)
+        with pytest.raises(
+            StoppedError, match=r"No space left.*is kept in .*data\.work, the same command continues$"
+        ):
+            make_poses(photos, target)
+    assert not target.exists()
+    monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
+    assert make_poses(photos, target).placed == 4
+    assert not work_folder(target).exists()
+
+
+def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """COLMAP does not notice that its disk is full."""
+    photos, target = photos_alone(tmp_path / "photos"), tmp_path / "data"
+    make_poses(photos, target)
+    before = {file: file.read_bytes() for file in target.rglob("*") if file.is_file()}
+    whole = structure_from_motion._write_model
+
+    def cut_off(model: Any, folder: Path) -> None:
+        def write(there: Path) -> None:
+            model.write_binary(there)
+            points = there / "points3D.bin"
+            points.write_bytes(points.read_bytes()[:-5])
+
+        whole(SimpleNamespace(write_binary=write), folder)
+
+    monkeypatch.setattr(structure_from_motion, "_write_model", cut_off)
+    with pytest.raises(StoppedError, match=f"^{target}: No space left on device; what is done"):
+        make_poses(photos, target)
+    assert before == {file: file.read_bytes() for file in target.rglob("*") if file.is_file()}
+    assert len(load_dataset(target, holdout=0).train) == 4
+
+
+def test_a_database_that_fails_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "d.db").write_bytes(b"no database" * 99)
+    failing = r"^COLMAP stopped at its database .*d\.db: .*$"
+    with pytest.raises(StoppedError, match=failing) as caught, features.opened(tmp_path / "d.db"):
+        pass
+    assert "free on its disk" not in str(caught.value)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=4096))
+    told = r", and 4 kB are free on its disk$"
+    with pytest.raises(StoppedError, match=told), features.opened(tmp_path / "d.db"):
+        pass
+    with pytest.raises(DatasetError, match=r"^mine$"), features.opened(tmp_path / "e.db"):
+        raise DatasetError("mine")
+
+
+def test_a_database_whose_journal_stays_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SQLite closes it without a word where the disk is full; without its journal it is empty."""
+    opened = features.opened
+
+    def journalled(path: Path) -> Any:
+        path.with_name(path.name + "-wal").write_bytes(b"rows")
+        return opened(path.with_name("other.db"))
+
+    monkeypatch.setattr(features, "opened", journalled)
+    with pytest.raises(OSError, match="No space left"):
+        features.create_database(tmp_path / "d.db", [], [])
+    assert not (tmp_path / "d.db").exists()
+    monkeypatch.undo()
+    features.create_database(tmp_path / "d.db", [], [])
+    assert [file.name for file in tmp_path.glob("d.*")] == ["d.db"]
+
+
+def test_the_work_folder_goes_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a kill in the middle leaves is no work, and is not in the way."""
+    work = tmp_path / "data.work"
+    prepare_work(work, {"files": 1})
+    assert [file.name for file in work.iterdir()] == ["made_of.json"]
+    (work / "more").touch()
+    with monkeypatch.context() as patch:
+        patch.setattr(shutil, "rmtree", lambda *args, **options: None)
+        remove_work(work)
+    assert not work.exists() and all(path.name.startswith(".") for path in tmp_path.iterdir())
+    prepare_work(work, {"files": 2})
+    assert [file.name for file in work.iterdir()] == ["made_of.json"]
+
+
+def test_pictures_for_colmap_are_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A picture that is there is not made again: a half one would stay."""
+    pixels = np.zeros((8, 8, 4), np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    photo = RawPhoto("a.png", tmp_path / "a.png", 8, 8, None, 1.0, True)
+    real = Image.Image.save
+
+    def half(image: Image.Image, place: Path, **options: Any) -> None:
+        if image.mode == "RGB":
+            Path(place).write_bytes(b"half")
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(image, place, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Image.Image, "save", half)
+        with pytest.raises(OSError, match="No space left"):
+            plainly_named([photo], tmp_path)
+    assert list((tmp_path / "colmap").iterdir()) == []
+    assert plainly_named([photo], tmp_path) == ["000000.png"]
+    with Image.open(tmp_path / "colmap" / "000000.png") as image:
+        assert image.size == (8, 8) and image.mode == "RGB"

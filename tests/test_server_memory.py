@@ -1,0 +1,93 @@
+"""What the rendering process keeps, and what it gives back."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import weakref
+
+import numpy as np
+import pytest
+
+from cagefield import devices
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit
+from cagefield.server.render_worker import page_files, renderer_cache, unused_memory
+from cagefield.server.render_worker.renderer_cache import KEPT_EDITS, RendererCache
+from cagefield.server.render_worker.tasks import PageEditsTask, Shown, values_of
+from cagefield.server.render_worker.unused_memory import UnusedMemory
+from scenes import ball_scene
+
+INNER = Cage.box((0, 0, 0), 1.2)
+MOVED = Edit(INNER, INNER.grown(0.4), lattice=40, relight="none").translate((0.2, 0, 0))
+CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=8, height=8, fov_x=0.8)
+
+
+@pytest.fixture
+def renderers() -> RendererCache:
+    devices.start("cpu")
+    return RendererCache(ball_scene())
+
+
+def _moved(number: int) -> Edit:
+    return MOVED.translate((0.001 * number, 0, 0))
+
+
+def _resident() -> int:
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096
+
+
+def test_edits_shown_before_are_the_same_objects_as_far_as_their_lattices_have_room(
+    renderers: RendererCache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(renderer_cache, "KEPT_BYTES", 3 * 12 * 40**3)
+    first = [renderers.edits(values_of((_moved(number),)))[0] for number in range(5)]
+    again = renderers.edits(values_of((_moved(3),)))
+    assert again[0] is first[3]
+    assert [edit is first[n] for edit, n in zip(renderers.known_edits, (3, 4, 2, 1), strict=True)] == [
+        True
+    ] * 4
+
+
+def test_all_edits_that_are_shown_are_kept(renderers: RendererCache) -> None:
+    many = values_of(tuple(_moved(number) for number in range(KEPT_EDITS + 6)))
+    first, second = renderers.edits(many), renderers.edits(many)
+    assert all(one is other for one, other in zip(first, second, strict=True))
+
+
+@pytest.mark.parametrize("lattice", [40, None], ids=["lattice", "exact"])
+def test_edits_that_are_not_kept_are_nowhere(
+    renderers: RendererCache, monkeypatch: pytest.MonkeyPatch, lattice: int | None
+) -> None:
+    """Quick renderers and files for pages hold what was made of an edit no longer than it is kept."""
+    monkeypatch.setattr(renderer_cache, "KEPT_EDITS", 1)
+    pages = page_files.PageFiles(renderers)
+    seen = []
+    for number in range(4):
+        shown = Shown(values_of((_moved(number).replace(lattice=lattice),)))
+        renderers.renderer(shown, exact=False)
+        pages.edits(PageEditsTask(1, shown, False, (), 0), lambda: False)
+        drawn = pages._prepared(renderers.known_edits[0])  # the edit itself, or one with a lattice
+        seen.append((weakref.ref(renderers.known_edits[0]), weakref.ref(drawn)))
+        del drawn
+    gc.collect()
+    # The renderers that are ready hold the last two.
+    assert [ref() for refs in seen[:2] for ref in refs] == [None] * 4 and seen[3][0]() is not None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other C libraries have no malloc_trim")
+def test_memory_between_blocks_in_use_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    if UnusedMemory()._trim is None:
+        pytest.skip("this C library has no malloc_trim")
+    monkeypatch.setattr(unused_memory, "EVERY", 0.0)
+    blocks = [np.ones(2500) for _ in range(5000)]  # of 20 kB: none has a mapping of its own
+    del blocks[:-1]
+    before = _resident()
+    assert UnusedMemory().give_back()
+    assert before - _resident() > 60 << 20  # of 95 MiB that are free
+
+
+def test_it_is_not_given_back_all_the_time() -> None:
+    assert not UnusedMemory().give_back()
