@@ -34,8 +34,8 @@ KNOTS = 1500
 class Footprint:
     """Columns of a support on a grid [U,V] a voxel apart: those in the hole, and those around it.
 
-    surfaced [U,V]: those where the support has a surface; height [U,V] of that, also where it goes on. changed
-    [U,V]: the log of by how much light on the columns around was changed, None where it was not.
+    surfaced [U,V]: those where the support has a surface; height [U,V] of that, also where it goes on.
+    changed [U,V]: the log of by how much light on the columns around was changed, None where it was not.
     """
 
     support: Support

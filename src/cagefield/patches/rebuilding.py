@@ -27,9 +27,9 @@ TOP = 1.6
 EDGE = 2
 """Columns at the edge of a support whose colours do not go on."""
 
-RING, UNSURE, DOUBTED = 5.0, 0.3, 0.1
-"""Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and fade
-into their own. From this share on they do not hold the membrane."""
+RING, UNSURE, DOUBTED = 6.0, 0.4, 0.1
+"""Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and
+fade into their own. From this share on they do not hold the membrane."""
 
 VIEWS = 32
 """Directions from which colours are looked at."""
@@ -121,10 +121,8 @@ def _coloured(
     share = _doubt(footprint).reshape(-1)
     sure = given & (share < DOUBTED)
     given = sure if sure.any() else given
-    own, table = (
-        table,
-        membrane((footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape), given.reshape(shape), table),
-    )
+    unknown = (footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape)
+    own, table = table, membrane(unknown, given.reshape(shape), table)
     sh = block.sh.copy()
     beside = np.ravel_multi_index((u, v), shape)
     rows = (slot >= 0) & (share[beside] > 0.0) & (height < TOP) & (total[beside] > 0.0)
