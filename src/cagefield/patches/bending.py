@@ -13,7 +13,10 @@ and worked out on a grid of at most FINEST vertices an axis.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.edits import Edit
@@ -22,14 +25,21 @@ from cagefield.edits.stack import EditStack
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import Block, block_of
 from cagefield.patches.extent import RIM, swept
+from cagefield.patches.footprint import footprint_of
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
-from cagefield.patches.surfels import surfels_of
+from cagefield.patches.rebuilding import rebuilt
+from cagefield.patches.support import support_of
+from cagefield.patches.surfels import Surfels, surfels_of
+from cagefield.patches.work import UNSURE
 from cagefield.typing import Array
 from cagefield.warps.forward import to_deformed
 
 FINEST = 128
 """Vertices along the longest axis of the grid that the light is worked out on."""
+
+AROUND = 24.0
+"""How far around what was in deep shade its surroundings are looked at, at least; voxels."""
 
 UNSEEN = 0.03
 """The log of a change of light that is left out."""
@@ -42,18 +52,31 @@ def light_box(edit: Edit, voxel: float, reach: float, falls: Array) -> Array:
     return np.asarray(swept(edit.outer.aabb, falls) + margin * np.array([[-1.0], [1.0]]))
 
 
-def bending_light(block: Block, edit: Edit, ambience: Ambience) -> tuple[Block, Lighting]:
-    """(a coarser block, what the light on it is multiplied by) once a continuous edit has bent a block."""
+@dataclass(frozen=True, eq=False)
+class Bent:
+    """The light on a coarser block once a continuous edit has bent it.
+
+    log [N]: what the light on the surface elements is multiplied by; light: the same on the block's vertices.
+    """
+
+    block: Block
+    surface: Surfels
+    log: Array
+    light: Lighting
+
+
+def bending_light(block: Block, edit: Edit, ambience: Ambience) -> Bent:
+    """What becomes of the light on a block that a continuous edit bends."""
     assert edit.outer is not None
     coarse = block.pooled(max(1, -(-max(block.shape) // FINEST))).reaching(edit.outer.aabb)
     surface, _ = flattened(surfels_of(coarse), max(coarse.spacing))
     if not len(surface.points):
-        return coarse, Lighting(np.zeros(coarse.shape, bool), np.zeros(0))
+        return Bent(coarse, surface, np.zeros(0), Lighting(np.zeros(coarse.shape, bool), np.zeros(0)))
     moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
     bent = surface.turned(moved.points, moved.jacobian)
     log = ambience.log_light([bent], bent) - ambience.log_light([surface], surface)
     log = np.where(np.abs(log) < UNSEEN, 0.0, log)
-    return coarse, Lighting.of(coarse, surface, log, 2.0 * max(coarse.spacing))
+    return Bent(coarse, surface, log, Lighting.of(coarse, surface, log, 2.0 * max(coarse.spacing)))
 
 
 def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Block:
@@ -72,16 +95,63 @@ def bent_voxels(
     """
     box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
     block = block or bent_block(field, below, edit, ambience)
-    coarse, light = bending_light(block, edit, ambience)
+    bent = bending_light(block, edit, ambience)
     where = block.slot >= 0
-    log = light.at(coarse, block.positions(where))
+    log = bent.light.at(bent.block, block.positions(where))
     log[np.abs(log) < UNSEEN] = 0.0
-    relit = block.relit(where, np.exp(log))
+    relit = _filled(block.relit(where, np.exp(log)), edit, bent)
     changed = relit.differs(block)
     if not changed.any():
         return None
     region, relit = relit.around(changed, Cage.box(box.mean(axis=0), box[1] - box[0]))
     return light_edit(edit, Patch(region, relit.layer()))
+
+
+def _filled(block: Block, edit: Edit, bent: Bent) -> Block:
+    """The block, in its new light, with what the part stood on going on where it was in deep shade.
+
+    What was photographed there is noise, which the new light would bring out.
+    """
+    at = block.coordinates(bent.surface.points)
+    dark = at[bent.log > UNSURE]
+    if not len(dark):
+        return block
+    # Not all that is bent: what is dark, and as much again around it.
+    low, high = dark.min(axis=0), dark.max(axis=0)
+    margin = max(AROUND, 0.5 * float((high - low).max()))
+    first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
+    small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
+    filled = _continued(small, edit, bent, at - first, dark - first)
+    if filled is small:
+        return block
+    place = tuple(slice(n, n + size) for n, size in zip(first, small.shape, strict=True))
+    density, slot = block.density.copy(), block.slot.copy()
+    density[place], slot[place] = filled.density, filled.slot
+    return replace(block, density=density, slot=slot, sh=filled.sh)
+
+
+def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: Array) -> Block:
+    """The block with the support going on that surfaces [N] at block coordinates are of; dark [M,3]: some."""
+    inside = edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
+    part = block.solid & inside
+    if not part.any():
+        return block
+    away = ndimage.distance_transform_edt(~inside)
+    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, cval=np.inf))
+    size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
+    near = (away > 0.0) & (away < max(RIM, 0.5 * size))
+    normals, ring = bent.surface.normals.copy(), np.zeros(len(at), bool)
+    flat, on = flattened(bent.surface.take(near), max(bent.block.spacing))
+    normals[near], ring[near] = flat.normals, on
+    support = support_of(part, at, normals, ring)
+    footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), dark)
+    if footprint is None:
+        return block
+    known = bent.light.at(bent.block, footprint.points(block)) < UNSURE
+    footprint = footprint.without(known, np.zeros_like(part))
+    changed = np.zeros(footprint.hole.shape)
+    changed[footprint.around] = bent.light.at(bent.block, footprint.points(block, footprint.around))
+    return rebuilt(block, replace(footprint, changed=changed), inside, stays=True)
 
 
 def light_edit(edit: Edit, patch: Patch | SplatPatch) -> Edit:

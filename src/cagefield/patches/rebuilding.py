@@ -38,8 +38,11 @@ FIRM = 0.01
 """How firmly colours are held to be the same from all of them."""
 
 
-def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
-    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c."""
+def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = False) -> Block:
+    """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c.
+
+    What is in V^c is left as it is where it `stays`, as that of a continuous edit.
+    """
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
     known = u >= 0
@@ -58,6 +61,8 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask) -> Block:
     nearby = ndimage.binary_dilation(removed, iterations=4)
     crust = hole & (height > HIGH) & nearby[tuple(voxels.T)]
     new = hole & level
+    if stays:
+        crust, new = crust & ~gone, new & ~gone
     where = np.zeros(block.shape, bool)
     where[tuple(voxels[crust].T)] = True
     block = block.with_density(where, np.zeros(int(where.sum()), np.float32))

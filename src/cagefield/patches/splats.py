@@ -115,13 +115,13 @@ def bent_splats(field: SplatField, below: EditStack, edit: Edit, ambience: Ambie
     voxel = voxel_for(splats, box)
     box = light_box(edit, voxel, ambience.reach, ambience.falls)
     block = block_of(voxelised(splats, box, voxel), EditStack(), box)
-    coarse, light = bending_light(block, edit, ambience)
+    bent = bending_light(block, edit, ambience)
     none, points = np.zeros(0, np.int64), np.zeros((0, 3))
     patch = SplatPatch(
         field,
         Cage.box(box.mean(axis=0), box[1] - box[0]),
         np.zeros((1, 1, 1), bool),
-        light.on_grid(coarse),
+        bent.light.on_grid(bent.block),
         None,
         none,
         points,
