@@ -122,12 +122,7 @@ def _filled(block: Block, edit: Edit, bent: Bent) -> Block:
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
     filled = _continued(small, edit, bent, at - first, dark - first)
-    if filled is small:
-        return block
-    place = tuple(slice(n, n + size) for n, size in zip(first, small.shape, strict=True))
-    density, slot = block.density.copy(), block.slot.copy()
-    density[place], slot[place] = filled.density, filled.slot
-    return replace(block, density=density, slot=slot, sh=filled.sh)
+    return replace(block, sh=filled.sh)
 
 
 def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: Array) -> Block:

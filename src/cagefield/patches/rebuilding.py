@@ -41,7 +41,7 @@ FIRM = 0.01
 def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = False) -> Block:
     """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c.
 
-    What is in V^c is left as it is where it `stays`, as that of a continuous edit.
+    Where that `stays`, under a continuous edit, colours alone change, and none in V^c.
     """
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
@@ -56,13 +56,15 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     np.maximum.at(top, (u[gone], v[gone]), height[gone])
     nearest = ndimage.distance_transform_edt(np.isinf(top), return_distances=False, return_indices=True)
     hole &= height <= top[tuple(nearest)][u, v] + 0.5
+    known_columns = (u[around], v[around], height[around])
+    if stays:
+        new = hole & level & ~gone
+        return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
     profile = _profile(block, voxels[around & level], height[around & level])
     # Crusts of what was taken away, between the support and V^c.
     nearby = ndimage.binary_dilation(removed, iterations=4)
     crust = hole & (height > HIGH) & nearby[tuple(voxels.T)]
     new = hole & level
-    if stays:
-        crust, new = crust & ~gone, new & ~gone
     where = np.zeros(block.shape, bool)
     where[tuple(voxels[crust].T)] = True
     block = block.with_density(where, np.zeros(int(where.sum()), np.float32))
@@ -76,7 +78,6 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     deep[tuple(voxels[new & (height < -1.5)].T)] = True
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where], slots=True)
-    known_columns = (u[around], v[around], height[around])
     return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
 
 
