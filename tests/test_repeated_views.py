@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import repeated_views, structure_from_motion
+from cagefield.datasets.left_out import Matches
 from cagefield.datasets.repeated_views import are_in_order, contradicting, far_pairs, neighbourhood
 
 pycolmap = pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
@@ -104,7 +105,7 @@ def test_the_unfolded_model_must_not_lose_photos_or_points(tmp_path, monkeypatch
     monkeypatch.setattr(repeated_views, "rotations_of", lambda _: {})
     monkeypatch.setattr(repeated_views, "contradicting", lambda *_: {(2, 20)})
     counts = _counts(40, 6, period=20)
-    matches = structure_from_motion._Matches(counts, np.zeros_like(counts, dtype=bool))
+    matches = Matches(counts, np.zeros_like(counts, dtype=bool))
     (found,) = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)
     assert found is models["pruned" if wins else "plain"]
     assert removed == [far_pairs(counts), {(2, 20)}]
