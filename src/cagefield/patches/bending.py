@@ -29,7 +29,7 @@ from cagefield.patches.footprint import footprint_of
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
 from cagefield.patches.rebuilding import rebuilt
-from cagefield.patches.support import support_of
+from cagefield.patches.support import support_around
 from cagefield.patches.surfels import Surfels, surfels_of
 from cagefield.patches.work import UNSURE
 from cagefield.typing import Array
@@ -135,10 +135,7 @@ def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: Array) -> 
     away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, cval=np.inf))
     size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
     near = (away > 0.0) & (away < max(RIM, 0.5 * size))
-    normals, ring = bent.surface.normals.copy(), np.zeros(len(at), bool)
-    flat, on = flattened(bent.surface.take(near), max(bent.block.spacing))
-    normals[near], ring[near] = flat.normals, on
-    support = support_of(part, at, normals, ring)
+    support = support_around(part, bent.surface, at, near, max(bent.block.spacing))
     footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), dark)
     if footprint is None:
         return block

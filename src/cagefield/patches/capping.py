@@ -1,7 +1,7 @@
 """A part's cut end is closed: where it was held, or stood, its own surface goes on.
 
 The part and what it was cut from change roles: what touches the part from outside stands on one of the part's
-faces, as `support_of` finds it, and that face is rebuilt under it.
+faces, as `support_around` finds it, and that face is rebuilt under it.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from cagefield.patches.block import Block
 from cagefield.patches.extent import RIM
 from cagefield.patches.footprint import footprint_of
 from cagefield.patches.light import Lighting
-from cagefield.patches.planes import flattened
 from cagefield.patches.rebuilding import rebuilt
 from cagefield.patches.seen import Sight
-from cagefield.patches.support import support_of
+from cagefield.patches.support import support_around
 from cagefield.patches.work import CLOSE, UNSURE, Work
 
 TOUCHES = 4
@@ -38,10 +37,7 @@ def capped(work: Work, block: Block, light: Lighting | None, below: EditStack, s
     away = ndimage.distance_transform_edt(~held)
     away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, mode="nearest"))
     near = away < max(RIM, 0.5 * float(np.median(np.ptp(at, axis=0))))
-    flat, on = flattened(part.take(near), work.voxel)
-    normals, ring = part.normals.copy(), np.zeros(len(near), bool)
-    normals[near], ring[near] = flat.normals, on
-    support = support_of(held, at, normals, ring)
+    support = support_around(held, part, at, near, work.voxel)
     if support is None:
         return block
     log = np.zeros(len(at)) if light is None else light.at(block, part.points)

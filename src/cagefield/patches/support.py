@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield.patches.planes import flattened
+from cagefield.patches.surfels import Surfels
 from cagefield.typing import Array, Mask
 
 TRIALS = 200
@@ -45,6 +47,19 @@ class Support:
         """(u and v [N,2], height [N]) of block coordinates [N,3]."""
         away = at - self.point
         return away @ self.axes.T, away @ self.normal
+
+
+def support_around(
+    part: Mask, surface: Surfels, at: Array, near: NDArray[np.bool_], voxel: float
+) -> Support | None:
+    """The support of a part [X,Y,Z] among those of a surface's elements [N], `at` [N,3], that are near.
+
+    Large planes among these have one normal, and only what lies on one is a support.
+    """
+    flat, on = flattened(surface.take(near), voxel)
+    normals, ring = surface.normals.copy(), np.zeros(len(at), bool)
+    normals[near], ring[near] = flat.normals, on
+    return support_of(part, at, normals, ring)
 
 
 def support_of(

@@ -21,7 +21,7 @@ from cagefield.patches.footprint import Footprint
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
 from cagefield.patches.seen import Sight
-from cagefield.patches.support import Support, support_of
+from cagefield.patches.support import Support, support_around
 from cagefield.patches.surfels import Surfels, joined, surfels_of, with_seen
 from cagefield.typing import Array, Mask
 from cagefield.warps.inner_map import HexahedronMap
@@ -150,10 +150,7 @@ class Work:
 
     def support(self) -> Support | None:
         """What the part stood on."""
-        flat, on = flattened(self.rest.take(self.rim), self.voxel)
-        normals, ring = self.rest.normals.copy(), np.zeros(len(self.rest.points), bool)
-        normals[self.rim], ring[self.rim] = flat.normals, on
-        return support_of(self.part, self.rest_at, normals, ring)
+        return support_around(self.part, self.rest, self.rest_at, self.rim, self.voxel)
 
     @property
     def voxel(self) -> float:
