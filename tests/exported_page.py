@@ -53,10 +53,11 @@ def shown(address: Path | str, touch: bool = False) -> Iterator[Any]:
 
 def until(page: Any, condition: str, seconds: float = 120.0) -> None:
     """Waits until an expression is true; the page's policy forbids waiting inside it."""
-    end = time.monotonic() + seconds
+    begun = time.monotonic()
     while not page.evaluate(condition):
-        assert time.monotonic() < end, f"never came true: {condition}"
-        time.sleep(0.02)
+        waited = time.monotonic() - begun
+        assert waited < seconds, f"never came true: {condition}"
+        time.sleep(min(0.02 + 0.1 * waited, 0.1))
 
 
 def settle(page: Any, level: str = "level?.last") -> None:

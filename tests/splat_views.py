@@ -103,6 +103,7 @@ def all_kinds(
     values["log_scales"][20:25] = np.log([0.5, 0.3, 1e-5])
     turns = rotation_matrices(unit(chance.normal(size=(60, 4)))) if turned else None
     splats = splats_of(values, antialiased, turns)
-    splats.opacities[25:30] = (0.0, 1.0, 0.9999, 1.0 / 255.0, 0.004)
-    splats.opacities[10:15] *= 0.3
-    return single(splats)
+    opacities = splats.opacities.copy()
+    opacities[25:30] = (0.0, 1.0, 0.9999, 1.0 / 255.0, 0.004)
+    opacities[10:15] *= 0.3
+    return single(replace(splats, opacities=opacities))

@@ -268,8 +268,9 @@ def test_splats_whose_variance_is_not_finite_are_not_drawn() -> None:
     splats = single(splats_of(parameters(20)))
     # What float32 makes of log scales beyond 44.
     for value in (np.inf, 1e35):
-        wide = replace(splats, covariances=splats.covariances.copy())
-        wide.covariances[::2, [0, 3, 5]] = value
+        covariances = splats.covariances.copy()
+        covariances[::2, [0, 3, 5]] = value
+        wide = replace(splats, covariances=covariances)
         rest = {name: getattr(splats, name)[1::2] for name in ("means", "covariances", "opacities", "sh")}
         want = project(DeformedSplats(**rest), view, near=NEAR).picture()
         got = project(wide, view, near=NEAR).picture()

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 FORMAT_VERSION = "1"
 
-BLOCK = 1 << 18
+BLOCK = 1 << 16
 """Splats that are checked at a time."""
 
 

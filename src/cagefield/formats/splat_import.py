@@ -7,6 +7,7 @@ middle of the splats, upright by the axis that is given.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -17,6 +18,7 @@ from cagefield.cameras import Camera, turntable
 from cagefield.datasets.views import Dataset
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
+from cagefield.typing import Array, Float32
 
 Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
 Cameras = dict[str, tuple[Camera, ...]]
@@ -67,9 +69,11 @@ def import_splats(
     visible = field.opacities >= VISIBLE
     if not visible.any():
         raise FieldError("the file holds no splat that is visible; export it again")
-    means = field.means[visible].astype(np.float64)
-    middle = np.median(means, axis=0)
-    distance = np.abs(means - middle).max(axis=1)
+    means = field.means[visible]
+    middle = np.array([np.median(column) for column in _columns(means)])
+    distance = np.zeros(len(means))
+    for column, at in zip(_columns(means), middle, strict=True):
+        np.maximum(distance, np.abs(column - at), out=distance)
     half, far = np.quantile(distance, (0.5, 0.99))
     if unbounded is None:
         unbounded = bool(far > FAR * half)
@@ -93,9 +97,14 @@ def nearest_up(up: ArrayLike) -> Up:
     return max(get_args(Up), key=lambda name: float(axis_of(name) @ np.asarray(up)))
 
 
-def _whole(means: NDArray[np.float64]) -> NDArray[np.float64]:
+def _columns(means: Float32) -> Iterator[Array]:
+    """The coordinates along each axis in float64, one axis at a time: all of them take much memory."""
+    return (means[:, axis].astype(np.float64) for axis in range(3))
+
+
+def _whole(means: Float32) -> Array:
     """The box of nearly all means, with room around it."""
-    low, high = np.quantile(means, (0.001, 0.999), axis=0)
+    low, high = np.stack([np.quantile(column, (0.001, 0.999)) for column in _columns(means)], axis=1)
     room = MARGIN * max(float((high - low).max()), 1e-6)
     return np.stack([low - room, high + room])
 

@@ -50,7 +50,7 @@ _MOST_RATIO = 1040
 _SMALL, _USUAL_RATIO = 1 << 20, 100
 """Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
 
-_DECODED = 1 << 15
+_DECODED = 1 << 13
 """Splats that are decoded at a time: each takes 600 bytes meanwhile."""
 
 # Coordinate systems of the extension, by their number.
@@ -174,7 +174,7 @@ def _widths(path: Path, version: int, count: int, degree: int) -> tuple[int, ...
 
 def _spool() -> IO[bytes]:
     """A temporary file, in memory while it is small; it ends with the source."""
-    return cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 26))
+    return cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 22))
 
 
 def _source(

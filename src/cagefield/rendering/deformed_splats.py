@@ -60,6 +60,13 @@ class DeformedSplats:
     antialiased: bool = False
     tangents: Float32 | None = None
 
+    def __post_init__(self) -> None:
+        # Numba compiles a kernel again for arrays that may be written, and again for those with strides.
+        for name in ("means", "covariances", "opacities", "sh", "rotations", "tangents"):
+            values = getattr(self, name)
+            if values is not None and (values.flags.writeable or not values.flags.c_contiguous):
+                object.__setattr__(self, name, _frozen(np.ascontiguousarray(values).view()))
+
     def __len__(self) -> int:
         return len(self.means)
 
@@ -76,6 +83,10 @@ class DeformedSplats:
             _of_fields[field] = found
         return found
 
+
+NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
+"""What kernels take for rotations where no splat was turned."""
+NO_ROTATIONS.setflags(write=False)
 
 _of_fields: WeakKeyDictionary[SplatField, DeformedSplats] = WeakKeyDictionary()
 

@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.deformed_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.kernels import splat_clusters as kernels
 from cagefield.rendering.kernels.splat_projection import BLUR
 from cagefield.typing import Float32
@@ -186,7 +186,7 @@ def _merged(
     own, apart = np.empty((count, 2), np.float32), np.empty(count, np.float32)
     kernels.merge(
         below.means, below.covariances, below.opacities, below.sh,
-        below.rotations if below.rotations is not None else rotations, order, size, masses,
+        NO_ROTATIONS if below.rotations is None else below.rotations, order, size, masses,
         means, covariances, sh, rotations, own, apart,
     )  # fmt: skip
     spread = np.empty(clusters, np.float32)

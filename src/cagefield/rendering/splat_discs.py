@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
-from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.deformed_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.kernels import splat_discs
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
 from cagefield.rendering.splat_rasterizer import (
@@ -30,7 +30,6 @@ from cagefield.rendering.splat_rasterizer import (
 from cagefield.typing import Float32
 
 _NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
-_NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +114,8 @@ def project_discs(
             splats.tangents,
             splats.opacities,
             splats.sh,
-            _NO_ROTATIONS if splats.rotations is None else splats.rotations,
-            _NO_NORMALS if normals is None else normals,
+            NO_ROTATIONS if splats.rotations is None else splats.rotations,
+            _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
             world_to_camera(camera),
             camera.origin.astype(np.float64),
             lens.focal,

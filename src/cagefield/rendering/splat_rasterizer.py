@@ -17,7 +17,7 @@ from scipy.special import spence
 
 from cagefield import devices, lenses
 from cagefield.cameras import Camera
-from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.rendering.deformed_splats import NO_ROTATIONS, DeformedSplats
 from cagefield.rendering.kernels import splat_blending, splat_projection, splat_tiles
 from cagefield.rendering.kernels.splat_projection import AREA, PACKED, TILE
 from cagefield.rendering.splat_clusters import Clusters, View
@@ -47,7 +47,6 @@ NOWHERE: Float32 = np.zeros((2, 1, 1), np.float32)
 
 _NO_MASSES: Float32 = np.empty((0, 2), np.float32)
 _NO_NORMALS: Float32 = np.empty((0, 3), np.float32)
-_NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
 
 _SHARES = np.concatenate(
     [np.linspace(0.0, 0.9, 1000), 0.9 + np.linspace(0.0, splat_projection.ALPHA_MAX - 0.9, 1000)]
@@ -227,8 +226,8 @@ def project(
                 source.splats.covariances,
                 source.splats.opacities,
                 source.splats.sh,
-                _NO_ROTATIONS if source.splats.rotations is None else source.splats.rotations,
-                _NO_NORMALS if normals is None else normals,
+                NO_ROTATIONS if source.splats.rotations is None else source.splats.rotations,
+                _NO_NORMALS if normals is None else np.ascontiguousarray(normals),
                 _NO_MASSES if source.masses is None else source.masses,
                 _OPACITIES,
                 source.rows,

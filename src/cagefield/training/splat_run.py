@@ -154,8 +154,8 @@ class SplatRun:
             sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
             projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil)
             chain(
-                projected.order, projected.firsts, projected.slots, sums, projected.packed, state.means,
-                state.log_scales, state.quaternions, opacities, state.sh, world_to_camera(camera),
+                projected.order, projected.firsts, projected.slots, sums, projected.packed, splats.means,
+                state.log_scales, state.quaternions, splats.opacities, splats.sh, world_to_camera(camera),
                 camera.origin, lens.focal, lens.limits, lens.model, lens.coefficients, config.antialiased,
                 False, state.gradients, state.curvatures,
             )  # fmt: skip

@@ -58,7 +58,7 @@ C40, C41, C42, C43, C44, C45, C46, C47, C48 = harmonics.C4
 MAX_TERMS = harmonics.MAX_TERMS
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def distort(x, y, model, k):
     """The lens's image (xd, yd) of n = (x, y), and D = d(xd, yd)/d(x, y) by rows; see `cagefield.lenses`."""
     if model == OPENCV:
@@ -108,7 +108,7 @@ def jacobian(x, y, z, W, fx, fy, limits, model, k, M):
         M[1, j] = fy * (d10 * px + d11 * py)
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def harmonics_at(x, y, z, terms, basis):
     """Writes the first `terms` real spherical harmonics of the unit direction; see `cagefield.sh`."""
     basis[0] = C0

@@ -24,7 +24,7 @@ NOISE = np.float32((3.0 / 255.0) ** 2)
 """Variance that windows have without texture."""
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def box_sums(image, rows, out):
     """Sums over windows of (2 RADIUS + 1)^2 pixels, cut off at the borders; `rows` is scratch."""
     height, width = image.shape
@@ -42,7 +42,7 @@ def box_sums(image, rows, out):
                 out[y, x] += rows[k, x]
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def warp(image, directions, A, b, w, focal, centre, model, coefficients, out, seen):
     """The neighbour's image at the reference's pixels, all at the inverse depth w; `seen` is 0 outside it."""
     height, width = out.shape

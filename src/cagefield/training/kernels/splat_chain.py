@@ -43,7 +43,7 @@ STEP = 1e-4
 """Step of the lens's second derivative, in n."""
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def quartic(s, ax, ay, bx, by, cx, cy, dx, dy):
     """sum h (a.e)(b.e)(c.e)(d.e) from the moments 14 to 18."""
     p0, p1, p2 = ax * bx, ax * by + ay * bx, ay * by
@@ -57,7 +57,7 @@ def quartic(s, ax, ay, bx, by, cx, cy, dx, dy):
     )
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def bilinear(a, b, c, x0, y0, x1, y1):
     """(x0, y0) (a b; b c) (x1, y1)^T."""
     return a * x0 * x1 + b * (x0 * y1 + y0 * x1) + c * y0 * y1
@@ -260,7 +260,7 @@ def chain(
         H[15] = s[10] * (1.0 - o) * (1.0 - o)
 
 
-@njit(inline="always", **FAST)
+@njit(**FAST)
 def add_direction(i, dx, dy, dz, s, packed, sh, terms, G):
     """Adds the mean's gradient through the direction in which its colour is seen; central differences."""
     r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
