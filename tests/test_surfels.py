@@ -166,11 +166,3 @@ def test_a_part_that_stands_free_is_not_thinned_by_its_seam() -> None:
     )
     error = float(((hard.rgb - soft.rgb) ** 2).mean())
     assert -10.0 * np.log10(max(error, 1e-9)) > 36.0
-
-
-def test_under_what_is_thin_is_not_inside_of_it() -> None:
-    across = np.stack(np.meshgrid(*[np.arange(-0.5, 0.51, 0.02)] * 2, [0.0]), axis=-1).reshape(-1, 3)
-    leaf = Surfels(across, np.broadcast_to([0.0, 0.0, 1.0], across.shape))
-    asked = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, -0.01], [0.0, 0.0, -0.1]])
-    np.testing.assert_allclose(distance_to([leaf])(asked), [0.1, 0.0, 0.0])
-    np.testing.assert_allclose(distance_to([leaf], 0.05)(asked), [0.1, 0.0, 0.1])

@@ -43,9 +43,6 @@ ALIKE = 1000.0
 HUBER = 3.0
 """Standard deviations of noise from which on a change counts by its size, no longer by its square."""
 
-INSIDE = 2.5
-"""So deep behind a surface is no longer inside of what it belongs to, as a multiple of the smallest reach."""
-
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
 
@@ -95,7 +92,7 @@ class Ambience:
         """The log of how bright surface elements [N] are among all the surfaces around, [N]."""
         log = np.zeros(len(at.points))
         if sum(self.weights) > SHOWING:
-            log += self.log_openness(nearness(around, at, self.reaches, INSIDE * min(self.reaches)))
+            log += self.log_openness(nearness(around, at, self.reaches))
         if self.sun is not None:
             log += self.sun.log_light(gridded(around, FINE * self.sun.near), at.points, at.normals)
         return log
@@ -105,14 +102,9 @@ class Ambience:
         return np.asarray(np.log(np.maximum(1.0 - nearness @ np.array(self.weights), DARKEST)))
 
 
-def nearness(
-    around: Sequence[Surfels], at: Surfels, reaches: Sequence[float], inside: float = np.inf
-) -> Array:
-    """max(0, 1 - D(p + r n) / r) [N,R] at surface elements (p, n) [N], for each reach r.
-
-    D is 0 behind a surface, down to `inside`: see `Surfels.distance`.
-    """
-    distance = distance_to(around, inside)
+def nearness(around: Sequence[Surfels], at: Surfels, reaches: Sequence[float]) -> Array:
+    """max(0, 1 - D(p + r n) / r) [N,R] at surface elements (p, n) [N], for each reach r."""
+    distance = distance_to(around)
     found = [distance(at.points + reach * at.normals, reach) / reach for reach in reaches]
     return np.clip(1.0 - np.stack(found, axis=1), 0.0, 1.0)
 

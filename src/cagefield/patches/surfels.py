@@ -66,11 +66,8 @@ class Surfels:
     def _tree(self) -> cKDTree:
         return cKDTree(self.points)
 
-    def distance(self, points: Array, reach: float = np.inf, inside: float = np.inf) -> NDArray[np.float64]:
-        """Distances [M] of points [M,3] to the nearest surface, FAR beyond `reach`.
-
-        They are 0 behind it, down to `inside`: deeper is under what is thin and hangs over, such as a leaf.
-        """
+    def distance(self, points: Array, reach: float = np.inf) -> NDArray[np.float64]:
+        """Distances [M] of points [M,3] to the nearest surface: 0 behind it, FAR beyond `reach`."""
         if not len(self.points) or not len(points):
             return np.full(len(points), FAR)
         found, nearest = self._tree.query(points, distance_upper_bound=reach, workers=-1)
@@ -78,7 +75,7 @@ class Surfels:
         away = points[near] - self.points[nearest[near]]
         behind = (away * self.normals[nearest[near]]).sum(axis=1) < BEHIND * found[near]
         out = np.full(len(points), FAR)
-        out[near] = np.where(behind & (found[near] < inside), 0.0, found[near])
+        out[near] = np.where(behind, 0.0, found[near])
         return out
 
     def nearest(self, points: Array, count: int, reach: float) -> tuple[Array, NDArray[np.int64]]:
@@ -125,11 +122,11 @@ class Surfels:
         return Surfels(points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
 
 
-def distance_to(surfaces: Sequence[Surfels], inside: float = np.inf) -> Distance:
-    """The distance to the nearest of some surfaces, 0 behind any of them, down to `inside`."""
+def distance_to(surfaces: Sequence[Surfels]) -> Distance:
+    """The distance to the nearest of some surfaces, 0 behind any of them."""
 
     def distance(points: Array, reach: float = np.inf) -> NDArray[np.float64]:
-        return np.min([each.distance(points, reach, inside) for each in surfaces], axis=0)
+        return np.min([each.distance(points, reach) for each in surfaces], axis=0)
 
     return distance
 
