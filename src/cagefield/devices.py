@@ -5,7 +5,6 @@ Quadrants is imported here and in the kernel modules only, never by ``import cag
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import io
 import os
@@ -74,21 +73,8 @@ def start(device: str = "auto", *, double: bool = False) -> str:
     except Exception as error:
         raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
     forgive()
-    atexit.register(_keep_kernels)
     _started = chosen
     return chosen
-
-
-def _keep_kernels() -> None:
-    """Writes the compiled kernels to their folder as the process ends.
-
-    Quadrants does so when its program is destroyed, which no object may outlive, an array or a renderer. None
-    of the kernels can run afterwards: their code is gone.
-    """
-    import quadrants as qd
-
-    with contextlib.suppress(qd.QuadrantsRuntimeError):
-        qd.lang.impl.get_runtime().prog.dump_cache_data_to_disk()
 
 
 def current() -> str | None:
