@@ -17,8 +17,7 @@ from scenes import ball_scene
 def test_pages_leave_nothing_behind(tmp_path: Path) -> None:
     ball_scene().save(tmp_path / "scene")
     with editor_server(tmp_path / "scene") as server:
-        Soak(server, tmp_path, pause=0.05, stay=1.0).run(4, 3.0, 1.0, lambda found: None)
-        before = _rested(server)
+        before = _begun(server, tmp_path)
         soak = Soak(server, tmp_path, pause=0.05, stay=1.0)
         soak.run(6, 6.0, 1.0, lambda found: None)
         assert soak.faults == []
@@ -28,6 +27,18 @@ def test_pages_leave_nothing_behind(tmp_path: Path) -> None:
         # A pool of threads grows to its end; each page has more than one file handle.
         assert after.threads <= before.threads + 4
         assert after.files <= before.files + 2
+
+
+def _begun(server: EditorServer, folder: Path) -> Sample:
+    """Once all that starts on first use has started, which takes longer on a machine with other work."""
+    threads = -1
+    for _ in range(6):
+        Soak(server, folder, pause=0.05, stay=1.0).run(4, 3.0, 1.0, lambda found: None)
+        found = _rested(server)
+        if found.threads == threads:
+            break
+        threads = found.threads
+    return found
 
 
 def _rested(server: EditorServer) -> Sample:
