@@ -35,10 +35,8 @@ def main() -> None:
     devices.start("auto")
     settings = Settings(config=TrainingOptions(steps=options.steps).config(), discrete_views=CAMERAS)
     bench = Workbench(settings, options.work)
-    lines, ratios = (
-        ["| scene | edit | with, ms | without, ms | ratio |", "| --- | --- | ---: | ---: | ---: |"],
-        [],
-    )
+    lines = ["| scene | edit | with, ms | without, ms | ratio |", "| --- | --- | ---: | ---: | ---: |"]
+    ratios: list[float] = []
     for case in CASES:
         if case.kind == "continuous":
             continue
