@@ -126,7 +126,7 @@ def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
 
         fill, shadows = (
             tab.page.locator(".pane .tp-lblv", has_text=label)
-            for label in ("Fill what is uncovered", "Shadows go along")
+            for label in ("Fill what is uncovered", "Contact shadows go along")
         )
         assert "goes on where it was" in fill.get_attribute("title")
         assert redness() < 0.1
@@ -135,6 +135,9 @@ def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
         assert tab.edit["fill"] == "none" and redness() > 0.25
         tab.changed(lambda: tab.press("Shift+U"))
         assert tab.edit["relight"] == "none" and redness() > 0.25
+        tab.changed(lambda: shadows.locator("select").select_option(label="Cast shadows too"))
+        assert tab.edit["relight"] == "shadow" and redness() > 0.25
+        tab.changed(lambda: tab.press("Control+z"))
         # A copy uncovers nothing, and a continuous edit has neither.
         kind = tab.page.locator(".pane .tp-lblv", has_text="Delete").locator("select")
         for label, shown in (("Copy", (False, True)), ("Continuous", (False, True))):

@@ -18,6 +18,7 @@ interface Point {
 const KINDS = { Continuous: "continuous", Move: "move", Copy: "copy", Delete: "delete" };
 const SHELLS = { Flow: "flow", Trilinear: "trilinear" };
 const FALLOFFS = { Smooth: "smooth", Linear: "linear" };
+const SHADOWS = { "Contact shadows go along": "occlusion", "Cast shadows too": "shadow", Stay: "none" };
 const LATTICES = { Exact: 0, "32³ nodes": 32, "64³ nodes": 64, "128³ nodes": 128, "256³ nodes": 256 };
 
 export function options(app: App, actions: Actions): HTMLElement {
@@ -25,7 +26,7 @@ export function options(app: App, actions: Actions): HTMLElement {
   const operations = h("ol", { class: "operations" });
   const pane = new Pane({ container: host });
   const model = {
-    kind: "continuous", from: "", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relights: true,
+    kind: "continuous", from: "", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relight: "occlusion",
     margin: 0.2, preserve: false,
     position: point(0, 0, 0), turn: point(0, 0, 0), scale: point(1, 1, 1),
   }; // prettier-ignore
@@ -86,9 +87,9 @@ export function options(app: App, actions: Actions): HTMLElement {
   const fills = kind.addBinding(model, "fills", { label: "Fill what is uncovered" });
   fills.on("change", ({ value }) => change({ fill: value ? "surroundings" : "none" }));
   explained(fills, "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).");
-  const relights = kind.addBinding(model, "relights", { label: "Shadows go along" });
-  relights.on("change", ({ value }) => change({ relight: value ? "occlusion" : "none" }));
-  explained(relights, "Soft shadows where things touch leave with the thing and appear at its new place; off, they stay (Shift+U).");
+  const relight = kind.addBinding(model, "relight", { label: "Shadows", options: SHADOWS });
+  relight.on("change", ({ value }) => change({ relight: value as EditState["relight"] }));
+  explained(relight, "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).");
   kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
@@ -110,7 +111,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     const { pivot } = leading(app.shown(edit), target(now));
     Object.assign(model, {
       kind: edit.kind, from: edit.source?.split(/[\\/]/).at(-1) ?? "", shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
-      error: latticeError(edit), fills: edit.fill !== "none", relights: edit.relight !== "none", preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
+      error: latticeError(edit), fills: edit.fill !== "none", relight: edit.relight, preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
     }); // prettier-ignore
     if (marginOf !== edit.id) {
       marginOf = edit.id;
@@ -122,9 +123,9 @@ export function options(app: App, actions: Actions): HTMLElement {
     error.hidden = lattice.hidden || edit.lattice === 0;
     kinds.hidden = edit.source !== null;
     from.hidden = edit.source === null;
-    relights.hidden = !relightable(now);
+    relight.hidden = !relightable(now);
     fills.hidden = !fillable(now);
-    for (const binding of [shell, lattice, fills, relights]) binding.disabled = edit.locked;
+    for (const binding of [shell, lattice, fills, relight]) binding.disabled = edit.locked;
     filling = true;
     pane.refresh();
     filling = false;
@@ -137,7 +138,7 @@ export function options(app: App, actions: Actions): HTMLElement {
 /** Gives a switch a tooltip, and its name and the tooltip to screen readers: its label is only beside it. */
 function explained(binding: BladeApi, what: string): void {
   binding.element.title = what;
-  const input = binding.element.querySelector("input")!;
+  const input = binding.element.querySelector("input, select")!;
   input.setAttribute("aria-label", binding.element.querySelector(".tp-lblv_l")!.textContent);
   input.setAttribute("aria-description", what);
 }
