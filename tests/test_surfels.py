@@ -14,7 +14,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import block_of
 from cagefield.patches.light import Ambience
 from cagefield.patches.planes import flattened
-from cagefield.patches.surfels import FAR, Surfels, distance_to, gridded, joined, surfels_of, with_seen
+from cagefield.patches.surfels import FAR, Surfels, cut_through, gridded, joined, surfels_of, with_seen
 from cagefield.scene import Scene
 from cagefield.typing import Array
 
@@ -88,12 +88,40 @@ def test_distances_on_a_grid_are_those_to_the_nearest() -> None:
     ball = sphere(20_000, np.zeros(3), 0.5, 0)
     asked = np.random.default_rng(1).uniform(-0.9, 0.9, (500, 3))
     asked = asked[np.linalg.norm(asked, axis=1) > 0.55]
-    exact, fast = distance_to([ball])(asked), gridded([ball], 0.02)(asked)
+    exact, fast = ball.distance(asked), gridded([ball], 0.02)(asked)
     np.testing.assert_allclose(exact, np.linalg.norm(asked, axis=1) - 0.5, atol=0.02)
     within = (np.abs(asked) < 0.5).all(axis=1)
     np.testing.assert_allclose(fast[within], exact[within], atol=0.035)  # a cell's diagonal
     # Beyond the grid it is the way to the grid, and the distance there: at most a bit more.
     assert (fast > exact - 0.035).all() and (fast < 1.25 * exact + 0.035).all()
+
+
+def test_only_what_the_way_passed_through_is_deep_shade() -> None:
+    """Beneath a sheet seen from above alone all is behind it; inside a box is what its lid hides."""
+    ground = Surfels(np.array([[0.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
+    flat = plane(20_000, 0.0, 0).points
+    up, down = np.tile([0.0, 0.0, 1.0], (len(flat), 1)), np.tile([0.0, 0.0, -1.0], (len(flat), 1))
+    reaches = (0.02, 0.04, 0.08, 0.16, 0.24)
+    sheet = Surfels(flat + np.array([0.0, 0.0, 0.2]), up)
+    near = joined([ground, sheet]).nearness(ground, reaches)[0]
+    np.testing.assert_allclose(near, [0, 0, 0, 1 - 0.04 / 0.16, 1 - 0.04 / 0.24], atol=0.06)
+    lid = Surfels(flat + np.array([0.0, 0.0, 0.1]), down)
+    both = joined([ground, sheet, lid]).nearness(ground, reaches)[0]
+    np.testing.assert_allclose(both, [0, 0, 1 - 0.02 / 0.08, 1, 1 - 0.04 / 0.24], atol=0.06)
+
+
+def test_cages_cut_through_what_is_solid() -> None:
+    block = block_of(slab(), EditStack(), np.array([[-0.9, -0.9, -0.5], [0.9, 0.9, 0.25]]))
+    cut = cut_through(block, Cage.box((0.0, 0.0, 0.0), (0.8, 0.4, 0.4), rotation=(0.0, 0.0, 0.3)))
+    assert (np.abs(np.linalg.norm(cut.normals, axis=1) - 1.0) < 1e-12).all()
+    assert (cut.points[:, 2] < 0.5 * VOXEL).all()
+    floor = cut.normals[:, 2] < -0.99
+    assert np.allclose(cut.points[floor, 2], -0.2) and floor.sum() == 16 * 8
+    # Of the four walls what is below the slab's top: half of each.
+    assert not (cut.normals[:, 2] > 0.01).any() and abs((~floor).sum() - 2 * (16 + 8) * 4) <= 2 * (16 + 8)
+    assert ((cut.points * cut.normals)[~floor].sum(axis=1) > 0.19).all()
+    nothing = cut_through(block, Cage.box((0.0, 0.0, 0.15), (0.2, 0.2, 0.1)))
+    assert nothing.points.shape == (0, 3)
 
 
 def test_thinned_surfaces_keep_both_sides() -> None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cages import Cage
@@ -113,20 +114,20 @@ def _filled(block: Block, edit: Edit, bent: Bent) -> Block:
     What was photographed there is noise, which the new light would bring out.
     """
     at = block.coordinates(bent.surface.points)
-    dark = at[bent.log > UNSURE]
-    if not len(dark):
+    dark = bent.log > UNSURE
+    if not dark.any():
         return block
     # Not all that is bent: what is dark, and as much again around it.
-    low, high = dark.min(axis=0), dark.max(axis=0)
+    low, high = at[dark].min(axis=0), at[dark].max(axis=0)
     margin = max(AROUND, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
-    filled = _continued(small, edit, bent, at - first, dark - first)
+    filled = _continued(small, edit, bent, at - first, dark)
     return replace(block, sh=filled.sh)
 
 
-def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: Array) -> Block:
-    """The block with the support going on that surfaces [N] at block coordinates are of; dark [M,3]: some."""
+def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: NDArray[np.bool_]) -> Block:
+    """The block with the support going on that surfaces [N] at block coordinates are of; some are dark."""
     inside = edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
     part = block.solid & inside
     if not part.any():
@@ -136,7 +137,8 @@ def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: Array) -> 
     size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
     near = (away > 0.0) & (away < max(RIM, 0.5 * size))
     support = support_around(part, bent.surface, at, near, max(bent.block.spacing))
-    footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), dark)
+    unsure = Surfels(at[dark], bent.surface.normals[dark])
+    footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), unsure)
     if footprint is None:
         return block
     known = bent.light.at(bent.block, footprint.points(block)) < UNSURE

@@ -17,6 +17,7 @@ from cagefield.patches.light import Lighting
 from cagefield.patches.rebuilding import rebuilt
 from cagefield.patches.seen import Sight
 from cagefield.patches.support import support_around
+from cagefield.patches.surfels import Surfels
 from cagefield.patches.work import CLOSE, UNSURE, Work
 
 TOUCHES = 4
@@ -41,7 +42,8 @@ def capped(work: Work, block: Block, light: Lighting | None, below: EditStack, s
     if support is None:
         return block
     log = np.zeros(len(at)) if light is None else light.at(block, part.points)
-    footprint = footprint_of(support, held, at[near & (away < CLOSE)], at[log > UNSURE])
+    dark = log > UNSURE
+    footprint = footprint_of(support, held, at[near & (away < CLOSE)], Surfels(at[dark], part.normals[dark]))
     if footprint is None:
         return block
     points = footprint.points(block)

@@ -15,6 +15,7 @@ from scipy.interpolate import RBFInterpolator
 
 from cagefield.patches.block import Block, world_of
 from cagefield.patches.support import LEAST, NEAR, Support
+from cagefield.patches.surfels import Surfels
 from cagefield.typing import Array, Mask
 
 HIGH = 3.0
@@ -25,6 +26,9 @@ BESIDE = 2
 
 GAP = 3
 """Half the width of a gap amid a support from which on it is one; columns."""
+
+ALONG = 0.8
+"""Least cosine between a support's normal and those of its surface in deep shade."""
 
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
@@ -102,10 +106,11 @@ class Footprint:
         return np.where(inside, cell[:, 0], -1), cell[:, 1], height
 
 
-def footprint_of(support: Support, part: Mask, close: Array, unsure: Array) -> Footprint | None:
+def footprint_of(support: Support, part: Mask, close: Array, unsure: Surfels) -> Footprint | None:
     """The columns under the part, and those of the surfaces close to it, and of those in deep shade.
 
-    close, unsure: block coordinates [N,3] of these.
+    close: block coordinates [N,3] of the former; unsure: the latter, at block coordinates. The sides of a
+    support are no part of its columns.
     """
     uv, own = support.local(support.members)
     content = np.argwhere(part).astype(np.float64)
@@ -116,7 +121,7 @@ def footprint_of(support: Support, part: Mask, close: Array, unsure: Array) -> F
     low = np.concatenate([low, dark[0][np.abs(dark[1]) < 2.0 * NEAR]])
     if len(low) < 4:
         return None
-    deep, above = support.local(unsure)
+    deep, above = support.local(unsure.points[unsure.normals @ support.normal > ALONG])
     deep = deep[np.abs(above) < 2.0 * NEAR]
     every = np.concatenate([uv, low, deep])
     first = np.floor(every.min(axis=0)).astype(np.int64) - 3

@@ -27,7 +27,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
 from cagefield.patches.seen import Sight
 from cagefield.patches.sun import Sun, sun_of
-from cagefield.patches.surfels import Surfels, distance_to, gridded
+from cagefield.patches.surfels import Surfels, gridded
 from cagefield.typing import Array, Mask
 
 REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
@@ -57,6 +57,9 @@ FINE = 0.4
 
 AMONG = 8
 """Surface elements that the light on a vertex is the mean of."""
+
+FACING = 3.0
+"""How much more surface elements count for a vertex that face as it does: e^FACING across an edge."""
 
 DEEP = 10.0
 """How far from a surface what shows is lit as it is; voxels."""
@@ -104,9 +107,7 @@ class Ambience:
 
 def nearness(around: Sequence[Surfels], at: Surfels, reaches: Sequence[float]) -> Array:
     """max(0, 1 - D(p + r n) / r) [N,R] at surface elements (p, n) [N], for each reach r."""
-    distance = distance_to(around)
-    found = [distance(at.points + reach * at.normals, reach) / reach for reach in reaches]
-    return np.clip(1.0 - np.stack(found, axis=1), 0.0, 1.0)
+    return np.asarray(np.max([each.nearness(at, reaches) for each in around], axis=0))
 
 
 def _solid_vertices(field: VoxelField) -> NDArray[np.int64]:
@@ -200,8 +201,9 @@ class Lighting:
             found, rows = found[near], rows[near]
             where[where] = near
             rows = np.where(np.isfinite(found), rows, rows[:, :1])
-            # Both sides of what is thin: its colours are those of all vertices around.
-            weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / apart**2)
+            # Around an edge each side has a light of its own; what is thin shows the vertices of both sides.
+            facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], block.normals[where]))
+            weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / apart**2 + FACING * facing)
             log = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
         return cls(where, log)
 

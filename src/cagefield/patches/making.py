@@ -24,9 +24,6 @@ from cagefield.patches.support import Support
 from cagefield.patches.work import UNSURE, VIEWS, Work, lit_by
 from cagefield.typing import Mask
 
-ALONG = 0.8
-"""Least cosine between a support's normal and those of its surface."""
-
 THROUGH = 3.0
 """What is so much before what a camera shows, in voxels, is air."""
 
@@ -92,9 +89,9 @@ def made_of(
     if edit.fill == "surroundings" and not edit.keep_source:
         support = found
     if support is not None:
-        # The sides of a support are no part of its columns.
-        unsure = work.lit.points[(logs > UNSURE) & (work.lit.normals @ support.normal > ALONG)]
-        footprint = footprint_of(support, work.part, work.close, under.coordinates(unsure))
+        dark = work.lit.take(logs > UNSURE)
+        unsure = replace(dark, points=under.coordinates(dark.points))
+        footprint = footprint_of(support, work.part, work.close, unsure)
     if footprint is not None and sight is not None:
         footprint = footprint.without_air(
             work.views(footprint.points(under), below, sight, -THROUGH) >= VIEWS

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from cagefield import trilinear_hex
+from cagefield.cages import Cage
 from cagefield.patches.block import Block, world_of
 from cagefield.typing import Array, Mask
 
@@ -25,6 +28,9 @@ FAR = 1e9
 
 BEHIND = -0.5
 """Cosine between a surface's normal and the way from it to a point, from which on down that is behind it."""
+
+PASSED = 0.9
+"""Share of a way within which a surface must lie that the way passes through."""
 
 HALF = float(np.log(2.0))
 """Optical depth that stops half of the light."""
@@ -66,16 +72,39 @@ class Surfels:
     def _tree(self) -> cKDTree:
         return cKDTree(self.points)
 
+    def sided(self, points: Array, reach: float = np.inf) -> tuple[Array, NDArray[np.bool_]]:
+        """(distances [M] of points [M,3] to the nearest surface, which of them [M] are behind that).
+
+        FAR and False beyond `reach`.
+        """
+        out, behind = np.full(len(points), FAR), np.zeros(len(points), bool)
+        if len(self.points) and len(points):
+            found, nearest = self._tree.query(points, distance_upper_bound=reach, workers=-1)
+            near = np.flatnonzero(np.isfinite(found))
+            out[near] = found[near]
+            away = points[near] - self.points[nearest[near]]
+            behind[near] = (away * self.normals[nearest[near]]).sum(axis=1) < BEHIND * found[near]
+        return out, behind
+
     def distance(self, points: Array, reach: float = np.inf) -> NDArray[np.float64]:
         """Distances [M] of points [M,3] to the nearest surface: 0 behind it, FAR beyond `reach`."""
-        if not len(self.points) or not len(points):
-            return np.full(len(points), FAR)
-        found, nearest = self._tree.query(points, distance_upper_bound=reach, workers=-1)
-        near = np.flatnonzero(np.isfinite(found))
-        away = points[near] - self.points[nearest[near]]
-        behind = (away * self.normals[nearest[near]]).sum(axis=1) < BEHIND * found[near]
-        out = np.full(len(points), FAR)
-        out[near] = np.where(behind, 0.0, found[near])
+        found, behind = self.sided(points, reach)
+        return np.where(behind, 0.0, found)
+
+    def nearness(self, at: Surfels, reaches: Sequence[float]) -> Array:
+        """max(0, 1 - D(p + r n) / r) [M,R] at surface elements (p, n) [M], for reaches r that grow.
+
+        D is 0 behind a surface that the way along the normal passed through. What is thin is seen from one
+        side only, often: what lies before its other side is behind it, and nothing was passed on the way.
+        """
+        inside, free, last = np.zeros(len(at.points), bool), np.zeros(len(at.points)), 0.0
+        out = np.zeros((len(at.points), len(reaches)))
+        for k, reach in enumerate(reaches):
+            found, behind = self.sided(at.points + reach * at.normals, reach)
+            # The surface itself is as near as the way is long.
+            inside = behind & (inside | (free < PASSED * (reach - last)))
+            free, last = found, reach
+            out[:, k] = np.clip(1.0 - np.where(inside, 0.0, found) / reach, 0.0, 1.0)
         return out
 
     def nearest(self, points: Array, count: int, reach: float) -> tuple[Array, NDArray[np.int64]]:
@@ -120,15 +149,6 @@ class Surfels:
             for values in (self.points, self.normals)
         )
         return Surfels(points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
-
-
-def distance_to(surfaces: Sequence[Surfels]) -> Distance:
-    """The distance to the nearest of some surfaces, 0 behind any of them."""
-
-    def distance(points: Array, reach: float = np.inf) -> NDArray[np.float64]:
-        return np.min([each.distance(points, reach) for each in surfaces], axis=0)
-
-    return distance
 
 
 def gridded(surfaces: Sequence[Surfels], edge: float) -> Distance:
@@ -205,6 +225,23 @@ def surfels_of(block: Block) -> Surfels:
     middle = 0.5 * (block.stride - 1)
     points = world_of(block.field, block.stride * g + block.low + middle)
     return Surfels(points, _smooth(points, normals, 2.5 * max(block.spacing)))
+
+
+def cut_through(block: Block, cage: Cage) -> Surfels:
+    """The faces of a cage where they cut through what is solid in a block, a voxel apart."""
+    solid, edge = block.solid.astype(np.float32), max(block.spacing)
+    found = [Surfels(np.zeros((0, 3)), np.zeros((0, 3)))]
+    for axis, side in product(range(3), (0.0, 1.0)):
+        lengths = np.linalg.norm(trilinear_hex.jacobian(cage.corners, np.full((1, 3), 0.5))[0], axis=0)
+        count = np.ceil(lengths / edge).astype(np.int64)
+        count[axis] = 1
+        u = (np.stack(np.unravel_index(np.arange(count.prod()), count), axis=1) + 0.5) / count
+        u[:, axis] = side
+        at = trilinear_hex.points(cage.corners, u)
+        inside = block.lookup(solid, at) > 0.5
+        normals = np.linalg.inv(trilinear_hex.jacobian(cage.corners, u[inside]))[:, axis] * (2.0 * side - 1.0)
+        found.append(Surfels(at[inside], normals / np.linalg.norm(normals, axis=1, keepdims=True)))
+    return joined(found)
 
 
 def _smooth(points: Array, normals: Array, reach: float) -> Array:

@@ -22,7 +22,7 @@ from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
 from cagefield.patches.seen import Sight
 from cagefield.patches.support import Support, support_around
-from cagefield.patches.surfels import Surfels, joined, surfels_of, with_seen
+from cagefield.patches.surfels import Surfels, cut_through, joined, surfels_of, with_seen
 from cagefield.typing import Array, Mask
 from cagefield.warps.inner_map import HexahedronMap
 
@@ -214,17 +214,22 @@ class Work:
             new = self.pasted.take(rest.distance(self.pasted.points) > 0.5 * self.voxel)
             log = _change(ambience, lit, [rest, new], [rest], new, self.voxel)
             return Lighting.of(under, lit, log, self.apart), None
-        part = self.gone
-        inside, points, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(part.points)
-        part = part.take(inside)
-        moved = part.turned(points, jacobian)
-        log = strength * _change(ambience, lit, [rest, moved], [rest], moved, self.voxel)
+        part, moved = self._moved(self.gone)
+        # It is cut from what is solid: where it stood, it is no shell.
+        whole = joined([moved, self._moved(cut_through(self.before, self.edit.inner))[1]])
+        log = strength * _change(ambience, lit, [rest, whole], [rest], whole, self.voxel)
         cast = Lighting.of(under, lit, log, self.apart)
         before = [self.others, self.gone]
-        log = ambience.log_light([rest, moved], moved) - ambience.log_light(before, part)
+        log = ambience.log_light([rest, whole], moved) - ambience.log_light(before, part)
         on_part = Lighting.of(self.before, part, log, self.apart)
         where = on_part.where & self.inside
         return cast, Lighting(where, on_part.log_ratio[self.inside[on_part.where]])
+
+    def _moved(self, surface: Surfels) -> tuple[Surfels, Surfels]:
+        """(what of a surface lies in V^c, the same at its new place)."""
+        inside, points, jacobian = HexahedronMap(self.edit.deformed, self.edit.inner)(surface.points)
+        kept = surface.take(inside)
+        return kept, kept.turned(points, jacobian)
 
     def shown_part(self, block: Block, there: Block) -> Block | None:
         """The part, as it became in its block, put into `there`; no more has colours. None where it stays."""
