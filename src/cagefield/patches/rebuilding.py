@@ -2,6 +2,7 @@
 
 The densities are those of the surfaces around, at the same height over the support, and the colours are the
 membrane that spans the hole: each coefficient solves Laplace's equation between those at the hole's rim.
+Where a texture has a grain its lines go on (`patches.grain`).
 
 Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membrane (without guidance).
 """
@@ -15,6 +16,7 @@ from scipy.sparse.linalg import factorized
 
 from cagefield.patches.block import Block
 from cagefield.patches.footprint import HIGH, Footprint
+from cagefield.patches.grain import grain_of, streamed
 from cagefield.sh import sh_basis
 from cagefield.typing import AnyArray, Array, Float32, Mask
 
@@ -24,8 +26,12 @@ DEEP = -4.0
 TOP = 1.6
 """Height over a support, voxels, up to which its colours are."""
 
-EDGE = 2
+EDGE = 3
 """Columns at the edge of a support whose colours do not go on."""
+
+ASIDE, CLOSE = 0.6, 3.0
+"""Cosine with a support's normal up to which a surface is its side, which stays unless it is so close to what
+was taken away; voxels."""
 
 RING, UNSURE, DOUBTED = 6.0, 0.4, 0.1
 """Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and
@@ -57,6 +63,7 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     nearest = ndimage.distance_transform_edt(np.isinf(top), return_distances=False, return_indices=True)
     hole &= height <= top[tuple(nearest)][u, v] + 0.5
     known_columns = (u[around], v[around], height[around])
+    hole &= ~_sides(block, footprint, removed)[tuple(voxels.T)]
     if stays:
         new = hole & level & ~gone
         return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
@@ -79,6 +86,20 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where], slots=True)
     return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
+
+
+def _sides(block: Block, footprint: Footprint, removed: Mask) -> Mask:
+    """[X,Y,Z], where the support's edge was seen to face aside, not close to what was removed [X,Y,Z]."""
+    columns = footprint.around | footprint.hole
+    edge = footprint.surfaced & columns & ~ndimage.binary_erosion(columns, iterations=EDGE)
+    at = np.argwhere(ndimage.distance_transform_edt(~removed) > CLOSE)
+    u, v, height = footprint.column(at.astype(np.float64))
+    normals = block.normals[tuple(at.T)]
+    facing = normals @ footprint.support.normal
+    side = (u >= 0) & edge[u, v] & (height < TOP) & (facing < ASIDE) & ((normals**2).sum(axis=1) > 0.25)
+    found = np.zeros(block.shape, bool)
+    found[tuple(at[side].T)] = True
+    return found
 
 
 def _profile(block: Block, at: NDArray[np.int64], height: Array) -> Array:
@@ -128,7 +149,7 @@ def _coloured(
     sure = given & (share < DOUBTED)
     given = sure if sure.any() else given
     unknown = (footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape)
-    own, table = table, membrane(unknown, given.reshape(shape), table)
+    own, table = table, _spanned(unknown, given.reshape(shape), table)
     sh = block.sh.copy()
     beside = np.ravel_multi_index((u, v), shape)
     rows = (slot >= 0) & (share[beside] > 0.0) & (height < TOP) & (total[beside] > 0.0)
@@ -185,6 +206,18 @@ def _as_seen(sh: Float32, normal: Array) -> Array:
     firm = np.eye(sh.shape[1]) * FIRM * VIEWS
     firm[0, 0] = 0.0
     return np.einsum("kd,ndc->nkc", np.linalg.solve(basis.T @ basis + firm, basis.T), seen)
+
+
+def _spanned(unknown: Mask, given: Mask, table: Array) -> Array:
+    """The rows [U*V,C] with those of the unknown [U,V]: the membrane's, and the grain's where it goes on."""
+    spanned = membrane(unknown, given, table)
+    sought = unknown & ~given
+    values = table[:, :3].sum(axis=1).reshape(given.shape)
+    grain = grain_of(values, given, lambda known, rows: membrane(sought | given, known, rows))
+    rows, share = streamed(sought, given, table, grain)
+    at = np.flatnonzero(sought)
+    spanned[at] += share[:, None] * (rows - spanned[at])
+    return spanned
 
 
 def membrane(hole: Mask, given: Mask, table: Array) -> Array:
