@@ -59,7 +59,8 @@ def _table(found: dict[str, Outcome], inputs: int) -> str:
 {inputs} inputs for each reader, damaged as `tests/robustness/mutators.py` does it. Refused: one line that
 says what is wrong. Read: what is left makes sense. Crashed: any other exception, or the end of the process.
 Hung: over {HANG:g} s of a processor, or a minute without an answer. Over memory: above twice what the honest
-file takes and {SLACK >> 20} MiB.
+file takes and {SLACK >> 20} MiB; memory is what the process grows by, after it has given back what it kept of
+the inputs before.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 

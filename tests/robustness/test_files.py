@@ -55,6 +55,12 @@ FOUND = {
 """Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
 
 
+def test_what_took_memory_stays_cured() -> None:
+    """A damaged file that is unpacked to half a million splats, none of which is visible: it took 60 MiB."""
+    found = attack(["spz 1"], 5622, 5623)["spz 1"]
+    assert (found.refused, found.faults) == (1, [])
+
+
 @pytest.mark.parametrize("name", FOUND)
 def test_what_was_found_stays_cured(tmp_path: Path, name: str) -> None:
     reader = READERS[name]
@@ -77,40 +83,29 @@ def test_most_damages_are_seen(outcomes: dict[str, Outcome]) -> None:
 
 
 def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A reader that crashes, one that ends its process, one that takes memory, and one that never ends."""
-    faulty = tmp_path / "readers.py"
-    faulty.write_text(
-        "import os, time\n"
-        "class Reader:\n"
-        "    damaged = {'a': 'bytes'}\n"
-        "    def make(self, folder):\n"
-        "        (folder / 'a').write_bytes(b'honest' * 20)\n"
-        "    def read(self, folder):\n"
-        "        self.calls = getattr(self, 'calls', 0) + 1\n"
-        "        if self.calls > 4: self.fault()\n"
-        "def reader(fault):\n"
-        "    made = Reader(); made.fault = fault; return made\n"
-        "def crash(): raise KeyError('x')\n"
-        "def burn():\n"
-        "    while True: pass\n"
-        "READERS = {'crash': reader(crash), 'death': reader(lambda: os._exit(3)),\n"
-        "           'memory': reader(lambda: bytearray(60 << 20)), 'burn': reader(burn)}\n"
-    )
+    """Readers that crash, end their process, take memory, also where they refuse, and one that never ends.
+
+    The one that takes memory in small parts is counted again, though its process has kept what it freed.
+    """
     import attack as attacking
 
+    here = Path(__file__).parent
+    (tmp_path / "readers.py").write_text((here / "faulty_readers.py").read_text())
     for name in ("attacked_reader", "mutators", "plain_mutators", "hostile_values"):
-        program = (Path(__file__).parent / f"{name}.py").read_text()
-        (tmp_path / f"{name}.py").write_text(program)
+        (tmp_path / f"{name}.py").write_text((here / f"{name}.py").read_text())
     monkeypatch.setattr(attacking, "__file__", str(tmp_path / "attack.py"))
     monkeypatch.setattr(attacking, "HANG", 0.5)
-    found = attack(["crash", "death", "memory", "burn"], 0, 1)
+    found = attack(["crash", "death", "memory", "refused", "crumbs", "burn"], 0, 2)
     assert {name: (one.tried, one.crashed, one.over_memory, one.hung) for name, one in found.items()} == {
-        "crash": (1, 1, 0, 0),
-        "death": (1, 1, 0, 0),
-        "memory": (1, 0, 1, 0),
-        "burn": (1, 0, 0, 1),
+        "crash": (2, 2, 0, 0),
+        "death": (2, 2, 0, 0),
+        "memory": (2, 0, 2, 0),
+        "refused": (2, 0, 2, 0),
+        "crumbs": (2, 0, 2, 0),
+        "burn": (2, 0, 0, 2),
     }
-    assert all(len(one.faults) == 1 for one in found.values())
+    assert found["refused"].refused == 2
+    assert all(len(one.faults) == sum((one.crashed, one.over_memory, one.hung)) for one in found.values())
 
 
 # ---- structure ----

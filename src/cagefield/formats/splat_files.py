@@ -15,6 +15,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -38,6 +39,7 @@ from cagefield.formats.splat_spz import SPZ_AXES, open_spz
 from cagefield.formats.splat_spz_writer import Version as SpzVersion
 from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import (
+    VISIBLE,
     FieldTable,
     OnProgress,
     SplatBatch,
@@ -89,14 +91,16 @@ def read_splats(
     no number are left out with one warning.
 
     Raises:
-        FieldError: no such file, a format that is not known, a file that is damaged or holds no splats.
+        FieldError: no such file, a format that is not known, a file that is damaged or holds no splat that is
+            visible.
     """
     source = open_splats(Path(path))
+    found = _with_visible(source)  # before memory is taken for all of them
     count, degree = source.count, min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
     shapes = ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
     arrays = [np.empty((count, *shape), np.float32) for shape in shapes]
     done = 0
-    for batch in _batches(source, axes):
+    for batch in _batches(source, found, axes):
         parts = (batch.means, batch.log_scales, batch.quaternions, batch.opacities, batch.sh)
         for array, part in zip(arrays, parts, strict=True):
             array[done : done + len(batch)] = part
@@ -148,7 +152,9 @@ def convert_splats(
     writer_of(Path(target), spz_version)
     found = open_splats(Path(source))
     degree = min(found.sh_degree, spherical_harmonics.MAX_DEGREE)
-    with spooled(found, _batches(found, axes), degree, lambda share: on_progress(0.4 * share)) as table:
+    with spooled(
+        found, _batches(found, found.batches(), axes), degree, lambda share: on_progress(0.4 * share)
+    ) as table:
         rest: OnProgress = lambda share: on_progress(0.4 + 0.6 * share)  # noqa: E731
         return table.count, _write(table, Path(target), target_axes, rest, spz_version)
 
@@ -197,7 +203,26 @@ def writer_of(
     return partial(write_spz, version=spz_version), SPZ_AXES
 
 
-def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
+def _with_visible(source: SplatSource) -> Iterator[SplatBatch]:
+    """A file's batches, which are gone through once more where the first holds nothing that is visible.
+
+    Raises:
+        FieldError: none does.
+    """
+    batches = source.batches()
+    first = next(batches, None)
+    if first is not None and not _transparent(first):
+        return itertools.chain((first,), batches)
+    if first is not None and all(map(_transparent, batches)):
+        raise FieldError(f"{source.path}: the file holds no splat that is visible; export it again")
+    return source.batches()
+
+
+def _transparent(batch: SplatBatch) -> bool:
+    return bool((batch.opacities < VISIBLE).all())
+
+
+def _batches(source: SplatSource, batches: Iterator[SplatBatch], axes: Axes | None) -> Iterator[SplatBatch]:
     """The splats that can be shown, in PLY's axes, with harmonics of a degree that a field may have."""
     most = spherical_harmonics.MAX_DEGREE
     if source.sh_degree > most:
@@ -206,7 +231,7 @@ def _batches(source: SplatSource, axes: Axes | None) -> Iterator[SplatBatch]:
             stacklevel=3,
         )
     kept = (min(source.sh_degree, most) + 1) ** 2
-    for batch in cleaned(source, source.batches()):
+    for batch in cleaned(source, batches):
         cut = dataclasses.replace(batch, sh=batch.sh[:, :kept])
         yield with_axes(cut, axes or source.axes, PLY)
 

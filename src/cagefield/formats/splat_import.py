@@ -18,6 +18,7 @@ from cagefield.cameras import Camera, turntable
 from cagefield.datasets.views import Dataset
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
+from cagefield.formats.splat_table import VISIBLE
 from cagefield.typing import Array, Float32
 
 Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
@@ -26,9 +27,6 @@ Cameras = dict[str, tuple[Camera, ...]]
 FAR = 8.0
 """A file holds surroundings where the farthest hundredth of its splats is this many times as far from the
 middle as half of them."""
-
-VISIBLE = 0.02
-"""Splats less opaque say nothing about where things are."""
 
 MARGIN = 0.05
 """Room around the splats in the box, in shares of its size."""

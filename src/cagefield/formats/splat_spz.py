@@ -50,6 +50,9 @@ _MOST_RATIO = 1040
 _SMALL, _USUAL_RATIO = 1 << 20, 100
 """Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
 
+_PART = 1 << 19
+"""Bytes that are decompressed at a time: a file that is cut off late is refused with little memory."""
+
 _DECODED = 1 << 13
 """Splats that are decoded at a time: each takes 600 bytes meanwhile."""
 
@@ -86,7 +89,7 @@ def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
     spool = _spool()
     left = sum(widths) * count
     while left:
-        part = stream.read(min(left, 1 << 24))
+        part = stream.read(min(left, _PART))
         if not part:
             raise _damaged(path, f"it ends {left} bytes early")
         spool.write(part)
@@ -120,7 +123,7 @@ def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
         left = size
         try:
             with zstandard.ZstdDecompressor().stream_reader(cast(Any, _Part(file, at, packed))) as reader:
-                while left and (part := reader.read(min(left, 1 << 24))):
+                while left and (part := reader.read(min(left, _PART))):
                     spool.write(part)
                     left -= len(part)
         except zstandard.ZstdError:

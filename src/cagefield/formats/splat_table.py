@@ -25,6 +25,9 @@ from cagefield.typing import AnyArray, Float32
 BATCH = 1 << 18
 """Splats that are held at a time."""
 
+VISIBLE = 0.02
+"""Splats less opaque say nothing about where things are; a scene of nothing else is refused."""
+
 LEAST_LOG_SCALE, MOST_LOG_SCALE = -30.0, 30.0
 """Logarithms of scales outside are cut, or, above, make the splat one that cannot be shown."""
 
