@@ -151,20 +151,6 @@ def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
     np.testing.assert_array_equal(flat.normals[6000:][stays], ball.normals[stays])
 
 
-def test_the_rounded_edge_of_a_plane_keeps_its_normals() -> None:
-    """A step's edge, seen as normals half aside: amid the plane these are noise, at its edge they are not."""
-    grid = np.stack(np.meshgrid(np.arange(-1, 1, 0.02), np.arange(-1, 1, 0.02)), axis=-1).reshape(-1, 2)
-    points = np.column_stack([grid, np.zeros(len(grid))])
-    tilted = (np.random.default_rng(9).random(len(grid)) < 0.1) & (grid[:, 0] < 0.9)
-    edge = grid[:, 0] > 0.93
-    half = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5)])
-    normals = np.where((tilted | edge)[:, None], half, [0.0, 0.0, 1.0])
-    flat, on = flattened(Surfels(points, normals), 0.02)
-    amid = tilted & (np.abs(grid) < 0.85).all(axis=1)
-    assert on[amid].mean() > 0.9 and (flat.normals[amid & on, 2] > 0.999).all()
-    assert not on[edge & (grid[:, 0] > 0.95)].any()
-
-
 def test_what_cameras_see_replaces_what_lies_beneath() -> None:
     seen, beneath = plane(3000, 0.0, 4), plane(500, 0.0, 5)
     hidden = Surfels(beneath.points - [0.0, 0.0, 0.03], beneath.normals)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from cagefield.patches.surfels import Surfels
 from cagefield.typing import Array
@@ -30,12 +29,6 @@ SHARE, LEAST = 0.08, 40
 ON, FACING = 3.0, 0.6
 """Those within this distance, voxels, and from this cosine of normals on, are put on the plane."""
 
-SURELY = 0.85
-"""From this cosine on they need nothing else; others lie amid such ones, not at the plane's edge."""
-
-AROUND, WITHIN, ASIDE = 24, 6.0, 1.0
-"""That is: the mean of so many of these, at most so far away, is so near at most; voxels."""
-
 
 def flattened(surface: Surfels, voxel: float, *, seed: int = 0) -> tuple[Surfels, NDArray[np.bool_]]:
     """(the surface elements [N], those on planes with the planes' normals; which of them are on planes)."""
@@ -52,31 +45,12 @@ def flattened(surface: Surfels, voxel: float, *, seed: int = 0) -> tuple[Surfels
         centre, normal = found
         height = (points[rows] - centre) @ normal
         on = rows[(np.abs(height) < ON * voxel) & (normals[rows] @ normal > FACING)]
-        on = on[_amid(points[on], normals[on] @ normal > SURELY, voxel)]
         if len(on) < max(LEAST, SHARE * len(points)):
             break
         points[on] -= ((points[on] - centre) @ normal)[:, None] * normal
         normals[on] = normal
         left[on] = False
     return Surfels(points, normals), ~left
-
-
-def _amid(points: Array, sure: NDArray[np.bool_], voxel: float) -> NDArray[np.bool_]:
-    """Which of the points [N] on a plane are so surely, or amid those: at its edge normals are no noise."""
-    amid = sure.copy()
-    tilted = np.flatnonzero(~sure)
-    if not len(tilted) or not sure.any():
-        return amid
-    found, rows = cKDTree(points[sure]).query(
-        points[tilted], k=[*range(1, AROUND + 1)], distance_upper_bound=WITHIN * voxel, workers=-1
-    )
-    near = np.isfinite(found)
-    count = near.sum(axis=1)
-    others = points[sure][np.where(near, rows, 0)] * near[..., None]
-    middle = others.sum(axis=1) / np.maximum(count, 1)[:, None]
-    aside = np.linalg.norm(middle - points[tilted], axis=1)
-    amid[tilted] = (count > 0) & (aside < ASIDE * voxel)
-    return amid
 
 
 def _plane(
