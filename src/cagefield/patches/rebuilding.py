@@ -27,7 +27,7 @@ TOP = 1.6
 """Height over a support, voxels, up to which its colours are."""
 
 EDGE = 3
-"""Columns at the edge of a support whose colours do not go on."""
+"""Columns at the edge of a support whose colours do not go on, and that may face aside."""
 
 ASIDE, CLOSE = 0.6, 3.0
 """Cosine with a support's normal up to which a surface is its side, which stays unless it is so close to what
@@ -90,7 +90,7 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
 
 def _sides(block: Block, footprint: Footprint, removed: Mask) -> Mask:
     """[X,Y,Z], where the support's edge was seen to face aside, not close to what was removed [X,Y,Z]."""
-    columns = footprint.around | footprint.hole
+    columns = ndimage.binary_fill_holes(footprint.around | footprint.hole)
     edge = footprint.surfaced & columns & ~ndimage.binary_erosion(columns, iterations=EDGE)
     at = np.argwhere(ndimage.distance_transform_edt(~removed) > CLOSE)
     u, v, height = footprint.column(at.astype(np.float64))
