@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from cagefield import leftovers
 from cagefield.atomic_files import recover_folder
 from cagefield.leftovers import hidden_name, remove_leftovers
 
@@ -73,3 +75,20 @@ def test_a_folder_put_aside_in_another_stays(tmp_path: Path, ended: str) -> None
     aside, half = (left(tmp_path / "pictures" / "ball", role, ended) for role in ("old", "new"))
     remove_leftovers(tmp_path / "pictures", inside=True)
     assert aside.exists() and not half.exists()
+
+
+@pytest.mark.parametrize("host", ["this", "another"])
+def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
+    tmp_path: Path, ended: str, host: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its number is a process's again, or a container has made it; nothing else removes it."""
+    target = tmp_path / "ball"
+    folder = left(target, "old", str(os.getpid()) if host == "this" else ended)
+    if host == "another":
+        monkeypatch.setattr(leftovers, "_host", lambda: "0a0a0a")
+    assert recover_folder(target, lambda f: True) is None
+    target.mkdir()
+    remove_leftovers(target)
+    target.rmdir()
+    monkeypatch.setattr(leftovers, "UNTOUCHED", -1.0)
+    assert recover_folder(target, lambda f: True) == folder

@@ -13,12 +13,16 @@ import os
 import re
 import shutil
 import socket
+import time
 import uuid
 from pathlib import Path
 
 _MARK = re.compile(r"\.(.+)\.(part|new|old)-([0-9a-f]{6})-(\d+)-\w+(\.\w+)*")
 _LONGEST = 100
 """Bytes of a target's name in a hidden one: names have 255 at most."""
+
+UNTOUCHED = 300.0
+"""Seconds after which a folder that was put aside is nobody's: what its maker had to do takes none."""
 
 
 def hidden_name(target: Path, role: str) -> str:
@@ -34,14 +38,18 @@ def is_abandoned(path: Path) -> bool:
 
 
 def put_aside(target: Path) -> list[Path]:
-    """The folders that ended programs have put aside beside `target`, of exactly its name."""
+    """The folders of exactly its name that programs have put aside beside `target`, where nothing is now.
+
+    A maker that has another host's name (a container's), or a number that is a process's again, cannot be
+    told from one that goes on: its folders count once nothing has touched them for UNTOUCHED seconds.
+    """
     found = []
     for path in target.parent.glob(".*"):
         made = _MARK.fullmatch(path.name)
         if made is None:  # the names of older versions
             is_left = re.fullmatch(rf"\.{re.escape(target.name)}\.old-\w+", path.name) is not None
         else:
-            is_left = (made[1], made[2]) == (_cut(target.name), "old") and is_abandoned(path)
+            is_left = (made[1], made[2]) == (_cut(target.name), "old") and _is_settled(path)
         if is_left and path.is_dir():
             found.append(path)
     return found
@@ -79,6 +87,16 @@ def _remove(path: Path) -> None:
     else:
         with contextlib.suppress(OSError):
             path.unlink()
+
+
+def _is_settled(path: Path) -> bool:
+    """Whether nobody is about to put something at the place that a folder had."""
+    if is_abandoned(path):
+        return True
+    try:
+        return time.time() - path.stat().st_ctime > UNTOUCHED
+    except OSError:
+        return False
 
 
 def _cut(name: str) -> str:
