@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import tempfile
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from starlette.types import Message
 
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.formats.splat_files import read_splats, write_splats
@@ -169,12 +171,41 @@ def test_other_machines_need_the_token_to_send_files(scene: Path) -> None:
         ("..", b"ply", "is no name of a file"),
         ("", b"ply", "is no name of a file"),
         ("x/.hidden.ply", b"ply", "is no name of a file"),
+        ("x\x00.ply", b"ply", "is no name of a file"),
+        ("x\n.ply", b"ply", "is no name of a file"),
     ],
 )
 def test_what_is_no_file_of_splats_is_one_line(scene: Path, name: str, content: bytes, line: str) -> None:
     answer = asyncio.run(posted(scene, name, content))
     assert answer.status_code == 400 and line in answer.text and "\n" not in answer.text
     assert not list(opened_folder().glob("*"))
+
+
+def test_a_page_that_hangs_up_amid_a_file_is_no_error(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    app = application(
+        *open_scene(scene), Guard("localhost", 80, None), lambda scene, source: open_scene(scene)
+    )
+    headers = {"host": "localhost", "content-length": "1000", **HOME}
+    scope = {
+        **{"type": "http", "method": "POST", "path": "/open", "root_path": "", "query_string": b"name=a.ply"},
+        "headers": [(name.lower().encode(), text.encode()) for name, text in headers.items()],
+    }
+    come = [{"type": "http.request", "body": b"ply", "more_body": True}, {"type": "http.disconnect"}]
+    sent: list[Message] = []
+
+    async def receive() -> Message:
+        return come.pop(0)
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    asyncio.run(app(scope, receive, send))
+    assert sent[0]["status"] == 499 and not come
+    assert not list((tmp_path / "temporary").iterdir())
 
 
 def test_a_file_that_is_too_large_is_refused_by_what_it_says_and_by_what_comes(

@@ -14,6 +14,7 @@ from cagefield.errors import SceneError
 from cagefield.keyframe_files import load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.scene import Scene
+from cagefield.server.editor import persistence
 from cagefield.server.editor.persistence import CAMERA_PATH, SceneStore
 from cagefield.server.editor.session import Session
 from full_disks import files_up_to
@@ -94,6 +95,19 @@ def test_a_damaged_autosave_is_passed_over(path: Path, text: str) -> None:
     assert (
         store.autosave_path.with_suffix(".damaged").read_text() == text and not store.autosave_path.exists()
     )
+
+
+def test_damaged_autosaves_are_kept_beside_one_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Up to a few, of which the first stay."""
+    monkeypatch.setattr(persistence, "MOST_DAMAGED", 3)
+    store, _ = opened(path)
+    ends = (".damaged$", ".damaged-2$", ".damaged-3$", ".damaged-3 in place of an older one$")
+    for number, end in enumerate(ends):
+        store.autosave_path.write_text(f"{number} is no autosave")
+        with pytest.warns(UserWarning, match=end):
+            assert store.recovered() is None
+    kept = {file.suffix: file.read_text()[0] for file in path.parent.glob(".*.damaged*")}
+    assert kept == {".damaged": "0", ".damaged-2": "1", ".damaged-3": "3"}
 
 
 def test_keyframes_name_edits_by_their_place_in_files(path: Path) -> None:

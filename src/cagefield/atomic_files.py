@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import glob
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterator
@@ -11,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cagefield.exchange import exchanged
-from cagefield.leftovers import hidden_name, is_ours, remove_leftovers
+from cagefield.leftovers import hidden_name, put_aside, remove_leftovers
 
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
@@ -143,11 +142,7 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
     """
     if target.exists() or not target.parent.is_dir():
         return None
-    left = [
-        folder
-        for folder in target.parent.glob(f".{glob.escape(target.name)}.old-*")
-        if folder.is_dir() and not is_ours(folder) and is_whole(folder)
-    ]
+    left = [folder for folder in put_aside(target) if is_whole(folder)]
     if not left:
         return None
     newest = max(left, key=lambda folder: folder.stat().st_mtime)

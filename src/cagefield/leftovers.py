@@ -1,65 +1,83 @@
 """Hidden files and folders of programs that were ended: known by their names, removed by the next one.
 
 A name is .TARGET.ROLE-HOST-PROCESS-RANDOM: what it is for, and who makes it. Those whose process is gone
-belong to nobody.
+belong to nobody. TARGET is the whole name, or a long one's beginning and a hash of it: another scene's name
+may begin with this one's.
 """
 
 from __future__ import annotations
 
 import contextlib
-import glob
 import hashlib
 import os
 import re
 import shutil
 import socket
+import time
 import uuid
 from pathlib import Path
 
-_MARK = re.compile(r"\.(part|new|old)-([0-9a-f]{6})-(\d+)-\w+(\.\w+)*$")
+_MARK = re.compile(r"\.(.+)\.(part|new|old)-([0-9a-f]{6})-(\d+)-\w+(\.\w+)*")
 _LONGEST = 100
-"""Characters of a target's name in a hidden one: names have 255 bytes at most."""
+"""Bytes of a target's name in a hidden one: names have 255 at most."""
+
+UNTOUCHED = 300.0
+"""Seconds after which a folder that was put aside is nobody's: what its maker had to do takes none."""
 
 
 def hidden_name(target: Path, role: str) -> str:
     """A new name for what becomes `target`, or was it: role "part" (a file), "new" or "old" (folders)."""
     suffix = target.suffix if role == "part" and len(target.suffix) < 16 else ""
-    return f".{target.name[:_LONGEST]}.{role}-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
+    return f".{_cut(target.name)}.{role}-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
 
 
 def is_abandoned(path: Path) -> bool:
     """Whether a hidden name is of a program on this machine that has ended."""
-    found = _MARK.search(path.name)
-    return found is not None and found[2] == _host() and not _lives(int(found[3]))
+    found = _MARK.fullmatch(path.name)
+    return found is not None and found[3] == _host() and not _lives(int(found[4]))
 
 
-def is_ours(path: Path) -> bool:
-    """Whether a program that goes on made this hidden name, or one on another machine."""
-    return _MARK.search(path.name) is not None and not is_abandoned(path)
+def put_aside(target: Path) -> list[Path]:
+    """The folders of exactly its name that programs have put aside beside `target`, where nothing is now.
+
+    A maker that has another host's name (a container's), or a number that is a process's again, cannot be
+    told from one that goes on: its folders count once nothing has touched them for UNTOUCHED seconds.
+    """
+    found = []
+    for path in target.parent.glob(".*"):
+        made = _MARK.fullmatch(path.name)
+        if made is None:  # the names of older versions
+            is_left = re.fullmatch(rf"\.{re.escape(target.name)}\.old-\w+", path.name) is not None
+        else:
+            is_left = (made[1], made[2]) == (_cut(target.name), "old") and _is_settled(path)
+        if is_left and path.is_dir():
+            found.append(path)
+    return found
 
 
 def remove_leftovers(target: Path, *, inside: bool = False) -> None:
-    """Removes what ended programs left beside `target` for it and for what is named after it.
+    """Removes what ended programs left beside `target`: for exactly it, its autosave and its work folder.
 
-    With `inside` also what they left in the folder itself. A folder that one had put aside stays while there
-    is nothing at `target`.
+    With `inside` also what they were writing in the folder itself. A folder that one had put aside stays
+    while there is nothing at `target`.
     """
-    name = glob.escape(target.name[:_LONGEST])
-    found = [path for dots in (".", "..") for path in target.parent.glob(f"{dots}{name}*")]
-    if inside and target.is_dir():
-        found += target.glob(".*")
-    for path in found:
-        role = _MARK.search(path.name)
-        if role is None or not is_abandoned(path) or (role[1] == "old" and not target.exists()):
+    name = target.name
+    beside = {_cut(each) for each in (name, f".{name}.cagefield-autosave.json", f"{name}.work")}
+    for path in target.parent.glob(".*"):
+        made = _MARK.fullmatch(path.name)
+        if made is None or made[1] not in beside or not is_abandoned(path):
             continue
-        _remove(path)
+        if made[2] != "old" or (made[1] == _cut(name) and target.exists()):
+            _remove(path)
+    if inside and target.is_dir():
+        remove_unfinished(target)
 
 
 def remove_unfinished(folder: Path) -> None:
     """Removes what ended programs were writing in a folder, whatever it was to become."""
     for path in folder.glob(".*"):
-        role = _MARK.search(path.name)
-        if role is not None and role[1] != "old" and is_abandoned(path):
+        made = _MARK.fullmatch(path.name)
+        if made is not None and made[2] != "old" and is_abandoned(path):
             _remove(path)
 
 
@@ -69,6 +87,25 @@ def _remove(path: Path) -> None:
     else:
         with contextlib.suppress(OSError):
             path.unlink()
+
+
+def _is_settled(path: Path) -> bool:
+    """Whether nobody is about to put something at the place that a folder had."""
+    if is_abandoned(path):
+        return True
+    try:
+        return time.time() - path.stat().st_ctime > UNTOUCHED
+    except OSError:
+        return False
+
+
+def _cut(name: str) -> str:
+    """A target's name in hidden ones: a long one is cut, and told from others by a hash of it."""
+    whole = os.fsencode(name)
+    if len(whole) <= _LONGEST:
+        return name
+    digest = hashlib.blake2b(whole, digest_size=8).hexdigest()
+    return f"{whole[: _LONGEST - len(digest) - 1].decode(errors='ignore')}~{digest}"
 
 
 def _host() -> str:

@@ -34,6 +34,9 @@ from cagefield.server.editor.session import Session
 CAMERA_PATH = "camera_path.json"
 _EDITS = "edits.yaml"
 
+MOST_DAMAGED = 5
+"""Autosaves of a scene that could not be read and are kept."""
+
 
 class SceneStore:
     """Where a session is kept: the scene's folder, and the autosave beside it.
@@ -89,17 +92,24 @@ class SceneStore:
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-            aside = self.autosave_path.with_suffix(".damaged")
+            aside = self._damaged_path()
+            instead = " in place of an older one" if aside.exists() else ""
             with contextlib.suppress(OSError):
                 self.autosave_path.replace(aside)
             reason = " ".join(str(error).split())[:120]
             self.damaged = (
                 f"unsaved changes in {self.autosave_path} cannot be read ({reason}); "
-                f"they are kept as {aside.name}"
+                f"they are kept as {aside.name}{instead}"
             )
             warnings.warn(self.damaged, stacklevel=2)
             return None
         return None if document == self.document() else document
+
+    def _damaged_path(self) -> Path:
+        """Where the next damaged autosave is kept: a name that is free, or the last of MOST_DAMAGED."""
+        names = (".damaged", *(f".damaged-{n}" for n in range(2, MOST_DAMAGED + 1)))
+        paths = [self.autosave_path.with_suffix(name) for name in names]
+        return next((path for path in paths if not path.exists()), paths[-1])
 
     @property
     def shown_path(self) -> Path:

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 from starlette.applications import Starlette
-from starlette.requests import HTTPConnection, Request
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -87,6 +87,8 @@ def application(
             )
         except TooLargeError as error:
             return PlainTextResponse(str(error), 413)
+        except ClientDisconnect:
+            return PlainTextResponse("the page that sent the file has hung up", 499)
         except (CagefieldError, OSError) as error:
             return PlainTextResponse(str(error), 400)
         return PlainTextResponse("opened")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -19,6 +20,9 @@ MOST_UPLOAD = 4 << 30
 
 STALLED = 30.0
 """Seconds without a byte of a file that a page sends, after which it is given up."""
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+"""What no name of a file has: systems refuse some, and others break lines."""
 
 Opened = tuple[Coordinator, server_messages.Hello]
 Reopen = Callable[[Path, Path], Opened]
@@ -56,7 +60,7 @@ class OpenEditor:
             raise CagefieldError("another file is being opened; wait until it is there")
         async with self._is_opening:
             file_name = Path(name.replace("\\", "/")).name
-            if not file_name or file_name.startswith("."):
+            if not file_name or file_name.startswith(".") or _CONTROL.search(file_name):
                 raise CagefieldError(f"{name!r} is no name of a file; give the file its name, such as x.ply")
             folder = Path(tempfile.mkdtemp(prefix="cagefield-open-"))
             try:
