@@ -42,6 +42,15 @@ def test_train_writes_a_scene(photos: Path, tmp_path: Path, capsys: pytest.Captu
     assert float(match[3]) > 14.0
 
 
+def test_photos_too_small_for_ssim_give_a_scene_without_that_figure(
+    photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    argv = ["train", str(photos), "-o", str(tmp_path / "scene"), "--steps", "5", "--resolution", "16"]
+    assert main([*argv, "--downscale", "6"]) == 0  # to 8 x 8 pixels
+    assert re.search(r"; test PSNR [\d.]+ dB\n", capsys.readouterr().out)
+    assert Scene.open(tmp_path / "scene").cameras["test"][0].width == 8
+
+
 def test_train_refuses_before_it_trains(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

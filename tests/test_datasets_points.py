@@ -6,6 +6,7 @@ import dataclasses
 import json
 import sys
 import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.normalisation import Similarity
-from cagefield.datasets.points import points_of, random_points, training_points
+from cagefield.datasets.points import _read, points_of, random_points, training_points
 from cagefield.datasets.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError
@@ -136,6 +137,73 @@ def test_the_cache_serves_the_same_capture_and_no_other(capture, data, tmp_path,
         assert asked == [len(data.train)]
     finally:
         photo.write_bytes(before)
+
+
+WHOLE = {
+    "positions": np.zeros((2, 3)),
+    "rgb": np.zeros((2, 3), np.uint8),
+    "errors": np.zeros(2, np.float32),
+    "names": np.array(["a", "b"]),
+    "counts": np.array([1, 1]),
+    "seen": np.array([0, 1]),
+}
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999,)}\n",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': ((1,),)}\n",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}\n",
+        "{'descr': '|O', 'fortran_order': False, 'shape': (1,)}\n",
+        "{'descr': '<U0', 'fortran_order': False, 'shape': (99999999999,)}\n",
+        "(((((",
+    ],
+)
+def test_a_cache_whose_arrays_do_not_fit_the_file_is_none(tmp_path, header):
+    file = tmp_path / "points.npz"
+    with zipfile.ZipFile(file, "w") as archive:
+        for name in WHOLE:
+            start = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little")
+            archive.writestr(f"{name}.npy", start + header.encode() + bytes(8))
+    assert _read(file) is None
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"names": np.zeros(3)},
+        {"names": np.array("a")},
+        {"counts": np.array(3)},
+        {"counts": np.array([[1, 1]])},
+        {"counts": np.array([-1, 3])},
+        {"counts": np.array([-1, 10**18])},
+        {"counts": np.array([2, 1])},
+        {"seen": np.array(["x"])},
+        {"seen": np.array([0, -1])},
+        {"seen": np.array([0, 2])},
+        {"positions": np.zeros((2, 2))},
+        {"positions": np.full((2, 3), np.nan)},
+        {"errors": np.array(["x", "y"])},
+    ],
+)
+def test_a_cache_that_does_not_fit_together_is_none(tmp_path, changed):
+    file = tmp_path / "points.npz"
+    np.savez(file, **WHOLE)
+    assert len(_read(file)) == 2
+    np.savez(file, **{**WHOLE, **changed})
+    assert _read(file) is None
+
+
+def test_a_cache_with_bytes_changed_raises_nothing(tmp_path):
+    file = tmp_path / "points.npz"
+    np.savez(file, **WHOLE)
+    content, rng = file.read_bytes(), np.random.default_rng(1)
+    for _ in range(500):
+        changed = np.frombuffer(content, np.uint8).copy()
+        changed[rng.integers(len(changed), size=4)] = rng.integers(256, size=4)
+        file.write_bytes(changed.tobytes())
+        _read(file)
 
 
 def test_a_data_set_s_own_points_are_used_without_those_of_held_out_photos(data):

@@ -16,7 +16,13 @@ from PIL import Image
 
 from cagefield.datasets import colmap_process, features, load_dataset, poses_work, structure_from_motion
 from cagefield.datasets.colmap_process import StoppedError
-from cagefield.datasets.poses_work import plainly_named, prepare_work, remove_work, work_folder
+from cagefield.datasets.poses_work import (
+    plainly_named,
+    prepare_work,
+    remove_work,
+    work_folder,
+    work_photos,
+)
 from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.datasets.structure_from_motion import make_poses
 from cagefield.errors import DatasetError
@@ -105,6 +111,35 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
     monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
     assert make_poses(photos, target).placed == 4
     assert not work_folder(target).exists()
+
+
+DAMAGED = [b"{}", b"[]", b"nope", b"\xff\xfe\x80\x00", b'{"photos": [{"name": "a.png"}], "unreadable": {}}']
+
+
+@pytest.mark.parametrize("content", DAMAGED)
+def test_photos_are_read_again_where_their_list_is_damaged(tmp_path: Path, content: bytes) -> None:
+    photos, work = photos_alone(tmp_path / "photos"), tmp_path / "data.work"
+    prepare_work(work, {"files": 1})
+    found = work_photos(photos, work, 1, lambda done, note: None)
+    plainly_named(found[0], work)
+    (work / "database.db").touch()
+    (work / "photos.json").write_bytes(content)
+    assert work_photos(photos, work, 1, lambda done, note: None) == found
+    assert (work / "database.db").is_file()  # of the same photos
+    (work / "photos.json").write_bytes(content)
+    next(photos.glob("*.png")).unlink()
+    assert len(work_photos(photos, work, 1, lambda done, note: None)[0]) == len(found[0]) - 1
+    assert not (work / "database.db").exists()
+
+
+@pytest.mark.parametrize("content", DAMAGED[1:4])
+def test_work_of_nobody_knows_what_is_left_alone(tmp_path: Path, content: bytes) -> None:
+    work = tmp_path / "data.work"
+    prepare_work(work, {"files": 1})
+    (work / "made_of.json").write_bytes(content)
+    with pytest.raises(DatasetError, match=r"data\.work is in the way, its made_of.json is damaged; move it"):
+        prepare_work(work, {"files": 1})
+    assert (work / "made_of.json").read_bytes() == content
 
 
 def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

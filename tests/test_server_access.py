@@ -88,6 +88,8 @@ def test_wrong_tokens_are_slowed_down(server: tuple[EditorServer, EditorServer])
     editor, _ = server
     found = [status_of(editor, "/edits.yaml", Authorization=f"Bearer guess{n}") for n in range(30)]
     assert found[0] == 403 and found[-1] == 429 and 18 <= found.count(403) <= 22
+    forged = {"Authorization": "Bearer guess", "X-Forwarded-For": "192.0.2.7", "X-Forwarded-Proto": "https"}
+    assert status_of(editor, "/edits.yaml", **forged) == 429
     # A token of so few characters is not even looked at meanwhile, or guesses would cost nothing.
     assert status_of(editor, "/edits.yaml") == 429
     attempts = Attempts()

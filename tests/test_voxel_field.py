@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -83,6 +85,21 @@ def test_a_file_may_be_read_by_whom_other_new_files_may(tmp_path):
     (tmp_path / "other").touch()
     linear_field(1).save(tmp_path / "field.safetensors")
     assert (tmp_path / "field.safetensors").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
+@pytest.mark.parametrize(("numbers", "size"), [("BF16", 2), ("F8_E4M3", 1), ("F8_E5M2", 1), ("C64", 8)])
+def test_numbers_that_numpy_does_not_know_are_one_clear_error(tmp_path, numbers, size):
+    path = tmp_path / "f.safetensors"
+    linear_field().save(path)
+    content = path.read_bytes()
+    end = 8 + int.from_bytes(content[:8], "little")
+    header = json.loads(content[8:end])
+    first, last = header["density"]["data_offsets"]
+    header["density"] |= {"dtype": numbers, "shape": [(last - first) // size]}
+    changed = json.dumps(header).encode()
+    path.write_bytes(len(changed).to_bytes(8, "little") + changed + content[end:])
+    with pytest.raises(FieldError, match=rf"tensor 'density' is of type {numbers}, .*; write it as F32$"):
+        VoxelField.load(path)
 
 
 def test_truncated_file_is_one_clear_error(tmp_path):

@@ -278,5 +278,6 @@ def summary(result: TrainResult | SplatTrainResult) -> str:
         f"train PSNR {result.train_psnr:.2f} dB",
     ]
     if result.test_psnr == result.test_psnr:
-        parts.append(f"test PSNR {result.test_psnr:.2f} dB, SSIM {result.test_ssim:.4f}")
+        ssim = f", SSIM {result.test_ssim:.4f}" if result.test_ssim == result.test_ssim else ""
+        parts.append(f"test PSNR {result.test_psnr:.2f} dB{ssim}")
     return "; ".join(parts)

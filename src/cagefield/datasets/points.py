@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
-import zipfile
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +21,7 @@ from cagefield.datasets.photos import read_header
 from cagefield.datasets.triangulation import triangulate
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import DatasetError
+from cagefield.npz import read_arrays
 
 FloatArray = npt.NDArray[np.float64]
 Views = Literal["train", "all"]
@@ -225,14 +225,20 @@ def _write(file: Path, points: SparsePoints) -> None:
 def _read(file: Path) -> SparsePoints | None:
     """The points of a file; None where it is not there or damaged."""
     try:
-        with np.load(file, allow_pickle=False) as arrays:
-            names = arrays["names"].tolist()
-            ends = np.cumsum(arrays["counts"])
-            flat = arrays["seen"].tolist()
-            seen = tuple(
-                frozenset(names[number] for number in flat[end - count : end])
-                for count, end in zip(arrays["counts"].tolist(), ends.tolist(), strict=True)
-            )
-            return SparsePoints(arrays["positions"], arrays["rgb"], seen, arrays["errors"])
-    except (OSError, ValueError, KeyError, IndexError, EOFError, zipfile.BadZipFile):
+        arrays = read_arrays(file)
+        names, counts, numbers = (arrays[name] for name in ("names", "counts", "seen"))
+        kinds = "".join(array.dtype.kind for array in (names, counts, numbers, arrays["positions"]))
+        if kinds != "Uiif" or any(array.ndim != 1 for array in (names, counts, numbers)):
+            return None
+        if len(counts) and (counts.min() < 0 or counts.max() > len(numbers)):
+            return None
+        if counts.sum() != len(numbers) or (len(numbers) and numbers.min() < 0):
+            return None
+        known, flat = names.tolist(), numbers.tolist()
+        seen = tuple(
+            frozenset(known[number] for number in flat[end - count : end])
+            for count, end in zip(counts.tolist(), np.cumsum(counts).tolist(), strict=True)
+        )
+        return SparsePoints(arrays["positions"], arrays["rgb"], seen, arrays["errors"])
+    except (OSError, ValueError, TypeError, KeyError, IndexError, OverflowError, DatasetError):
         return None

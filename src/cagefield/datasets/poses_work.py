@@ -34,18 +34,32 @@ def work_folder(target: Path) -> Path:
 
 
 def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
-    """The work folder, emptied where it is of other photos."""
+    """The work folder, emptied where it is of other photos.
+
+    Raises DatasetError where nobody can say what it is of.
+    """
     remove_leftovers(work)
     note = work / "made_of.json"
     text = json.dumps(record)
     if work.exists():
-        if note.is_file() and note.read_text(encoding="utf-8") == text:
-            return
-        if not note.is_file() and any(work.iterdir()):
+        if note.is_file():
+            known = note.read_bytes()
+            if known == text.encode():
+                return
+            if not _is_record(known):
+                raise DatasetError(f"folder {work} is in the way, its {note.name} is damaged; move it away")
+        elif any(work.iterdir()):
             raise DatasetError(f"folder {work} is in the way and holds something else; move it away")
         remove_work(work)
     with replaced_folder(work, ()) as draft:
         (draft / note.name).write_text(text, encoding="utf-8")
+
+
+def _is_record(content: bytes) -> bool:
+    try:
+        return isinstance(json_text.loads(content), dict)
+    except ValueError:
+        return False
 
 
 def remove_work(work: Path) -> None:
@@ -75,12 +89,15 @@ def kept_work(work: Path) -> Iterator[None]:
 def work_photos(
     source: Path, work: Path, frames: int, on_progress: OnProgress
 ) -> tuple[list[RawPhoto], dict[str, str]]:
-    """The upright photos in the work folder, and those that cannot be read with the reason."""
+    """The upright photos in the work folder, and those that cannot be read with the reason.
+
+    Where the list of them is damaged they are read again; features and matches stay if there are as many.
+    """
     note = work / "photos.json"
     if note.is_file():
-        kept = json_text.loads(note.read_text(encoding="utf-8"))
-        known = [RawPhoto(**{**one, "path": work / "images" / one["name"]}) for one in kept["photos"]]
-        return known, kept["unreadable"]
+        known = _known_photos(note, work / "images")
+        if known is not None:
+            return known
     shutil.rmtree(work / "images", ignore_errors=True)
     if source.is_file():
         base = work / "frames"
@@ -97,10 +114,41 @@ def work_photos(
         except DatasetError as error:
             unreadable[name] = str(error).removeprefix(f"{file}: ")
         on_progress(index / len(files), f"{index} of {len(files)} photos read")
+    if (work / "colmap").is_dir() and len(list((work / "colmap").iterdir())) != len(photos):
+        _remove_features(work)
     listing = [{**asdict(photo), "path": ""} for photo in photos]
     with replaced_file(note) as draft:
         draft.write_text(json.dumps({"photos": listing, "unreadable": unreadable}), encoding="utf-8")
     return photos, unreadable
+
+
+def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, str]] | None:
+    """What the list of photos says; None where it is damaged, or a photo is not there."""
+    try:
+        kept = json_text.loads(note.read_bytes())
+        photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in kept["photos"]]
+        unreadable = {str(name): str(reason) for name, reason in kept["unreadable"].items()}
+        whole = all(
+            photo.path.is_file()
+            and isinstance(photo.width, int)
+            and isinstance(photo.height, int)
+            and min(photo.width, photo.height) > 0
+            and isinstance(photo.focal, (int, float, type(None)))
+            and isinstance(photo.sharpness, (int, float))
+            and isinstance(photo.alpha, bool)
+            for photo in photos
+        )
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return None
+    return (photos, unreadable) if whole else None
+
+
+def _remove_features(work: Path) -> None:
+    """Removes what was made of a list of photos: their copies for COLMAP, and its database."""
+    for file in work.glob("database.db*"):
+        file.unlink()
+    for name in ("colmap", "masks"):
+        shutil.rmtree(work / name, ignore_errors=True)
 
 
 def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:

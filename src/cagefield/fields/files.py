@@ -15,6 +15,9 @@ import numpy as np
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 
+_NUMBERS = ("F64", "F32", "F16", "I64", "I32", "I16", "I8", "U64", "U32", "U16", "U8", "BOOL")
+"""Types of tensors that numpy knows and that are real."""
+
 
 def kind_of(path: str | Path) -> str | None:
     """The kind of field that the header of a field file names; None where it names none.
@@ -32,20 +35,28 @@ def read_tensors(
     """(header, tensors by name) of a field file; `cure` says where a file that is not there comes from.
 
     Raises:
-        FieldError: the file is missing, truncated, of another kind or of a newer version.
+        FieldError: the file is missing, truncated, of another kind or of a newer version, or has a tensor
+            of a type that is not read.
     """
     if not Path(path).is_file():
         raise FieldError(f"{path}: no such field file; {cure}")
     with _opened(path) as file:
         metadata = file.metadata() or {}
-        tensors: dict[str, Any] = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    if metadata.get("kind") != kind:
-        raise FieldError(f"{path}: kind is {metadata.get('kind')!r:.60}, expected {kind!r}")
-    if metadata.get("version") != version:
-        raise FieldError(
-            f"{path}: field format {metadata.get('version')!r:.60}, this cagefield reads "
-            f"{version!r}; update cagefield"
-        )
+        if metadata.get("kind") != kind:
+            raise FieldError(f"{path}: kind is {metadata.get('kind')!r:.60}, expected {kind!r}")
+        if metadata.get("version") != version:
+            raise FieldError(
+                f"{path}: field format {metadata.get('version')!r:.60}, this cagefield reads "
+                f"{version!r}; update cagefield"
+            )
+        tensors = {}
+        for name in file.keys():  # noqa: SIM118
+            numbers = file.get_slice(name).get_dtype()
+            if numbers not in _NUMBERS:
+                raise FieldError(
+                    f"{path}: tensor {name!r:.60} is of type {numbers}, which is not read; write it as F32"
+                )
+            tensors[name] = file.get_tensor(name)
     return metadata, tensors
 
 

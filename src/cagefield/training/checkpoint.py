@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from cagefield import json_text
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
+from cagefield.npz import read_arrays
 
 
 def write_checkpoint(
@@ -32,18 +32,13 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
         CagefieldError: no such file, a damaged one, or one of another training.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-        if unpacked > path.stat().st_size:  # none is packed
-            raise ValueError(f"it says that it unpacks to {unpacked} bytes")
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_arrays(path)
         scalars, written_for = json_text.loads(str(arrays.pop("scalars"))), str(arrays.pop("config"))
     except KeyError as error:
         raise CagefieldError(
             f"{path}: the checkpoint of another kind of training; give the field that it was started with"
         ) from error
-    except Exception as error:  # zipfile raises its own classes on damaged archives
+    except (OSError, ValueError) as error:
         raise CagefieldError(f"{path}: not a readable checkpoint ({error!s:.160}); start anew") from error
     if written_for != signature:
         raise CagefieldError(f"{path}: written for other photos or settings; start anew")

@@ -7,15 +7,18 @@ import numpy as np
 from cagefield.datasets.views import View
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.metrics import psnr, ssim
+from cagefield.rendering.metrics import WINDOW, psnr, ssim
 
 
 def evaluate_views(field: VoxelField | SplatField, views: tuple[View, ...]) -> tuple[float, float]:
-    """(PSNR, SSIM) of the field's pictures against photos, means over views; alpha is composited on white."""
+    """(PSNR, SSIM) of the field's pictures against photos, means over views; alpha is composited on white.
+
+    SSIM is of the photos that its window fits in; NaN where it fits in none.
+    """
     from cagefield.rendering.renderers import renderer_of
 
     renderer = renderer_of(field)
-    scores = []
+    ratios, similarities = [], []
     for view in views:
         photo = view.load().astype(np.float32) / 255.0
         if photo.shape[2] == 4:
@@ -25,6 +28,7 @@ def evaluate_views(field: VoxelField | SplatField, views: tuple[View, ...]) -> t
             frame = renderer.render(view.camera, background="black")
         if frame is not None:
             rgb = np.clip(frame.rgb, 0.0, 1.0)
-            scores.append((psnr(rgb, photo), ssim(rgb, photo)))
-    means = np.mean(scores, axis=0)
-    return float(means[0]), float(means[1])
+            ratios.append(psnr(rgb, photo))
+            if min(photo.shape[:2]) >= WINDOW:
+                similarities.append(ssim(rgb, photo))
+    return float(np.mean(ratios)), float(np.mean(similarities)) if similarities else float("nan")

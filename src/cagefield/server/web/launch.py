@@ -201,6 +201,7 @@ def serve(
         timeout_graceful_shutdown=2,
         backlog=AT_A_TIME,
         server_header=False,
+        proxy_headers=False,  # an address that a visitor writes himself would get round the limit of tokens
         ssl_certfile=None if certificate is None else certificate.file,
         ssl_keyfile=None if certificate is None or certificate.key is None else certificate.key,
     )
