@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     """The arrays of a file that `numpy.savez` wrote; nothing is allocated that is larger than the file.
 
+    Other archives hold none: a checkpoint of PyTorch's, say.
+
     Raises ValueError for a damaged file, OSError where it cannot be read.
     """
     size = path.stat().st_size
     try:
         with zipfile.ZipFile(path) as archive:
-            entries = archive.infolist()
+            entries = [entry for entry in archive.infolist() if entry.filename.endswith(".npy")]
             unpacked = sum(entry.file_size for entry in entries)
             if unpacked > size:  # none is packed
                 raise ValueError(f"it says that it unpacks to {unpacked} bytes")
