@@ -126,7 +126,7 @@ def test_what_a_delete_uncovers_is_filled_unless_it_is_switched_off(
 
         fill, shadows = (
             tab.page.locator(".pane .tp-lblv", has_text=label)
-            for label in ("Fill what is uncovered", "Contact shadows go along")
+            for label in ("Fill what is uncovered", "Shadows go along")
         )
         assert "goes on where it was" in fill.get_attribute("title")
         assert redness() < 0.1

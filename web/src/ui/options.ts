@@ -18,7 +18,7 @@ interface Point {
 const KINDS = { Continuous: "continuous", Move: "move", Copy: "copy", Delete: "delete" };
 const SHELLS = { Flow: "flow", Trilinear: "trilinear" };
 const FALLOFFS = { Smooth: "smooth", Linear: "linear" };
-const SHADOWS = { "Contact shadows go along": "occlusion", "Cast shadows too": "shadow", Stay: "none" };
+const SHADOWS = { "Contact shadows": "occlusion", "Cast shadows too": "shadow", None: "none" };
 const LATTICES = { Exact: 0, "32³ nodes": 32, "64³ nodes": 64, "128³ nodes": 128, "256³ nodes": 256 };
 
 export function options(app: App, actions: Actions): HTMLElement {
@@ -87,7 +87,7 @@ export function options(app: App, actions: Actions): HTMLElement {
   const fills = kind.addBinding(model, "fills", { label: "Fill what is uncovered" });
   fills.on("change", ({ value }) => change({ fill: value ? "surroundings" : "none" }));
   explained(fills, "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).");
-  const relight = kind.addBinding(model, "relight", { label: "Shadows", options: SHADOWS });
+  const relight = kind.addBinding(model, "relight", { label: "Shadows go along", options: SHADOWS });
   relight.on("change", ({ value }) => change({ relight: value as EditState["relight"] }));
   explained(relight, "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).");
   kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
