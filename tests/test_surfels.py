@@ -151,6 +151,22 @@ def test_planes_get_their_normals_and_spheres_keep_theirs() -> None:
     np.testing.assert_array_equal(flat.normals[6000:][stays], ball.normals[stays])
 
 
+def test_bumps_amid_a_plane_are_put_on_it_and_its_edge_keeps_its_normals() -> None:
+    chance = np.random.default_rng(9)
+    top = Surfels(chance.uniform(-1.0, 1.0, (6000, 3)) * [1.0, 1.0, 0.0], np.tile([0.0, 0.0, 1.0], (6000, 1)))
+    tilted = np.tile([0.7, 0.0, 0.714], (200, 1))
+    bumps = Surfels(chance.uniform(-0.8, 0.8, (200, 3)) * [1.0, 1.0, 0.01], tilted)
+    rim = np.stack(
+        [chance.uniform(1.0, 1.02, 200), chance.uniform(-1.0, 1.0, 200), np.full(200, -0.02)], axis=1
+    )
+    surface = joined([top, bumps, Surfels(rim, tilted)])
+    flat, on = flattened(surface, 0.05, edges=True)
+    assert on[:6000].all() and on[6000:6200].mean() > 0.98 and on[6200:].mean() < 0.02
+    np.testing.assert_array_equal(flat.normals[6200:][~on[6200:]], tilted[~on[6200:]])
+    _, on = flattened(surface, 0.05)
+    assert on.all()
+
+
 def test_what_cameras_see_replaces_what_lies_beneath() -> None:
     seen, beneath = plane(3000, 0.0, 4), plane(500, 0.0, 5)
     hidden = Surfels(beneath.points - [0.0, 0.0, 0.03], beneath.normals)

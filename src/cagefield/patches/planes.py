@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from cagefield.patches.surfels import Surfels
 from cagefield.typing import Array
@@ -29,9 +30,19 @@ SHARE, LEAST = 0.08, 40
 ON, FACING = 3.0, 0.6
 """Those within this distance, voxels, and from this cosine of normals on, are put on the plane."""
 
+REACH, NEIGHBOURS, AMID = 8.0, 24, 0.5
+"""A plane is around what has so many of its elements within so many voxels, whose mean is nearer than this
+share of their mean distance."""
 
-def flattened(surface: Surfels, voxel: float, *, seed: int = 0) -> tuple[Surfels, NDArray[np.bool_]]:
-    """(the surface elements [N], those on planes with the planes' normals; which of them are on planes)."""
+
+def flattened(
+    surface: Surfels, voxel: float, *, seed: int = 0, edges: bool = False
+) -> tuple[Surfels, NDArray[np.bool_]]:
+    """(the surface elements [N], those on planes with the planes' normals; which of them are on planes).
+
+    With `edges`, what is tilted or off a plane is put on it only amid what surely lies on it: bumps are, and
+    the rounded edge of a table, beyond which there is nothing, is not.
+    """
     points, normals = surface.points.copy(), surface.normals.copy()
     left = np.ones(len(points), bool)
     chance = np.random.default_rng(seed)
@@ -44,13 +55,37 @@ def flattened(surface: Surfels, voxel: float, *, seed: int = 0) -> tuple[Surfels
             break
         centre, normal = found
         height = (points[rows] - centre) @ normal
-        on = rows[(np.abs(height) < ON * voxel) & (normals[rows] @ normal > FACING)]
+        facing = normals[rows] @ normal
+        on = (np.abs(height) < ON * voxel) & (facing > FACING)
+        if edges:
+            sure = on & (np.abs(height) < NEAR * voxel) & (facing > ALONG)
+            on = sure | _amid(points[rows] - height[:, None] * normal, on & ~sure, sure, REACH * voxel)
+        on = rows[on]
         if len(on) < max(LEAST, SHARE * len(points)):
             break
         points[on] -= ((points[on] - centre) @ normal)[:, None] * normal
         normals[on] = normal
         left[on] = False
     return Surfels(points, normals), ~left
+
+
+def _amid(
+    points: Array, which: NDArray[np.bool_], sure: NDArray[np.bool_], reach: float
+) -> NDArray[np.bool_]:
+    """Which of some surface elements' points [N] on a plane have others of it, that are sure, all around."""
+    out = np.zeros(len(points), bool)
+    at = np.flatnonzero(which)
+    if not len(at) or not sure.any():
+        return out
+    found, rows = cKDTree(points[sure]).query(
+        points[at], k=[*range(1, NEIGHBOURS + 1)], distance_upper_bound=reach, workers=-1
+    )
+    near = np.isfinite(found)
+    count = np.maximum(near.sum(axis=1), 1)
+    away = np.where(near[..., None], points[sure][np.where(near, rows, 0)] - points[at, None], 0.0)
+    aside = np.linalg.norm(away.sum(axis=1), axis=1) / count
+    out[at] = near[:, 0] & (aside < AMID * np.where(near, found, 0.0).sum(axis=1) / count)
+    return out
 
 
 def _plane(

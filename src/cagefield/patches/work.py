@@ -260,7 +260,7 @@ def _change(
     near = np.arange(len(at.points))
     if ambience.sun is None:
         near = np.flatnonzero(what.distance(at.points, 2.0 * ambience.reach) < 2.0 * ambience.reach)
-    rows, _ = flattened(at.take(near), voxel)
+    rows, _ = flattened(at.take(near), voxel, edges=True)
     log = np.zeros(len(at.points))
     log[near] = ambience.log_light(now, rows) - ambience.log_light(before, rows)
     return np.where(np.abs(log) < UNSEEN, 0.0, log)
