@@ -18,6 +18,9 @@ from cagefield.server.editor.persistence import stem_of
 KEPT_DAYS = 30
 """Cached scenes that were not opened for longer are removed, but those with an autosave."""
 
+_LONGEST = 100
+"""Bytes of a file's name in its scene's: names have 255 at most, with what autosaves and drafts add."""
+
 _BLOCK = 1 << 22
 
 
@@ -35,7 +38,8 @@ def scene_of_file(file: Path) -> Path:
     from cagefield.formats.splat_import import import_splats
     from cagefield.scene import Scene
 
-    folder = opened_folder() / f"{stem_of(file)}-{_digest(file)}"
+    stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
+    folder = opened_folder() / f"{stem}-{_digest(file)}"
     if is_scene(folder):
         os.utime(folder)
     else:
