@@ -17,6 +17,7 @@ import numpy.typing as npt
 from cagefield import json_text
 from cagefield.cameras import Camera, turntable
 from cagefield.errors import CameraError
+from cagefield.regular_files import read_text
 
 Floats = npt.NDArray[np.float64]
 
@@ -220,7 +221,7 @@ def _perpendicular(direction: Floats) -> Floats:
 
 def _read_json(path: Path, what: str) -> dict[str, object]:
     try:
-        document = json_text.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(read_text(path))
     except OSError as error:
         raise CameraError(f"{what} {path} cannot be read: {error.strerror}; check the path") from None
     except ValueError as error:

@@ -23,6 +23,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.leftovers import remove_leftovers, remove_unfinished
+from cagefield.regular_files import read_bytes, read_text
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
@@ -87,7 +88,7 @@ class SceneStore:
         What cannot be read is put aside under another name, with a warning.
         """
         try:
-            content = json_text.loads(self.autosave_path.read_text(encoding="utf-8"))
+            content = json_text.loads(read_text(self.autosave_path))
             document = _parsed(content)
         except FileNotFoundError:
             return None
@@ -280,7 +281,7 @@ class SceneStore:
 
     def _fingerprint(self) -> str:
         try:
-            return hashlib.sha256((self.path / _EDITS).read_bytes()).hexdigest()
+            return hashlib.sha256(read_bytes(self.path / _EDITS)).hexdigest()
         except OSError:
             return ""
 

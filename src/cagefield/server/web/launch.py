@@ -24,6 +24,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
+from cagefield.regular_files import MOST_TEXT, check_regular
 from cagefield.scene import Scene
 from cagefield.scene_files import FIELD, is_scene
 from cagefield.server.editor.pasted_sources import source_problem
@@ -177,6 +178,8 @@ class Certificate:
 
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         try:
+            for file in (self.file, self.key or self.file):
+                check_regular(file, MOST_TEXT)
             context.load_cert_chain(self.file, self.key, no_password)
         except ssl.SSLError as error:
             raise CagefieldError(

@@ -12,6 +12,7 @@ import shutil
 import time
 from pathlib import Path
 
+from cagefield.regular_files import open_regular
 from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import stem_of
 
@@ -54,7 +55,7 @@ def _digest(file: Path) -> str:
     """A name for the content of a file."""
     content = hashlib.blake2b(digest_size=8)
     for part in sorted(file.iterdir()) if file.is_dir() else [file]:
-        with part.open("rb") as stream:
+        with open_regular(part) as stream:
             while block := stream.read(_BLOCK):
                 content.update(block)
     return content.hexdigest()
