@@ -54,7 +54,7 @@ _SMALL, _USUAL_RATIO = 1 << 20, 100
 _PART = 1 << 19
 """Bytes that are decompressed at a time: a file that is cut off late is refused with little memory."""
 
-_DECODED = 1 << 13
+_DECODED = 1 << 12
 """Splats that are decoded at a time: each takes 600 bytes meanwhile."""
 
 # Coordinate systems of the extension, by their number.
