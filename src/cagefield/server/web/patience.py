@@ -12,7 +12,7 @@ HEAD_SECONDS = 10.0
 """Seconds that the head of a request may take, from the connection or its first byte; and a handshake."""
 
 MOST_WAITING = 256
-"""Connections whose handshake or request's head has not come yet; the oldest is closed for another one."""
+"""Connections that owe a handshake, a head, or a body that was answered; the oldest is closed for another."""
 
 AT_A_TIME = 8 << 10
 """Bytes of a page's messages that are read before other connections have their turn."""
@@ -59,10 +59,11 @@ class PatientHttp(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Some of a request, or of the next one."""
         super().data_received(data)
-        if self.conn.their_state is not h11.IDLE:
+        if self._owes():
+            if self not in _waiting:
+                awaited(self, self.loop)
+        elif self.conn.their_state is not h11.IDLE:
             no_longer_awaited(self)
-        elif self not in _waiting and self.conn.trailing_data[0]:
-            awaited(self, self.loop)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The connection is over."""
@@ -79,3 +80,14 @@ class PatientHttp(H11Protocol):
         """Closes the connection at once."""
         no_longer_awaited(self)
         self.transport.abort()
+
+    def _owes(self) -> bool:
+        """Whether the rest of a head is awaited, or of a body that was answered before it had come.
+
+        Or the next request, once data has stopped uvicorn's own timer of that.
+        """
+        if self.conn.their_state is h11.IDLE:
+            return bool(self.conn.trailing_data[0]) or self.timeout_keep_alive_task is None
+        return (
+            self.conn.their_state is h11.SEND_BODY and self.cycle is not None and self.cycle.response_complete
+        )

@@ -160,7 +160,10 @@ def _is_address(name: str) -> bool:
 def _same_origin(origin: str | None, host: str) -> bool:
     if not origin:
         return False
-    parts = urlsplit(origin)
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
     return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
 
 
