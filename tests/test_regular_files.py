@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -11,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.errors import DatasetError
+from cagefield.errors import DatasetError, SceneError
 from cagefield.npz import DEFLATED, read_array, read_arrays
 from cagefield.regular_files import MOST_TEXT, UnreadableError, check_regular, open_regular, read_text
+from cagefield.scene import Scene
+from cagefield.server.editor.pasted_sources import sources_under
+from cagefield.server.editor.persistence import SceneStore
 from commands import refused
 from scenes import ball_scene
 
@@ -111,6 +115,27 @@ def test_the_command_line_reads_no_device(
 def test_an_editor_reads_no_device(tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str) -> None:
     ball_scene().save(tmp_path / "scene")
     assert "it is a device, not a file" in refused(capsys, "view", tmp_path / "scene", option, "/dev/zero")
+
+
+def test_links_in_a_circle_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, loop = tmp_path / "scene", tmp_path / "loop"
+    ball_scene().save(scene)
+    loop.symlink_to(loop)
+    assert "does not exist" in refused(capsys, "info", loop)
+    assert "does not exist" in refused(capsys, "view", loop, "--no-browser")
+    (tmp_path / "e.yaml").write_text("edits: []\n")
+    assert str(loop) in refused(capsys, "edit", scene, tmp_path / "e.yaml", "-o", loop)
+    (tmp_path / "folder.sog").mkdir()
+    assert "it has no meta.json" in refused(capsys, "import", tmp_path / "folder.sog", "-o", tmp_path / "new")
+
+
+def test_links_in_a_circle_beside_a_scene_stop_no_editor(tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "scene")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    assert sources_under(tmp_path, [tmp_path / "scene", tmp_path / "loop"], splats=True) == []
+    store = SceneStore(Scene.open(tmp_path / "scene"), tmp_path / "scene")
+    with contextlib.suppress(SceneError):  # Python up to 3.12 cannot say where that is
+        assert store.place("loop/scene").is_relative_to(tmp_path)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is measured by /proc")

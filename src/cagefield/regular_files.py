@@ -65,6 +65,11 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_TEXT) -> str:
     return read_bytes(path, most).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
+def real_path(path: str | os.PathLike[str]) -> Path:
+    """The absolute path without symbolic links; links in a circle stay as they are, and nothing is there."""
+    return Path(os.path.realpath(path))  # Path.resolve raises RuntimeError of them, up to Python 3.12
+
+
 def _without_waiting(path: str, flags: int) -> int:
     """Opens a file; a pipe that has taken its place meanwhile is not waited for."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

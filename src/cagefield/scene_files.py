@@ -15,7 +15,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.regular_files import read_text
+from cagefield.regular_files import read_text, real_path
 from cagefield.rendering.render_result import background_rgb
 
 FORMAT = "cagefield-scene"
@@ -35,7 +35,7 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
         SceneError: something is there that may not be replaced.
         OSError: nothing can be written there.
     """
-    target = Path(path).resolve()
+    target = real_path(path)
     recover(target)
     if target.exists() and not target.is_dir():
         raise SceneError(f"{path} is a file; give a new folder for the scene")
@@ -57,7 +57,7 @@ def recover(folder: Path) -> None:
 
     Says so in a warning. A scene that is there, and a folder that none was at, stay as they are.
     """
-    found = recover_folder(folder.resolve(), is_scene)
+    found = recover_folder(real_path(folder), is_scene)
     if found is not None:
         warnings.warn(
             f"{folder} was left as {found.name} by a program that was ended while it replaced it; it is back",

@@ -86,7 +86,10 @@ def open_sog(path: Path) -> SplatSource:
 def _from_folder(folder: Path, name: str) -> bytes:
     if PurePosixPath(name).name != name:
         raise ValueError(f"{name} lies in another folder")
-    return read_bytes(folder / name, _MOST_IMAGE)
+    try:
+        return read_bytes(folder / name, _MOST_IMAGE)
+    except FileNotFoundError:
+        raise ValueError(f"it has no {name}") from None
 
 
 def _open(path: Path, content: Images) -> SplatSource:

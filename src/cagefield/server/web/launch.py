@@ -24,7 +24,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
-from cagefield.regular_files import MOST_TEXT, check_regular
+from cagefield.regular_files import MOST_TEXT, check_regular, real_path
 from cagefield.scene import Scene
 from cagefield.scene_files import FIELD, is_scene
 from cagefield.server.editor.pasted_sources import source_problem
@@ -76,8 +76,8 @@ def open_cached(
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
     elif store.damaged is not None:
         coordinator.greeting = store.damaged
-    name = path.resolve().name if source is None else source.name
-    return coordinator, hello_of(scene, name, str(path.resolve()))
+    name = real_path(path).name if source is None else source.name
+    return coordinator, hello_of(scene, name, str(real_path(path)))
 
 
 def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
