@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+import ssl
 import subprocess
 import sys
 import time
@@ -34,6 +35,11 @@ class EditorAt:
         match = re.search(r":(\d+)/", self.link)
         assert match
         return int(match.group(1))
+
+    @property
+    def scheme(self) -> str:
+        """ "https" where it has a certificate, else "http"."""
+        return self.link.partition(":")[0]
 
     @property
     def token(self) -> str:
@@ -159,15 +165,28 @@ class PageClient:
         self.send(**(camera | {"kind": camera.pop("type")}))
 
 
+def _trusting_all() -> ssl.SSLContext:
+    context = ssl.create_default_context()
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context
+
+
 @contextlib.contextmanager
 def page(
     server: EditorServer, *, slow: bool = False, known: bool = True
 ) -> Iterator[tuple[PageClient, dict[str, Any]]]:
     """A page that has just been opened, and what it was told first; `known` has the token's cookie."""
-    origin = f"http://localhost:{server.port}"
+    origin = f"{server.scheme}://localhost:{server.port}"
     cookie = {"Cookie": f"cagefield_{server.port}={server.token}"} if known else {}
-    address = f"ws://localhost:{server.port}/socket"
-    with connect(address, origin=origin, max_size=None, additional_headers=cookie) as socket:
+    encrypted = server.scheme == "https"
+    address = f"{'wss' if encrypted else 'ws'}://localhost:{server.port}/socket"
+    with connect(
+        address,
+        origin=origin,
+        max_size=None,
+        additional_headers=cookie,
+        ssl=_trusting_all() if encrypted else None,
+    ) as socket:
         client = PageClient(socket, slow)
         hello = client.until(lambda m: m["type"] == "hello")
         client.joined = client.state()

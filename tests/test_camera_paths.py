@@ -88,6 +88,8 @@ def test_dataparser_transform_is_undone(tmp_path: Path) -> None:
         ({"render_width": 0}, '"render_width" is 0; give a whole number of pixels'),
         ({"render_height": 10.5}, '"render_height" is 10.5'),
         ({"fps": 0}, "'fps' is 0; give a number above 0"),
+        ({"fps": 1e-9}, "'fps' is 1e-09, 1e-09 pictures a second; give what makes 0.001 to 1000"),
+        ({"fps": None, "seconds": 1e-300}, "'seconds' is 1e-300, .* pictures a second"),
     ],
 )
 def test_bad_paths_name_the_entry(tmp_path: Path, change: dict[str, Any], message: str) -> None:

@@ -156,6 +156,7 @@ def test_existing_results_are_kept_unless_told(
         (["--size", "10x20x30"], "is no size"),
         (["--size", "99999"], "out of range"),
         (["--fps", 0], "--fps is 0"),
+        (["--fps", 1e-9], "--fps is 1e-09; give a number from 0.001 to 1000"),
     ],
 )
 def test_bad_options_are_refused(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
+from cagefield.fields.splat import SplatField
 from cagefield.formats.splat_files import read_splats, write_splats
 from splat_scenes import random_splats
 
@@ -29,6 +30,21 @@ def test_spz_files_are_read_with_little_memory(tmp_path: Path, version: Literal[
     # The field, its unpacked file (a quarter of it), quaternions once more, and 32,768 splats in the decoder,
     # at 600 bytes each. A quarter of a million at a time, and a second field, took six times the field.
     assert most < 1.6 * held + 32_768 * 600
+
+
+def test_small_spz_files_of_many_splats_take_little_beside_the_field(tmp_path: Path) -> None:
+    """Packed to a fiftieth of what it holds, as splats that are alike are."""
+    few = random_splats(40_000, degree=0)
+    columns = {name: np.repeat(getattr(few, name), 5, axis=0) for name in NAMES}
+    columns["sh"] = np.zeros((200_000, 16, 3), np.float32)
+    columns |= {"log_scales": np.full_like(columns["log_scales"], -3.0)}
+    splats = SplatField(**columns)
+    write_splats(splats, tmp_path / "a.spz")
+    held = sum(getattr(splats, name).nbytes for name in NAMES)
+    assert 20 * (tmp_path / "a.spz").stat().st_size < held
+    read, most = _measured(lambda: read_splats(tmp_path / "a.spz"))
+    # Quaternions once more (3 MB), 4 MB of what is unpacked, 4096 splats in the decoder at 600 bytes each.
+    assert len(read) == 200_000 and most < held + (12 << 20)
 
 
 @pytest.mark.parametrize("version", [3, 4])

@@ -6,6 +6,8 @@ import errno
 import shutil
 import subprocess
 import sys
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +19,7 @@ from PIL import Image
 from cagefield.datasets import colmap_process, features, load_dataset, poses_work, structure_from_motion
 from cagefield.datasets.colmap_process import StoppedError
 from cagefield.datasets.poses_work import (
+    check_database,
     plainly_named,
     prepare_work,
     remove_work,
@@ -111,6 +114,83 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
     monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
     assert make_poses(photos, target).placed == 4
     assert not work_folder(target).exists()
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `photos`, and in `data.work` what a run of them that was stopped at the matches left."""
+    folder = tmp_path_factory.mktemp("stopped")
+    photos_alone(folder / "photos")
+
+    def stops(*args: Any, **options: Any) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(structure_from_motion, "match", stops)
+        with pytest.raises(StoppedError):
+            make_poses(folder / "photos", folder / "data")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda whole: whole[: len(whole) // 2], "malformed"),
+        (lambda whole: b"no database at all" * 999, "file is not a database"),
+        (lambda whole: b"", "it holds no photos"),
+        (lambda whole: whole[:50], ""),
+        (lambda whole: whole.replace(b"000001.png", b"000009.png"), "it is of other photos"),
+        (lambda whole: whole[:4096] + bytes(len(whole) - 4096), ""),
+    ],
+    ids=["cut off", "garbage", "empty", "head", "other photos", "zeros"],
+)
+def test_a_damaged_database_is_made_anew(
+    stopped: Path, tmp_path: Path, damage: Callable[[bytes], bytes], reason: str
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    database = folder / "data.work" / "database.db"
+    database.write_bytes(damage(database.read_bytes()))
+    with pytest.warns(UserWarning, match=rf"database\.db is damaged \(.*{reason}.*; features and"):
+        assert make_poses(folder / "photos", folder / "data").placed == 4
+    assert not database.parent.exists()
+
+
+def test_a_database_that_is_whole_is_left(stopped: Path, tmp_path: Path) -> None:
+    database = tmp_path / "database.db"
+    shutil.copy(stopped / "data.work" / "database.db", database)
+    names = sorted(file.name for file in (stopped / "data.work" / "colmap").iterdir())
+    before = database.read_bytes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_database(database, names)
+    assert database.read_bytes() == before
+
+
+def test_a_database_that_may_not_be_written_says_what_helps(
+    stopped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    database = folder / "data.work" / "database.db"
+    with monkeypatch.context() as patch:  # root may write whatever its mode says
+        patch.setattr(poses_work.os, "access", lambda path, mode: path != database)
+        with pytest.raises(DatasetError, match=r"may not be written; make it and .* writable, or move"):
+            make_poses(folder / "photos", folder / "data")
+    database.rename(tmp_path / "away.db")
+    assert make_poses(folder / "photos", folder / "data").placed == 4
+
+
+def test_a_folder_in_a_databases_place_is_moved_away(stopped: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    database = folder / "data.work" / "database.db"
+    database.unlink()
+    database.mkdir()
+    with pytest.raises(DatasetError, match=r"database\.db is in the way \(Is a directory\); move it away$"):
+        make_poses(folder / "photos", folder / "data")
+    database.rename(tmp_path / "away")
+    assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
 DAMAGED = [b"{}", b"[]", b"nope", b"\xff\xfe\x80\x00", b'{"photos": [{"name": "a.png"}], "unreadable": {}}']

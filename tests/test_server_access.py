@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import http.client
 import json
-import shutil
 import socket
 import ssl
-import subprocess
 import time
 import urllib.error
 import urllib.request
@@ -20,6 +18,7 @@ from websockets.sync.client import connect
 from cagefield.server.web import patience
 from cagefield.server.web.launch import Certificate
 from cagefield.server.web.security import Attempts
+from certificates import certificate_of_localhost
 from commands import refused
 from editor_server import EditorServer, editor_server, page
 from scenes import ball_scene
@@ -120,6 +119,33 @@ def test_half_sent_requests_are_given_up(server: tuple[EditorServer, EditorServe
         each.close()
 
 
+@pytest.mark.parametrize("drips", [True, False], ids=["byte by byte", "all at once"])
+def test_bodies_that_come_after_the_answer_hold_no_place(
+    server: tuple[EditorServer, EditorServer], drips: bool
+) -> None:
+    """Data stops the timer of what comes next."""
+    head = f"GET / HTTP/1.1\r\nHost: localhost:{server[0].port}\r\nContent-Length: 1000\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", server[0].port), timeout=0.2) as client:
+        client.sendall(head.encode())
+        begun, rest = time.monotonic(), 1000
+        while time.monotonic() - begun < patience.HEAD_SECONDS + 20.0:
+            try:
+                if rest and time.monotonic() - begun > 0.5:
+                    rest -= client.send(b"x" * (1 if drips else rest))
+                if client.recv(1 << 16) == b"":
+                    return
+            except TimeoutError:
+                continue
+            except ConnectionError:
+                return
+    raise AssertionError("it is still open")
+
+
+def test_odd_origins_and_hosts_are_refused(server: tuple[EditorServer, EditorServer]) -> None:
+    for headers in ({"Origin": "http://["}, {"Host": "[::1"}, {"Host": "localhost:99999999"}):
+        assert status_of(server[0], "/edits.yaml", **headers) == 403
+
+
 def _is_closed(client: socket.socket) -> bool:
     try:
         return client.recv(100) == b""
@@ -130,14 +156,7 @@ def _is_closed(client: socket.socket) -> bool:
 @pytest.fixture(scope="module")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A certificate of localhost's and its key."""
-    if shutil.which("openssl") is None:
-        pytest.skip("certificates for this test are made by openssl, which is not here")
-    folder = tmp_path_factory.mktemp("tls")
-    file, key = folder / "cert.pem", folder / "key.pem"
-    subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost"]
-    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", *subject]
-    subprocess.run([*command, "-keyout", key, "-out", file], check=True, capture_output=True)
-    return file, key
+    return certificate_of_localhost(tmp_path_factory.mktemp("tls"))
 
 
 @pytest.fixture
@@ -167,6 +186,33 @@ def test_pages_over_tls(another: Path, certificate: tuple[Path, Path]) -> None:
             assert json.loads(client.recv(30))["type"] == "hello"
         with pytest.raises((urllib.error.URLError, ConnectionError)):
             urllib.request.urlopen(f"http://localhost:{server.port}/", timeout=20)
+
+
+def test_connections_that_never_shake_hands_are_given_up(
+    another: Path, certificate: tuple[Path, Path]
+) -> None:
+    """They count with half-sent requests, and have as long, though they say a byte now and then."""
+    file, key = certificate
+    with editor_server(another, "--certificate", str(file), "--certificate-key", str(key)) as server:
+        address = ("127.0.0.1", server.port)
+        first = socket.create_connection(address)
+        others = [socket.create_connection(address) for _ in range(patience.MOST_WAITING)]
+        begun = time.monotonic()
+        first.settimeout(5.0)
+        assert _is_closed(first)  # it was the oldest, and makes room
+        others[-1].settimeout(patience.HEAD_SECONDS + 20.0)
+        others[-1].sendall(b"\x16\x03")
+        assert _is_closed(others[-1])
+        assert time.monotonic() - begun > 1.0
+        # Who speaks no TLS is closed at once, and an honest page has its answer.
+        with socket.create_connection(address, timeout=5.0) as plain:
+            plain.sendall(b"GET / HTTP/1.1\r\n\r\n")
+            assert _is_closed(plain) or _is_closed(plain)  # an alert may come first
+        asked = urllib.request.Request(f"https://localhost:{server.port}/edits.yaml", headers=server.headers)
+        trusting = ssl.create_default_context(cafile=str(file))
+        assert b"edits" in urllib.request.urlopen(asked, context=trusting, timeout=5.0).read()
+        for each in others:
+            each.close()
 
 
 def test_certificates_that_are_none(

@@ -125,6 +125,16 @@ def test_scenes_that_nobody_opened_for_long_leave_the_cache(file: Path, tmp_path
     assert scene_of_file(tmp_path / "third.ply") == newest
 
 
+def test_a_file_with_a_long_name_is_opened(tmp_path: Path) -> None:
+    """Its scene has a name that leaves room for those of its autosave and its drafts."""
+    file = tmp_path / ("\u00e9" * 120 + ".ply")
+    write_splats(ball_of_splats(300), file)
+    scene = scene_of_file(file)
+    assert scene.name.startswith("\u00e9" * 50 + "-")
+    store = SceneStore(Scene.open(scene), scene, file)
+    assert len(os.fsencode(store.autosave_path.name)) < 200
+
+
 # ---- files that pages send ----
 
 
@@ -173,11 +183,19 @@ def test_other_machines_need_the_token_to_send_files(scene: Path) -> None:
         ("x/.hidden.ply", b"ply", "is no name of a file"),
         ("x\x00.ply", b"ply", "is no name of a file"),
         ("x\n.ply", b"ply", "is no name of a file"),
+        ("...", b"ply", "is no name of a file"),
+        ("   ", b"ply", "is no name of a file"),
+        ("x" * 300 + ".ply", b"ply", "has 304 bytes, at most 200; rename the file"),
+        ("\u00e9" * 140 + ".ply", b"ply", "has 284 bytes, at most 200; rename the file"),
+        ("x.ply ", b"no splats", "x.ply: not a PLY file"),
+        ('a<b>:"|?*.ply', b"no splats", "|?*.ply: not a PLY file"),
+        ("x.ply.", b"ply", "x.ply.: no format of splats that is known"),
     ],
 )
 def test_what_is_no_file_of_splats_is_one_line(scene: Path, name: str, content: bytes, line: str) -> None:
     answer = asyncio.run(posted(scene, name, content))
     assert answer.status_code == 400 and line in answer.text and "\n" not in answer.text
+    assert "Errno" not in answer.text and tempfile.gettempdir() not in answer.text
     assert not list(opened_folder().glob("*"))
 
 

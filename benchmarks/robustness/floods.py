@@ -23,9 +23,10 @@ from cagefield.benchmarking.machine import cpu_model
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
-from flood_kinds import FLOODS  # noqa: E402
+from flood_kinds import ENCRYPTED, FLOODS  # noqa: E402
 from floods import during, memory  # noqa: E402
 
+from certificates import certificate_of_localhost  # noqa: E402
 from editor_server import editor_server  # noqa: E402
 from scenes import ball_scene  # noqa: E402
 
@@ -47,7 +48,11 @@ def main() -> None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             ball_scene().save(Path(folder) / "scene")
-            with editor_server(Path(folder) / "scene") as server:
+            secure = []
+            if name in ENCRYPTED:
+                file, key = certificate_of_localhost(Path(folder))
+                secure = ["--certificate", str(file), "--certificate-key", str(key)]
+            with editor_server(Path(folder) / "scene", *secure) as server:
                 before = memory(server.process.pid)
                 flood = None if name == "none" else name
                 found = during(server, flood, int(options.seconds / EVERY), EVERY, options.floods)

@@ -17,8 +17,12 @@ import numpy.typing as npt
 from cagefield import json_text
 from cagefield.cameras import Camera, turntable
 from cagefield.errors import CameraError
+from cagefield.regular_files import read_text
 
 Floats = npt.NDArray[np.float64]
+
+LEAST_FPS, MOST_FPS = 0.001, 1000.0
+"""Pictures a second of a video: its encoder refuses others, once all of them are drawn."""
 
 _SWING = 0.8
 """Share of the covered arc that a swing uses: the outermost cameras see less that others see too."""
@@ -161,7 +165,13 @@ def _frame_rate(document: Mapping[str, object], count: int, path: Path) -> float
             continue
         if not _is_number(value) or value <= 0:
             raise CameraError(f"{path}: {key!r} is {value!r:.40}; give a number above 0")
-        return float(value) if key == "fps" else count / float(value)
+        rate = float(value) if key == "fps" else count / float(value)
+        if not LEAST_FPS <= rate <= MOST_FPS:
+            raise CameraError(
+                f"{path}: {key!r} is {value!r:.40}, {rate:g} pictures a second; give what makes "
+                f"{LEAST_FPS:g} to {MOST_FPS:g}"
+            )
+        return rate
     return 24.0
 
 
@@ -220,7 +230,7 @@ def _perpendicular(direction: Floats) -> Floats:
 
 def _read_json(path: Path, what: str) -> dict[str, object]:
     try:
-        document = json_text.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(read_text(path))
     except OSError as error:
         raise CameraError(f"{what} {path} cannot be read: {error.strerror}; check the path") from None
     except ValueError as error:

@@ -110,6 +110,17 @@ def free_memory() -> int | None:
     return min(free, default=None)
 
 
+def lacking_memory(needed: int) -> str | None:
+    """Why so many bytes cannot be had now, and the cure; None where they can, or nobody knows."""
+    free = free_memory()
+    if free is None or needed <= free:
+        return None
+    return (
+        f"it takes {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} are free; end other programs, or use a "
+        "machine with more"
+    )
+
+
 def floats(values: ArrayLike) -> NDArray[np.float64]:
     """A vector or matrix as an argument of a kernel.
 

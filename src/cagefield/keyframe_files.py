@@ -13,6 +13,7 @@ from typing import Any, TypeGuard
 from cagefield import json_text
 from cagefield.errors import CameraError
 from cagefield.keyframes import Keyframe, stills
+from cagefield.regular_files import read_text
 
 
 def dump_path(
@@ -68,7 +69,7 @@ def load_keys(path: Path) -> tuple[tuple[Keyframe, ...], bool]:
         CameraError: the file holds no keyframes, or a value that makes none; names it and the cure.
     """
     try:
-        document = json_text.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(read_text(path))
     except OSError as error:
         raise CameraError(
             f"{path} cannot be read ({error.strerror}); make it readable or remove it"

@@ -1,4 +1,4 @@
-"""Files of arrays by name (.npz) as damage may have left them: what does not fit together is ValueError."""
+"""Files of arrays (.npy), by name (.npz), as damage may leave them: what does not fit is ValueError."""
 
 from __future__ import annotations
 
@@ -10,25 +10,57 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cagefield.devices import lacking_memory
+from cagefield.regular_files import open_regular
 
-def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of a file that `numpy.savez` wrote; nothing is allocated that is larger than the file.
+DEFLATED = 1040
+"""How many times as much a deflated file can hold, at most."""
+
+
+def read_arrays(path: Path, times: int = 1) -> dict[str, NDArray[Any]]:
+    """The arrays of a file that `numpy.savez` wrote; all of them take no more memory than the file.
+
+    With `times` they may take that many times as much (`DEFLATED`: of `numpy.savez_compressed`).
 
     Other archives hold none: a checkpoint of PyTorch's, say.
 
     Raises ValueError for a damaged file, OSError where it cannot be read.
     """
-    size = path.stat().st_size
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
+            size = path.stat().st_size
             entries = [entry for entry in archive.infolist() if entry.filename.endswith(".npy")]
             unpacked = sum(entry.file_size for entry in entries)
-            if unpacked > size:  # none is packed
+            if unpacked > times * size:
                 raise ValueError(f"it says that it unpacks to {unpacked} bytes")
+            if (lacking := lacking_memory(unpacked)) is not None:
+                raise ValueError(lacking)
             return {entry.filename.removesuffix(".npy"): _array(archive, entry) for entry in entries}
     except OSError:
         raise
     except Exception as error:  # zipfile and numpy raise their own classes, and many others, on damage
+        raise ValueError(" ".join(str(error).split()) or type(error).__name__) from error
+
+
+def read_array(path: Path) -> NDArray[Any]:
+    """The array of a file that `numpy.save` wrote; nothing is allocated that is larger than the file.
+
+    Raises ValueError for a damaged file, OSError where it cannot be read.
+    """
+    try:
+        with open_regular(path) as file:
+            size = path.stat().st_size
+            needed = _bytes_of(file)
+            if needed != size - file.tell():
+                raise ValueError(f"it says that it is an array of {needed} bytes")
+            if (lacking := lacking_memory(needed)) is not None:
+                raise ValueError(lacking)
+            file.seek(0)
+            array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+            return array
+    except OSError:
+        raise
+    except Exception as error:  # odd headers raise what numpy's parsers happen to
         raise ValueError(" ".join(str(error).split()) or type(error).__name__) from error
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
+from cagefield.regular_files import open_regular
 
 Columns = dict[str, NDArray[Any]]
 
@@ -73,9 +74,13 @@ def open_ply(path: str | Path) -> tuple[tuple[str, ...], dict[str, PlyTable]]:
         FieldError: as `read_ply`.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FieldError(f"{path}: no such file; give a .ply of splats")
-    with path.open("rb") as file:
+    try:
+        file = open_regular(path)
+    except FileNotFoundError:
+        raise FieldError(f"{path}: no such file; give a .ply of splats") from None
+    except OSError as error:
+        raise FieldError(f"{path}: it cannot be read ({error.strerror}); give a .ply of splats") from None
+    with file:
         kind, comments, declared = _header(path, file)
         tables: dict[str, PlyTable] = {}
         for element in declared:

@@ -45,6 +45,7 @@ from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.pasting import content_box
+from cagefield.regular_files import real_path
 from cagefield.rendering.render_result import Background, RenderResult, background_rgb
 from cagefield.scene_files import (
     CAMERAS,
@@ -300,7 +301,7 @@ class Scene:
         if at is None:
             grown = 1.0 if size is None else size / float((look.box[1] - look.box[0]).max())
             at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
-        found = Path(source).resolve().stem if name is None else name
+        found = real_path(source).stem if name is None else name
         return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:

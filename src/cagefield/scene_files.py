@@ -15,6 +15,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
+from cagefield.regular_files import read_text, real_path
 from cagefield.rendering.render_result import background_rgb
 
 FORMAT = "cagefield-scene"
@@ -34,7 +35,7 @@ def check_destination(path: Path | str, overwrite: bool) -> Path:
         SceneError: something is there that may not be replaced.
         OSError: nothing can be written there.
     """
-    target = Path(path).resolve()
+    target = real_path(path)
     recover(target)
     if target.exists() and not target.is_dir():
         raise SceneError(f"{path} is a file; give a new folder for the scene")
@@ -56,7 +57,7 @@ def recover(folder: Path) -> None:
 
     Says so in a warning. A scene that is there, and a folder that none was at, stay as they are.
     """
-    found = recover_folder(folder.resolve(), is_scene)
+    found = recover_folder(real_path(folder), is_scene)
     if found is not None:
         warnings.warn(
             f"{folder} was left as {found.name} by a program that was ended while it replaced it; it is back",
@@ -67,7 +68,7 @@ def recover(folder: Path) -> None:
 def is_scene(path: Path | str) -> bool:
     """True where `path` is a folder with the manifest of a scene, of any version."""
     try:
-        document = json_text.loads((Path(path) / MANIFEST).read_text(encoding="utf-8"))
+        document = json_text.loads(read_text(Path(path) / MANIFEST))
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("format") == FORMAT
@@ -134,7 +135,7 @@ def write_json(document: Mapping[str, object], path: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        document = json_text.loads(path.read_text(encoding="utf-8"))
+        document = json_text.loads(read_text(path))
     except (ValueError, OSError) as error:
         raise SceneError(f"{path} is not readable JSON ({error}); copy it back or train again") from error
     if not isinstance(document, dict):

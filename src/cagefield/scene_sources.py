@@ -18,6 +18,7 @@ from cagefield.edits import EditStack
 from cagefield.edits.sources import resolved
 from cagefield.errors import EditError
 from cagefield.patches.pasting import SourceContent, check_kinds, content_box
+from cagefield.regular_files import real_path
 from cagefield.scene_files import EDITS, FIELD, MANIFEST, is_scene
 from cagefield.typing import Array
 
@@ -68,7 +69,7 @@ class SceneSources:
 
         `open_scene` opens the scene of a folder, which is being pasted into some.
         """
-        own = () if folder is None else (folder.resolve(),)
+        own = () if folder is None else (real_path(folder),)
         self._folder, self._open, self._pasting = folder, open_scene, (*pasting, *own)
         self._last: tuple[Hashable, SourceContent] | None = None
 
@@ -115,7 +116,7 @@ class SceneSources:
         return SourceLook(content_box(other), up)
 
     def _path(self, source: str) -> Path:
-        path = resolved(source, self._folder).resolve()
+        path = real_path(resolved(source, self._folder))
         if path in self._pasting:
             raise EditError(
                 "that is the scene itself; use a copy (keep_source: true, without source)"

@@ -97,17 +97,22 @@ def _never_reading(server: EditorAt, over: threading.Event) -> None:
         line.close()
 
 
-def _half_sent(server: EditorAt, over: threading.Event) -> None:
-    lines: list[socket.socket] = []
-    while not over.is_set():
-        with contextlib.suppress(OSError):
-            line = socket.create_connection(("127.0.0.1", server.port), timeout=5)
-            line.sendall(b"GET /edits.yaml HTTP/1.1\r\nHost: local")
-            lines.append(line)
-        if len(lines) > 600:
-            lines.pop(0).close()
-    for line in lines:
-        line.close()
+def _beginning(start: bytes) -> Flood:
+    """Opens lines that say this much and no more, and holds the newest 600."""
+
+    def flood(server: EditorAt, over: threading.Event) -> None:
+        lines: list[socket.socket] = []
+        while not over.is_set():
+            with contextlib.suppress(OSError):
+                line = socket.create_connection(("127.0.0.1", server.port), timeout=5)
+                line.sendall(start)
+                lines.append(line)
+            if len(lines) > 600:
+                lines.pop(0).close()
+        for line in lines:
+            line.close()
+
+    return flood
 
 
 def _screenshots(server: EditorAt, over: threading.Event) -> None:
@@ -147,8 +152,13 @@ FLOODS: dict[str, Flood] = {
         lambda number: json.dumps({"type": "scene_change", "preserve_opacity": bool(number % 2)})
     ),
     "pages that never read": _never_reading,
-    "requests half sent": _half_sent,
+    "requests half sent": _beginning(b"GET /edits.yaml HTTP/1.1\r\nHost: local"),
+    "handshakes half sent": _beginning(b"\x16\x03\x01"),
+    "connections that never shake hands": _beginning(b""),
     "screenshots": _screenshots,
     "wrong tokens": _wrong_tokens,
 }
 """The floods, by what they are of."""
+
+ENCRYPTED = ("handshakes half sent", "connections that never shake hands")
+"""Those of an editor with a certificate."""

@@ -23,6 +23,7 @@ from cagefield.benchmarking.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import CagefieldError
+from cagefield.npz import read_array
 from cagefield.rendering.images import side_by_side, write_png
 from cagefield.rendering.metrics import psnr, ssim
 from cagefield.rendering.render_result import RenderResult
@@ -150,7 +151,10 @@ def true_depth(dataset: Dataset, view: View) -> Float32 | None:
     path = dataset.path / "depth" / f"{PurePosixPath(view.name).stem}.npy"
     if not path.is_file():
         return None
-    depth: Float32 = np.load(path)
+    try:
+        depth: Float32 = read_array(path)
+    except (OSError, ValueError) as error:
+        raise CagefieldError(f"{path}: cannot be read as distances ({error!s:.120}); copy it again") from None
     step, camera = view.downscale, view.camera
     some = depth[step // 2 :: step, step // 2 :: step][: camera.height, : camera.width]
     if some.shape != (camera.height, camera.width):

@@ -10,6 +10,7 @@ trainer's sources are not: `retrain` makes the fields anew.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
@@ -33,6 +34,7 @@ from cagefield.datasets.procedural import ProceduralScene, make_scene, procedura
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
+from cagefield.npz import DEFLATED, read_arrays
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.splat_config import SplatConfig
@@ -232,10 +234,8 @@ class Workbench:
     def _kept(self, name: str, key: str, what: str, make: Callable[[], Iterator[UInt8]], count: int) -> UInt8:
         """The pictures in the folder's file of that key, made where there is none."""
         path = self.folder / name / f"truth-{key}.npz"
-        if path.is_file():
-            with np.load(path) as file:
-                kept: UInt8 = file["pictures"]
-            return kept
+        with contextlib.suppress(OSError, ValueError, KeyError):  # not there, or damaged
+            return read_arrays(path, DEFLATED)["pictures"]
         made = []
         with self.bar(what) as move:
             for picture in make():

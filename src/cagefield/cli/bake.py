@@ -12,6 +12,7 @@ import tyro
 
 from cagefield.cli.options import Baking, BakingOptions, Device, Flag, OptionalOutput, progress_bar
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.cameras import Camera
@@ -54,7 +55,7 @@ class Bake:
                 f"scene {self.scene} holds no original field to bake, only voxels; import a checkpoint or "
                 "train with --field splat or nerf"
             )
-        if splats is not None and destination.resolve() == self.scene.resolve():
+        if splats is not None and real_path(destination) == real_path(self.scene):
             raise CagefieldError(
                 f"voxels in the place of the splats of {self.scene} would lose them; give -o NEW_SCENE"
             )

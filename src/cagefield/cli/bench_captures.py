@@ -10,6 +10,7 @@ import tyro
 
 from cagefield.cli.options import SEEDS, Device, Flag, Output, check_file, check_number, progress_bar
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.captures import CaptureScore
@@ -145,7 +146,7 @@ class BenchCaptures:
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
         if not self.keep_poses and name not in CAPTURES:
-            anew = folder / f"{dataset.name}-{digest([str(dataset.path.resolve())], ())}.poses"
+            anew = folder / f"{dataset.name}-{digest([str(real_path(dataset.path))], ())}.poses"
             dataset = unfolded(dataset, anew, self.downscale)
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")

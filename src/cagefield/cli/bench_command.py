@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cagefield.regular_files import real_path
+
 if TYPE_CHECKING:
     pass
 
@@ -46,7 +48,7 @@ def _words(options: Any, silent: Collection[str]) -> Iterator[str]:
 def work_folder(path: Path | None) -> Iterator[Path]:
     """The folder, or one that is removed afterwards."""
     if path is not None:
-        yield path.resolve()
+        yield real_path(path)
         return
     with tempfile.TemporaryDirectory(prefix="cagefield-bench-") as folder:
         yield Path(folder)

@@ -10,6 +10,7 @@ import tyro
 
 from cagefield.cli.options import Device, Flag, Output, Training, TrainingOptions, check_file, progress_bar
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.ablations import Ablation
@@ -113,7 +114,7 @@ class BenchAblation:
             compared_views=self.compared_views,
         )
         devices.start(self.device)
-        result = self._measure(case, Workbench(settings, self.workdir.resolve(), progress_bar))
+        result = self._measure(case, Workbench(settings, real_path(self.workdir), progress_bar))
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench ablation', self)}`")
         result = with_notes(result, notes)
         result.table.show()

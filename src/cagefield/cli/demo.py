@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cagefield.cli.options import Device, Flag, Output, check_folder, check_number, progress_bar, track
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.scene import Scene
@@ -54,7 +55,7 @@ class Demo:
         VoxelConfig(steps=self.steps, resolution=self.resolution, sh_degree=1)  # refused at once
         check_folder(self.out, self.overwrite, "before_after.png")
         began = time.perf_counter()
-        with replaced_folder(self.out.resolve(), _OWN) as folder:
+        with replaced_folder(real_path(self.out), _OWN) as folder:
             with _timed("photos of the digger"):
                 self._photograph(folder / "photos")
             with _timed("training"):

@@ -22,6 +22,7 @@ from cagefield.cli.options import (
     stages,
 )
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.cages import Cage
@@ -116,7 +117,7 @@ class Export:
         with progress_bar("Edits along the path") as move:
             page = ScenePage.of(
                 scene,
-                self.scene.resolve().name,
+                real_path(self.scene).name,
                 keys,
                 loop=loop,
                 on_progress=lambda done: move(done, 1.0, ""),
@@ -144,7 +145,7 @@ class Export:
             print(_along(page.along, scene))
         print(f"written to {self.out}")
         if self.embed:
-            name = self.out.resolve().name
+            name = real_path(self.out).name
             print(f'<iframe src="{name}/{INDEX}" width="800" height="600" style="border: 0"></iframe>')
 
     def _check(self) -> None:

@@ -9,6 +9,7 @@ import tyro
 
 from cagefield.cli.options import SEEDS, Flag, Output, check_folder, check_number, progress_bar
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 _MARK = "transforms_train.json"
 _OWN = (_MARK, "transforms_test.json", "transforms_val.json", "train", "test", "val")
@@ -60,7 +61,7 @@ class MakeScene:
             raise CagefieldError(f"--no-points is for rooms; {self.name} has no sparse points")
         check_folder(self.out, self.overwrite, _MARK)
         with (
-            replaced_folder(self.out.resolve(), _OWN) as draft,
+            replaced_folder(real_path(self.out), _OWN) as draft,
             progress_bar("Photos") as move,
         ):
             make_scene(
@@ -89,7 +90,7 @@ class MakeScene:
         scene = CAPTURES[self.name].scene
         check_folder(self.out, self.overwrite, _CAPTURE_MARK)
         with (
-            replaced_folder(self.out.resolve(), OWN) as draft,
+            replaced_folder(real_path(self.out), OWN) as draft,
             progress_bar("Photos") as move,
         ):
             make_capture(

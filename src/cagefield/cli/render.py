@@ -102,6 +102,8 @@ class Render:
         print(f"{count} in {self.out}")
 
     def _check_options(self) -> None:
+        from cagefield.camera_paths import LEAST_FPS, MOST_FPS
+
         if not 0 <= self.turntable <= 100_000:
             raise CagefieldError(
                 f"--turntable is {self.turntable!s:.20}; give the number of pictures, 1 to 100000"
@@ -112,8 +114,8 @@ class Render:
             raise CagefieldError("--dataparser-transforms belongs to --camera-path; give both or neither")
         if self.compare and self.unedited:
             raise CagefieldError("--compare and --unedited exclude each other; give one of them")
-        if self.fps is not None and not 0.0 < self.fps <= 1000.0:
-            raise CagefieldError(f"--fps is {self.fps}; give a number above 0 and up to 1000")
+        if self.fps is not None and not LEAST_FPS <= self.fps <= MOST_FPS:
+            raise CagefieldError(f"--fps is {self.fps}; give a number from {LEAST_FPS:g} to {MOST_FPS:g}")
         background = parse_background(self.background)
         if background == "none" and (self.compare or self.out.suffix.lower() == ".mp4"):
             raise CagefieldError(

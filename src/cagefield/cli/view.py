@@ -12,6 +12,7 @@ import tyro
 
 from cagefield.cli.options import Device, Flag
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import read_bytes
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,7 @@ class View:
         what, given = "--token", self.token
         if self.token_file is not None:
             what = f"--token-file {self.token_file}"
-            with self.token_file.open("rb") as file:
-                given = file.read(4096).decode("ascii", "replace").strip()
+            given = read_bytes(self.token_file, 4096).decode("ascii", "replace").strip()
         elif not given:
             what, given = "$CAGEFIELD_TOKEN", os.environ.get("CAGEFIELD_TOKEN") or None
         if given is None or (not given and self.token_file is None):

@@ -13,6 +13,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
 from cagefield.errors import DatasetError
+from cagefield.regular_files import real_path
 
 Size = tuple[int, int]
 
@@ -29,7 +30,7 @@ def unbounded_capture(
     """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
     train, test = hold_out(views, holdout)
     return Dataset(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         path=folder,
         train=train,
         test=test,

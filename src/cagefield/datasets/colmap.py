@@ -21,6 +21,7 @@ from cagefield.datasets.region import cube_of_interest, depths_of_points, levell
 from cagefield.datasets.views import Dataset, SparsePoints, View, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
+from cagefield.regular_files import real_path
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -142,7 +143,7 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
 
 
 def _upwards(folder: Path) -> Sequence[Path]:
-    return [folder, *folder.resolve().parents[:3]]
+    return [folder, *real_path(folder).parents[:3]]
 
 
 def _photo(folders: dict[int, Path], factors: Sequence[int], name: str) -> tuple[int, Path | None]:

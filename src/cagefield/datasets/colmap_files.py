@@ -15,30 +15,53 @@ from collections.abc import Callable
 from pathlib import Path
 
 from cagefield.errors import DatasetError
+from cagefield.regular_files import check_regular, open_regular
 
 _POSE = 56  # rotation quaternion and translation, float64
 _PARAMETERS = (3, 4, 4, 5, 8, 8)  # of the camera models 0 to 5, those that can be read; see `colmap._camera`
 
 
+_MOST_TEXT = 1 << 30
+"""Bytes of a model's file in text; one line is held at a time."""
+
+_TEXTS = ("cameras.txt", "images.txt", "points3D.txt", "rigs.txt", "frames.txt")
+
+
 def check_whole(folder: Path) -> None:
-    """Raises DatasetError, naming the file, where a binary file of the model in `folder` ends too early."""
+    """Raises DatasetError, naming the file, where one of the model in `folder` cannot be read whole.
+
+    A binary one that ends too early, a text with zeros in it or of more than _MOST_TEXT bytes, a device.
+    """
+    for name in _TEXTS:
+        _check_text(folder / name)
     for name, skip_record in _RECORDS.items():
         file = folder / name
-        if not file.is_file():
+        if not file.exists():
             continue
-        size = file.stat().st_size
         try:
-            with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            size = check_regular(file)
+            if not size:
+                raise _CutOffError
+            with open_regular(file) as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
                 _walk(data, size, skip_record)
-        except (
-            _CutOffError,
-            IndexError,
-            struct.error,
-            ValueError,
-        ):  # mmap refuses an empty file with ValueError
+        except OSError as error:
+            raise DatasetError(f"{file}: cannot be read ({error.strerror})") from None
+        except (_CutOffError, IndexError, struct.error, ValueError):
             raise DatasetError(
                 f"{file}: the file is cut off after {size} bytes; copy or export it again"
             ) from None
+
+
+def _check_text(file: Path) -> None:
+    try:
+        check_regular(file, _MOST_TEXT)
+        with open_regular(file) as stream:
+            if 0 in stream.read(1 << 12):  # what a copy that ended left of a text
+                raise DatasetError(f"{file}: it is no text; copy or export it again")
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise DatasetError(f"{file}: cannot be read ({error.strerror})") from None
 
 
 class _CutOffError(Exception):

@@ -25,6 +25,7 @@ from cagefield.datasets.photos import EXTENSIONS, choose_downscale, photo_folder
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CameraError, DatasetError
+from cagefield.npz import read_array
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -159,14 +160,14 @@ def _scaled(photos: Sequence[Path], sizes: Sequence[Size]) -> Size | None:
 
 def _read_rows(file: Path) -> npt.NDArray[np.float64]:
     try:
-        rows = np.load(file, allow_pickle=False)
-        if isinstance(rows, np.ndarray) and rows.ndim == 2:
+        rows = read_array(file)
+        if rows.ndim == 2:
             rows = rows.astype(np.float64)
-    except Exception as error:  # odd headers and archives raise what numpy's parsers happen to
+    except (OSError, ValueError, TypeError) as error:
         raise DatasetError(
             f"{file}: cannot be read as a NumPy array ({error!s:.120}); copy it again"
         ) from error
-    if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != 17 or len(rows) == 0:
+    if rows.ndim != 2 or rows.shape[1] != 17 or len(rows) == 0:
         raise DatasetError(f"{file}: must be an array [N,17] (LLFF's poses and depth bounds)")
     if not np.isfinite(rows).all():
         row, column = np.argwhere(~np.isfinite(rows))[0].tolist()

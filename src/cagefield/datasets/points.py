@@ -22,6 +22,7 @@ from cagefield.datasets.triangulation import triangulate
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import DatasetError
 from cagefield.npz import read_arrays
+from cagefield.regular_files import open_regular
 
 FloatArray = npt.NDArray[np.float64]
 Views = Literal["train", "all"]
@@ -194,7 +195,7 @@ def _key(views: tuple[View, ...], seed: int) -> str:
         header = read_header(view.image_path)
         camera = repr((view.name, view.camera.to_dict(), view.downscale, header))
         digest.update(camera.encode())
-        with view.image_path.open("rb") as stream:
+        with open_regular(view.image_path) as stream:
             digest.update(stream.read(_SAMPLE))
             size = stream.seek(0, os.SEEK_END)
             stream.seek(max(0, size - _SAMPLE))

@@ -10,6 +10,8 @@ import contextlib
 import json
 import os
 import shutil
+import sqlite3
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -24,6 +26,7 @@ from cagefield.datasets.features import OnProgress
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError, line_of
 from cagefield.leftovers import hidden_name, remove_leftovers
+from cagefield.regular_files import check_regular, read_bytes
 
 _VERSION = 1
 
@@ -43,7 +46,7 @@ def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
     text = json.dumps(record)
     if work.exists():
         if note.is_file():
-            known = note.read_bytes()
+            known = read_bytes(note)
             if known == text.encode():
                 return
             if not _is_record(known):
@@ -125,7 +128,7 @@ def work_photos(
 def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, str]] | None:
     """What the list of photos says; None where it is damaged, or a photo is not there."""
     try:
-        kept = json_text.loads(note.read_bytes())
+        kept = json_text.loads(read_bytes(note))
         photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in kept["photos"]]
         unreadable = {str(name): str(reason) for name, reason in kept["unreadable"].items()}
         whole = all(
@@ -141,6 +144,42 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
     return (photos, unreadable) if whole else None
+
+
+def check_database(database: Path, names: Sequence[str]) -> None:
+    """Removes a database that is damaged or of other photos than `names`, with a warning that says so.
+
+    Raises DatasetError for one that may not be written. Nothing else has it open meanwhile: SQLite's locks
+    do not know of each other where two libraries of it are in one process.
+    """
+    if not database.exists():
+        return
+    try:
+        check_regular(database)
+    except OSError as error:
+        raise DatasetError(f"{database} is in the way ({error.strerror}); move it away") from None
+    folder = database.parent
+    if not (os.access(database, os.R_OK | os.W_OK) and os.access(folder, os.W_OK)):
+        raise DatasetError(f"{database} may not be written; make it and {folder} writable, or move it away")
+    try:
+        with contextlib.closing(sqlite3.connect(database)) as opened:
+            said = str(opened.execute("PRAGMA quick_check(1)").fetchone()[0])
+            tables = {name for (name,) in opened.execute("SELECT name FROM sqlite_master")}
+            known = "SELECT name FROM images ORDER BY image_id"
+            if said == "ok" and "images" not in tables:
+                said = "it holds no photos"
+            elif said == "ok" and [name for (name,) in opened.execute(known)] != list(names):
+                said = "it is of other photos"
+    except sqlite3.OperationalError:  # locked, or the disk's fault: COLMAP says what
+        return
+    except sqlite3.DatabaseError as error:
+        said = str(error)
+    if said == "ok":
+        return
+    reason = " ".join(said.split())[:120]
+    warnings.warn(f"{database} is damaged ({reason}); features and matches are found anew", stacklevel=2)
+    for file in folder.glob("database.db*"):
+        file.unlink()
 
 
 def _remove_features(work: Path) -> None:

@@ -16,7 +16,8 @@ from scipy.ndimage import laplace
 
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import check_pixels
+from cagefield.regular_files import check_regular
+from cagefield.rendering.images import MOST_BYTES, check_pixels
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
 
@@ -71,6 +72,7 @@ def upright(source: Path, name: str, folder: Path) -> RawPhoto:
     Raises DatasetError where it cannot be read.
     """
     try:
+        check_regular(source, MOST_BYTES)
         with Image.open(source) as image:
             check_pixels(image)
             image.load()

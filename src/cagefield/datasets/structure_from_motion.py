@@ -26,6 +26,7 @@ from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.left_out import Matches, reasons_left_out, verified_matches, why_none
 from cagefield.datasets.matching import match
 from cagefield.datasets.poses_work import (
+    check_database,
     kept_work,
     plainly_named,
     prepare_work,
@@ -36,6 +37,7 @@ from cagefield.datasets.poses_work import (
 )
 from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.errors import DatasetError
+from cagefield.regular_files import read_text
 
 RECORD = "poses.json"
 
@@ -114,6 +116,7 @@ def _made(
         raise DatasetError(f"{source}: {len(photos)} photos can be read, at least 3 are needed{reasons}")
     names = plainly_named(photos, work)
     database = work / "database.db"
+    check_database(database, names)
     if not database.is_file():
         cameras, shared = camera_guesses(photos)
         listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
@@ -155,7 +158,7 @@ def _made(
 def is_made_of(target: Path, source: Path, frames: int = 80) -> bool:
     """Whether the data set `target` was made of these photos, none of them changed since."""
     try:
-        known = json_text.loads((target / RECORD).read_text(encoding="utf-8"))
+        known = json_text.loads(read_text(target / RECORD))
     except (OSError, ValueError):
         return False
     return isinstance(known, dict) and known.get("made_of") == record_of(source, frames)

@@ -37,6 +37,7 @@ from cagefield.datasets.region import cube_of_interest, depths_of_points
 from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out, report_missing
 from cagefield.errors import CameraError, DatasetError
 from cagefield.lenses import Lens
+from cagefield.regular_files import read_text, real_path
 
 LONGEST = 255
 """Characters in a file's name, at most, on the systems there are."""
@@ -92,7 +93,7 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
     unbounded, bounds = _extent(main, [view.camera for view in views["train"]], cut_out, synthetic, points)
     found = None if points is None else depths_of_points([v.camera for v in everything], points.positions)
     return Dataset(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         path=folder,
         train=train,
         test=test,
@@ -196,7 +197,7 @@ class _TransformsFile:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        values = json_text.loads(path.read_text(encoding="utf-8"))
+        values = json_text.loads(read_text(path))
     except json.JSONDecodeError as error:
         raise DatasetError(
             f"{path}: not valid JSON at line {error.lineno}, column {error.colno} ({error.msg}); "

@@ -56,6 +56,7 @@ from cagefield.edits.options import FEATHER, CastShadow, Clone, problem_of_latti
 from cagefield.edits.sequence import problem_of_count
 from cagefield.edits.stack import EditStack
 from cagefield.errors import CagefieldError, EditFileError
+from cagefield.regular_files import read_text
 from cagefield.typing import Array
 
 VERSION = 1
@@ -76,7 +77,7 @@ def load_edits(path: str | os.PathLike[str], *, check: bool = True, mend: bool =
     file = Path(path)
     kind = _format_of(file)
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file)
     except UnicodeDecodeError:
         raise EditFileError(f"{file}: not a UTF-8 text file; save it as UTF-8") from None
     except OSError as error:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from cagefield.edits.names import problem_of_text
+from cagefield.regular_files import real_path
 
 
 class Sourced(Protocol):
@@ -54,7 +55,7 @@ def resolved(source: str, folder: Path | None) -> Path:
 
 def rebased(edits: Iterable[AnyEdit], before: Path | None, after: Path) -> list[AnyEdit]:
     """The edits with relative sources that mean in the folder `after` what they mean in `before`."""
-    if before is not None and before.resolve() == after.resolve():
+    if before is not None and real_path(before) == real_path(after):
         return list(edits)
     return [
         edit
@@ -67,6 +68,6 @@ def rebased(edits: Iterable[AnyEdit], before: Path | None, after: Path) -> list[
 def relative(path: Path, folder: Path) -> str:
     """A path as seen from a folder, with slashes; absolute where it lies on another drive."""
     try:
-        return Path(os.path.relpath(path, folder.resolve())).as_posix()
+        return Path(os.path.relpath(path, real_path(folder))).as_posix()
     except ValueError:
         return str(path)

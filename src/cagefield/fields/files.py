@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from cagefield.atomic_files import replaced_file
+from cagefield.devices import lacking_memory
 from cagefield.errors import FieldError
+from cagefield.regular_files import UnreadableError, check_regular, open_regular
 
 _NUMBERS = ("F64", "F32", "F16", "I64", "I32", "I16", "I8", "U64", "U32", "U16", "U8", "BOOL")
 """Types of tensors that numpy knows and that are real."""
@@ -38,7 +40,7 @@ def read_tensors(
         FieldError: the file is missing, truncated, of another kind or of a newer version, or has a tensor
             of a type that is not read.
     """
-    if not Path(path).is_file():
+    if not Path(path).exists():
         raise FieldError(f"{path}: no such field file; {cure}")
     with _opened(path) as file:
         metadata = file.metadata() or {}
@@ -66,12 +68,16 @@ def _opened(path: str | Path) -> Iterator[Any]:
     from safetensors import SafetensorError, safe_open
 
     try:
-        with open(path, "rb"):  # safetensors calls a file that may not be read one that is not there
-            pass
+        with open_regular(path):  # safetensors calls a file that may not be read one that is not there
+            size = check_regular(path)
+        if (lacking := lacking_memory(size)) is not None:
+            raise FieldError(f"{path}: {lacking}")
         with safe_open(str(path), framework="numpy") as file:
             yield file
     except PermissionError as error:
         raise FieldError(f"{path}: it may not be read ({error.strerror}); make it readable") from error
+    except UnreadableError as error:
+        raise FieldError(f"{path}: {error}") from None
     except (SafetensorError, OSError) as error:
         raise FieldError(
             f"{path}: not a readable field file ({error!s:.160}); it may be truncated, write it again"

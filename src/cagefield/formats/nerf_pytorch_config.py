@@ -12,6 +12,7 @@ from typing import Any
 
 from cagefield import yaml_text
 from cagefield.errors import FieldError
+from cagefield.regular_files import read_text
 
 NAMES = ("args.txt", "config.txt", "config.yml", "config.yaml")
 
@@ -61,7 +62,7 @@ def read_config(path: Path | str) -> Settings:
     if not path.is_file():
         raise FieldError(f"{path}: no such config; give args.txt, config.txt or config.yml of the training")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         document = yaml_text.loads(text) if path.suffix in (".yml", ".yaml") else None
     except (OSError, UnicodeDecodeError, yaml_text.YamlError) as error:
         reason = " ".join(str(error).split())[:120].strip()

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -24,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from cagefield import sh as spherical_harmonics
+from cagefield.devices import lacking_memory
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.splat_axes import PLY, Axes, with_axes
@@ -49,6 +51,7 @@ from cagefield.formats.splat_table import (
     spooled,
 )
 from cagefield.ply import open_ply
+from cagefield.regular_files import check_regular
 
 READABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".ckpt", META)
 WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
@@ -95,9 +98,11 @@ def read_splats(
             visible.
     """
     source = open_splats(Path(path))
-    found = _with_visible(source)  # before memory is taken for all of them
     count, degree = source.count, min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
     shapes = ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
+    if (lacking := lacking_memory(4 * count * sum(map(math.prod, shapes)))) is not None:
+        raise FieldError(f"{path}: its {count} splats are too many: {lacking}")
+    found = _with_visible(source)  # before memory is taken for all of them
     arrays = [np.empty((count, *shape), np.float32) for shape in shapes]
     done = 0
     for batch in _batches(source, found, axes):
@@ -170,6 +175,10 @@ def open_splats(path: Path) -> SplatSource:
     ending = ending_of(path)
     if ending == META:
         return open_sog(path)
+    try:
+        check_regular(path)
+    except OSError as error:
+        raise FieldError(f"{path}: cannot be read ({error.strerror or error})") from None
     if ending.endswith(".ply"):
         _, tables = open_ply(path)
         packed = "vertex" in tables and "packed_position" in tables["vertex"].columns

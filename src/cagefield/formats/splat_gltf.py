@@ -28,6 +28,7 @@ from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import Axes
 from cagefield.formats.splat_colour_space import srgb_harmonics
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+from cagefield.regular_files import MOST_TEXT, open_regular
 from cagefield.sh_rotation import turned_sh
 from cagefield.typing import AnyArray
 
@@ -69,13 +70,15 @@ def open_splat_gltf(path: Path) -> SplatSource:
 def _chunks(path: Path) -> tuple[dict[str, Any], tuple[int, int]]:
     """(the JSON of a file, the first byte and the size of its binary part)."""
     size = path.stat().st_size
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         magic, version, _ = struct.unpack("<III", file.read(12))
         if magic != _MAGIC or version != 2:
             raise ValueError("it does not begin as GLB 2 does")
         length, kind = struct.unpack("<II", file.read(8))
         if kind != _JSON or 20 + length > size:
             raise ValueError("its JSON is cut off")
+        if length > MOST_TEXT:
+            raise ValueError(f"its JSON has {length} bytes, at most {MOST_TEXT} are read")
         gltf = json_text.loads(file.read(length))
         if not isinstance(gltf, dict):
             raise ValueError("its JSON is no object")

@@ -23,6 +23,7 @@ from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.regular_files import open_regular
 from cagefield.typing import AnyArray
 
 _HEADER, _SECTION = 4096, 1024
@@ -51,7 +52,7 @@ def open_ksplat(path: Path) -> SplatSource:
     Raises:
         FieldError: a version or level that is not known, a file that is damaged.
     """
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         head = file.read(_HEADER)
         if len(head) < _HEADER:
             raise _damaged(path, "its header is cut off")

@@ -18,6 +18,7 @@ from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
+from cagefield.regular_files import check_regular
 
 _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rotation", "u1", 4)])
 
@@ -28,7 +29,7 @@ def open_splat_rows(path: Path) -> SplatSource:
     Raises:
         FieldError: a size that is no multiple of 32 bytes.
     """
-    size = path.stat().st_size
+    size = check_regular(path)
     if not size or size % _ROW.itemsize:
         raise FieldError(f"{path}: {size} bytes are no whole number of splats of 32; copy the file again")
     count = size // _ROW.itemsize

@@ -31,6 +31,7 @@ from cagefield import json_text
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.regular_files import UnreadableError, check_regular, read_bytes
 from cagefield.rendering.images import check_pixels
 from cagefield.typing import AnyArray
 
@@ -39,6 +40,9 @@ PALETTE_WIDTH = 64
 """Centroids side by side."""
 
 _MOST_META = 1 << 24
+_MOST_IMAGE = 1 << 30
+"""Bytes of an image's file, which is read whole."""
+
 _DENSEST, _ALWAYS = 4, 1 << 16
 """Splats for each byte of the images, at most: honest files take 8 bytes or more for each."""
 
@@ -60,7 +64,10 @@ def open_sog(path: Path) -> SplatSource:
         folder = path if path.is_dir() else path.parent
         return _open(path, lambda name: _from_folder(folder, name))
     try:
+        check_regular(path)
         archive = zipfile.ZipFile(path)
+    except UnreadableError as error:
+        raise FieldError(f"{path}: {error}") from None
     except (zipfile.BadZipFile, NotImplementedError, OSError):
         raise FieldError(f"{path}: no SOG file, it is no zip that can be read; copy it again") from None
     with archive:
@@ -69,7 +76,7 @@ def open_sog(path: Path) -> SplatSource:
         def from_zip(name: str) -> bytes:
             info = archive.getinfo(held[name])
             # Images do not get smaller in a zip; meta.json does.
-            if info.file_size > _MOST_META + 4 * info.compress_size:
+            if info.file_size > min(_MOST_IMAGE, _MOST_META + 4 * info.compress_size):
                 raise ValueError(f"{name} is much larger than it should be")
             return archive.read(info)
 
@@ -79,7 +86,10 @@ def open_sog(path: Path) -> SplatSource:
 def _from_folder(folder: Path, name: str) -> bytes:
     if PurePosixPath(name).name != name:
         raise ValueError(f"{name} lies in another folder")
-    return (folder / name).read_bytes()
+    try:
+        return read_bytes(folder / name, _MOST_IMAGE)
+    except FileNotFoundError:
+        raise ValueError(f"it has no {name}") from None
 
 
 def _open(path: Path, content: Images) -> SplatSource:

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import AXES, Axes
 from cagefield.formats.splat_table import SplatBatch, SplatSource
+from cagefield.regular_files import open_regular
 from cagefield.typing import AnyArray
 
 SPZ_AXES: Axes = "rub"
@@ -53,7 +54,7 @@ _SMALL, _USUAL_RATIO = 1 << 20, 100
 _PART = 1 << 19
 """Bytes that are decompressed at a time: a file that is cut off late is refused with little memory."""
 
-_DECODED = 1 << 13
+_DECODED = 1 << 12
 """Splats that are decoded at a time: each takes 600 bytes meanwhile."""
 
 # Coordinate systems of the extension, by their number.
@@ -66,7 +67,7 @@ def open_spz(path: Path) -> SplatSource:
     Raises:
         FieldError: a file that is no SPZ, of a version that is not known, or damaged.
     """
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         start = file.read(NEW_HEADER.size)
         if start[:4] == MAGIC:
             return _open_new(path, file, start)

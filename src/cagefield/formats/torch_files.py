@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cagefield.errors import FieldError
+from cagefield.regular_files import UnreadableError, check_regular
 
 
 def read_tensors_of(path: Path) -> dict[str, Any]:
@@ -18,8 +19,14 @@ def read_tensors_of(path: Path) -> dict[str, Any]:
     Raises:
         FieldError: no such file, no PyTorch, a file that is damaged or holds other objects.
     """
-    if not path.is_file():
-        raise FieldError(f"{path}: no such checkpoint; give the .tar or .ckpt file that the training wrote")
+    try:
+        check_regular(path)
+    except UnreadableError as error:
+        raise FieldError(f"{path}: {error}") from None
+    except OSError:
+        raise FieldError(
+            f"{path}: no such checkpoint; give the .tar or .ckpt file that the training wrote"
+        ) from None
     try:
         import torch
     except ImportError as error:

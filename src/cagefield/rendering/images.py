@@ -17,12 +17,16 @@ from PIL import Image
 
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
+from cagefield.regular_files import check_regular
 from cagefield.rendering.render_result import to_uint8
 from cagefield.rendering.video_encoder import encoder
 from cagefield.typing import UInt8
 
 MOST_PIXELS = 100 << 20
 """Pixels of a picture that is read: a file of kilobytes may have any number of them."""
+
+MOST_BYTES = 1 << 30
+"""Bytes of a picture's file that is read: some decoders take all of it into memory."""
 
 _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
@@ -72,6 +76,7 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
 
     Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
     """
+    check_regular(path, MOST_BYTES)
     with _PictureFile(path) as file, Image.open(file) as image:
         check_pixels(image, path.stat().st_size)
         yield image

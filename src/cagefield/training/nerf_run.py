@@ -21,6 +21,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.mlp import Linear, Mlp
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
+from cagefield.regular_files import check_regular
 from cagefield.rendering.nerf import Jitter, Rays, march
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.nerf_space import space_of
@@ -178,6 +179,7 @@ class NerfRun:
     def restore(self, path: Path) -> None:
         """Continues from the state in `path`."""
         try:
+            check_regular(path)
             state = torch.load(path, map_location=self.device, weights_only=True)
             if state["config"] != repr(self._options()):
                 raise CagefieldError(

@@ -28,6 +28,7 @@ from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.tracks import Tracks, tracks
 from cagefield.datasets.procedural.writer import DepthViews
 from cagefield.errors import DatasetError
+from cagefield.regular_files import real_path
 
 HOLDOUT = 8
 QUALITY = 95
@@ -70,7 +71,7 @@ def make_capture(
         raise DatasetError(f"size must be at least {LEAST_SIDE}, not {longer}")
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
-    target = Path(out_dir).resolve()
+    target = real_path(out_dir)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
     phone = plan.phone.resized(longer)

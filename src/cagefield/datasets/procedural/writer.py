@@ -21,6 +21,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.errors import DatasetError
+from cagefield.regular_files import real_path
 from cagefield.rendering.images import write_png
 from cagefield.rendering.render_result import RenderResult
 
@@ -96,7 +97,7 @@ def make_scene(
             raise DatasetError(f"{what} must be at least 1, not {number}")
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
-    target = Path(out_dir).resolve()
+    target = real_path(out_dir)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
 

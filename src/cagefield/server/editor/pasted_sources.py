@@ -14,6 +14,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.edits.sources import relative, resolved
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
+from cagefield.regular_files import real_path
 from cagefield.scene_files import FIELD, is_scene
 
 SPLATS = (".ply", ".splat", ".ksplat", ".spz", ".sog", ".glb")
@@ -48,7 +49,7 @@ def admitted(edit: Edit, folder: Path, root: Path) -> Edit:
 def source_in(source: str, folder: Path, root: Path) -> Path:
     """The absolute path of a source that a page names. Raises SceneError where it lies outside the root."""
     try:
-        path = resolved(source, folder).resolve()
+        path = real_path(resolved(source, folder))
     except (OSError, ValueError, RuntimeError) as error:
         raise SceneError(f"{source!r:.200} is no path of a scene ({error}); choose one in the list") from None
     if not path.is_relative_to(root):
@@ -72,7 +73,7 @@ def sources_under(root: Path, own: Iterable[Path], *, splats: bool) -> list[str]
     Scene folders and, for splats, files of splats. Not the scene's `own` folders, hidden ones, and what lies
     deeper than DEEP.
     """
-    mine, found, seen = {path.resolve() for path in own}, list[str](), 0
+    mine, found, seen = {real_path(path) for path in own}, list[str](), 0
     for folder, folders, files in os.walk(root):
         here = Path(folder)
         depth = len(here.relative_to(root).parts)
@@ -82,7 +83,7 @@ def sources_under(root: Path, own: Iterable[Path], *, splats: bool) -> list[str]
         scenes = [name for name in sorted(folders) if is_scene(here / name)]
         for name in scenes:
             path = here / name
-            if path.resolve() not in mine and _holds(path, splats):
+            if real_path(path) not in mine and _holds(path, splats):
                 found.append(path.relative_to(root).as_posix())
         if splats:
             found += [

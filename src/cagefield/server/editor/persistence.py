@@ -23,6 +23,7 @@ from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.leftovers import remove_leftovers, remove_unfinished
+from cagefield.regular_files import read_bytes, read_text, real_path
 from cagefield.scene import Scene
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
@@ -50,10 +51,10 @@ class SceneStore:
     ) -> None:
         """`root` is the folder that pages may write into; None for the one that the scene is in."""
         self.scene = scene
-        self.source = None if source is None else source.resolve()
-        self.origin = path.resolve()
-        self.path = path.resolve()
-        self.root = (self.shown_path.parent if root is None else root).resolve()
+        self.source = None if source is None else real_path(source)
+        self.origin = real_path(path)
+        self.path = real_path(path)
+        self.root = real_path(self.shown_path.parent if root is None else root)
         """What pages save and render lies in it."""
         self._lock: SceneLock | None = None
         self.trouble: str | None = None
@@ -87,7 +88,7 @@ class SceneStore:
         What cannot be read is put aside under another name, with a warning.
         """
         try:
-            content = json_text.loads(self.autosave_path.read_text(encoding="utf-8"))
+            content = json_text.loads(read_text(self.autosave_path))
             document = _parsed(content)
         except FileNotFoundError:
             return None
@@ -263,7 +264,7 @@ class SceneStore:
             ) from None
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
-        self.path, self.source = target.resolve(), None
+        self.path, self.source = real_path(target), None
         self._done(session)
 
     def _done(self, session: Session) -> None:
@@ -280,7 +281,7 @@ class SceneStore:
 
     def _fingerprint(self) -> str:
         try:
-            return hashlib.sha256((self.path / _EDITS).read_bytes()).hexdigest()
+            return hashlib.sha256(read_bytes(self.path / _EDITS)).hexdigest()
         except OSError:
             return ""
 

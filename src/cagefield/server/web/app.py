@@ -18,7 +18,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from cagefield.edits import dump_edits
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, line_of
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.dispatcher import TooManyError
@@ -89,7 +89,9 @@ def application(
             return PlainTextResponse(str(error), 413)
         except ClientDisconnect:
             return PlainTextResponse("the page that sent the file has hung up", 499)
-        except (CagefieldError, OSError) as error:
+        except OSError as error:
+            return PlainTextResponse(line_of(error), 400)
+        except CagefieldError as error:
             return PlainTextResponse(str(error), 400)
         return PlainTextResponse("opened")
 

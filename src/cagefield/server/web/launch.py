@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import functools
 import hashlib
 import math
 import os
@@ -10,6 +12,7 @@ import socket
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import uvicorn
@@ -21,6 +24,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
+from cagefield.regular_files import MOST_TEXT, check_regular, real_path
 from cagefield.scene import Scene
 from cagefield.scene_files import FIELD, is_scene
 from cagefield.server.editor.pasted_sources import source_problem
@@ -33,6 +37,7 @@ from cagefield.server.web.app import application
 from cagefield.server.web.opening import scene_of_file
 from cagefield.server.web.patience import PatientHttp
 from cagefield.server.web.security import Guard
+from cagefield.server.web.tls import TlsHttp
 
 WAITING = 128
 """New connections that the system lets wait."""
@@ -71,8 +76,8 @@ def open_cached(
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
     elif store.damaged is not None:
         coordinator.greeting = store.damaged
-    name = path.resolve().name if source is None else source.name
-    return coordinator, hello_of(scene, name, str(path.resolve()))
+    name = real_path(path).name if source is None else source.name
+    return coordinator, hello_of(scene, name, str(real_path(path)))
 
 
 def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
@@ -163,11 +168,19 @@ class Certificate:
     key: Path | None = None
 
     def __post_init__(self) -> None:
+        self.context()
+
+    def context(self) -> ssl.SSLContext:
+        """What connections are encrypted with. Raises CagefieldError as the class says."""
+
         def no_password() -> str:
             raise CagefieldError(f"the key of {self.file} has a password; give one without")
 
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         try:
-            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.file, self.key, no_password)
+            for file in (self.file, self.key or self.file):
+                check_regular(file, MOST_TEXT)
+            context.load_cert_chain(self.file, self.key, no_password)
         except ssl.SSLError as error:
             raise CagefieldError(
                 f"{self.file}: no certificate with its key ({error.reason or error}); give PEM files that "
@@ -176,6 +189,7 @@ class Certificate:
         except OSError as error:
             where = self.file if self.key is None else f"{self.file} and {self.key}"
             raise CagefieldError(f"{where}: cannot be read ({error.strerror})") from None
+        return context
 
 
 def serve(
@@ -195,18 +209,20 @@ def serve(
     config = uvicorn.Config(
         application(coordinator, hello, guard, reopen),
         log_level="warning",
-        http=PatientHttp,
+        http=PatientHttp if certificate is None else _encrypted(certificate),
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,
         backlog=AT_A_TIME,
         server_header=False,
         proxy_headers=False,  # an address that a visitor writes himself would get round the limit of tokens
-        ssl_certfile=None if certificate is None else certificate.file,
-        ssl_keyfile=None if certificate is None or certificate.key is None else certificate.key,
     )
     with contextlib.suppress(KeyboardInterrupt):
         _Server(config).run(sockets=[listening])
+
+
+def _encrypted(certificate: Certificate) -> type[asyncio.Protocol]:
+    return cast(type[asyncio.Protocol], functools.partial(TlsHttp, certificate.context()))
 
 
 class _Server(uvicorn.Server):

@@ -12,11 +12,15 @@ import shutil
 import time
 from pathlib import Path
 
+from cagefield.regular_files import open_regular
 from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import stem_of
 
 KEPT_DAYS = 30
 """Cached scenes that were not opened for longer are removed, but those with an autosave."""
+
+_LONGEST = 100
+"""Bytes of a file's name in its scene's: names have 255 at most, with what autosaves and drafts add."""
 
 _BLOCK = 1 << 22
 
@@ -35,7 +39,8 @@ def scene_of_file(file: Path) -> Path:
     from cagefield.formats.splat_import import import_splats
     from cagefield.scene import Scene
 
-    folder = opened_folder() / f"{stem_of(file)}-{_digest(file)}"
+    stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
+    folder = opened_folder() / f"{stem}-{_digest(file)}"
     if is_scene(folder):
         os.utime(folder)
     else:
@@ -50,7 +55,7 @@ def _digest(file: Path) -> str:
     """A name for the content of a file."""
     content = hashlib.blake2b(digest_size=8)
     for part in sorted(file.iterdir()) if file.is_dir() else [file]:
-        with part.open("rb") as stream:
+        with open_regular(part) as stream:
             while block := stream.read(_BLOCK):
                 content.update(block)
     return content.hexdigest()

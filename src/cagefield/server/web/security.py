@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Literal
 from urllib.parse import urlsplit
 
+from cagefield.regular_files import read_bytes
+
 _LEAST = 32
 """Characters of a token that is taken from a file of ours: those nobody guesses."""
 
@@ -51,7 +53,7 @@ def own_token(role: Role = "edit") -> str:
             with os.fdopen(handle, "w", encoding="ascii") as out:
                 out.write(new_token())
         status = file.stat()
-        kept = file.read_text(encoding="ascii").strip()
+        kept = read_bytes(file, 4096).decode("ascii").strip()
         private = os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
         if private and len(kept) >= _LEAST:
             return kept
@@ -158,7 +160,10 @@ def _is_address(name: str) -> bool:
 def _same_origin(origin: str | None, host: str) -> bool:
     if not origin:
         return False
-    parts = urlsplit(origin)
+    try:
+        parts = urlsplit(origin)
+    except ValueError:
+        return False
     return parts.scheme in ("http", "https") and parts.netloc.lower() == host.lower()
 
 

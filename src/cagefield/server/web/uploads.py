@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import shutil
 import tempfile
@@ -21,7 +22,10 @@ MOST_UPLOAD = 4 << 30
 STALLED = 30.0
 """Seconds without a byte of a file that a page sends, after which it is given up."""
 
-_CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+MOST_NAME = 200
+"""Bytes of the name of a file that a page sends: systems take 255, some with what is encrypted 143."""
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 """What no name of a file has: systems refuse some, and others break lines."""
 
 Opened = tuple[Coordinator, server_messages.Hello]
@@ -59,13 +63,13 @@ class OpenEditor:
         if self._is_opening.locked():
             raise CagefieldError("another file is being opened; wait until it is there")
         async with self._is_opening:
-            file_name = Path(name.replace("\\", "/")).name
-            if not file_name or file_name.startswith(".") or _CONTROL.search(file_name):
-                raise CagefieldError(f"{name!r} is no name of a file; give the file its name, such as x.ply")
+            file_name = _file_name(name)
             folder = Path(tempfile.mkdtemp(prefix="cagefield-open-"))
             try:
                 await _receive(folder / file_name, content, size)
                 scene = await in_own_process(scene_of_file, folder / file_name)
+            except CagefieldError as error:
+                raise type(error)(str(error).replace(f"{folder}{os.sep}", "")) from None
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
             await self._enter(
@@ -86,6 +90,19 @@ class OpenEditor:
     def close(self) -> None:
         """Ends the rendering process and all that goes on."""
         self.coordinator.close()
+
+
+def _file_name(name: str) -> str:
+    """The last part of a name that a page gives. Raises CagefieldError where it is no name of a file."""
+    last = Path(name.replace("\\", "/")).name.strip()
+    if not last or last.startswith(".") or _CONTROL.search(last):
+        raise CagefieldError(f"{name!r:.80} is no name of a file; give the file its name, such as x.ply")
+    size = len(last.encode())
+    if size > MOST_NAME:
+        raise CagefieldError(
+            f"the name {last[:40]}... has {size} bytes, at most {MOST_NAME}; rename the file"
+        )
+    return last
 
 
 async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) -> None:
