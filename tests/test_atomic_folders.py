@@ -136,7 +136,8 @@ def test_recovering_takes_the_newest_whole_folder(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
         os.utime(tmp_path / name, (n, n))
     whole = {".out.old-1", ".out.old-2"}
-    assert recover_folder(tmp_path / "out", lambda f: f.name in whole) == tmp_path / ".out.old-2"
+    with pytest.warns(UserWarning, match="it is back"):
+        assert recover_folder(tmp_path / "out", lambda f: f.name in whole) == tmp_path / ".out.old-2"
     assert recover_folder(tmp_path / "out", lambda f: True) is None
     assert sorted(f.name for f in tmp_path.iterdir()) == [".other.old-4", ".out.old-1", ".out.old-3", "out"]
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import stat
+import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -75,12 +77,18 @@ def _naming(path: Path, hidden: Path) -> Iterator[None]:
 def merged_folder(target: Path) -> Iterator[Path]:
     """A folder to be filled with files that come into `target` together.
 
-    Where `target` holds something already, that is a hidden folder in it: on success its files take their
-    places, on failure they are removed, and `target` is what it was. Else it is `target` itself, not
-    made yet or empty, and what has been written stays.
+    Where `target` holds something already, that is a hidden folder beside it, which takes its place with all
+    that it held under other names (`replaced_folder`); after a failure `target` is what it was. Where it must
+    stay the folder that it is (`_must_stay`), the hidden folder is in it, and its files take their places one
+    after another. Else it is `target` itself, not made yet or empty, and what has been written stays.
     """
     if not target.exists() or not any(target.iterdir()):
         yield target
+        return
+    target = target.resolve()
+    if not _must_stay(target):
+        with replaced_folder(target, None) as draft:
+            yield draft
         return
     remove_leftovers(target, inside=True)
     draft = target / hidden_name(target, "new")
@@ -95,14 +103,29 @@ def merged_folder(target: Path) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def _must_stay(folder: Path) -> bool:
+    """Whether no other folder can take a folder's place.
+
+    Nothing may be made beside it, somebody works in it, or it holds another file system or what may not be
+    read or removed.
+    """
+    if not os.access(folder.parent, os.W_OK | os.X_OK) or Path.cwd().is_relative_to(folder):
+        return True
+    device, may = folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
+    return any(
+        os.stat(place).st_dev != device or not os.access(place, may) for place, _, _ in os.walk(folder)
+    )
+
+
 @contextmanager
-def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
+def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]:
     """An empty folder beside `target` to be filled: takes its place on success, is removed on failure.
 
-    What `target` held under the names in `own` goes; other entries stand in the new folder when it takes its
-    place. After a failure `target` is what it was. Where the system can exchange two names at once there is
-    a whole folder at `target` at every moment; else `recover_folder` puts back what an end between two
-    renames left. An OSError about the new folder, or about none (a full disk), names `target`.
+    What `target` held under the names in `own`, None for those in the new folder, goes; other entries stand
+    in the new folder, which has its rights, when it takes its place. After a failure `target` is what it was.
+    Where the system can exchange two names at once there is a whole folder at `target` at every moment; else
+    `recover_folder`, which whoever calls this has called, puts back what an end between two renames left. An
+    OSError about the new folder, or about none (a full disk), names `target`.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_leftovers(target)
@@ -112,16 +135,20 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
     try:
         with _naming(target, draft):
             yield draft
+            if own is None:
+                own = {entry.name for entry in draft.iterdir()}
             others = _others(target, own)
             for entry in others:
                 _linked(entry, draft / entry.name)
             if not target.exists():
                 draft.rename(target)
-            elif exchanged(draft, target):
-                retired = draft
             else:
-                target.rename(retired)
-                draft.rename(target)
+                draft.chmod(stat.S_IMODE(target.stat().st_mode))
+                if exchanged(draft, target):
+                    retired = draft
+                else:
+                    target.rename(retired)
+                    draft.rename(target)
     except BaseException:
         if retired is not draft:
             shutil.rmtree(draft, ignore_errors=True)
@@ -138,7 +165,8 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
 def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | None:
     """Puts back, where `target` is not there, the newest folder that an end between renames left beside it.
 
-    The name that it had is returned, None where there was nothing to do. `is_whole` says which folders count.
+    Says so in a warning. The name that it had is returned, None where there was nothing to do. `is_whole`
+    says which folders count.
     """
     if target.exists() or not target.parent.is_dir():
         return None
@@ -147,6 +175,10 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
         return None
     newest = max(left, key=lambda folder: folder.stat().st_mtime)
     newest.rename(target)
+    warnings.warn(
+        f"{target} was left as {newest.name} by a program that was ended while it replaced it; it is back",
+        stacklevel=2,
+    )
     return newest
 
 
