@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,12 @@ from kill_points import Say, forked
 from cagefield import atomic_files
 from cagefield.atomic_files import merged_folder, recover_folder
 from cagefield.cli import main
+from cagefield.cli.demo import Demo
+from cagefield.errors import CagefieldError
+from cagefield.leftovers import hidden_name
+from cagefield.server.editor.document import Document
+from cagefield.server.render_queue import jobs
+from cagefield.server.render_worker.job_files import MARK
 from full_disks import files_up_to
 from scenes import ball_scene, files_of
 
@@ -103,3 +112,110 @@ def test_pictures_that_do_not_fit_leave_the_old_ones(
     assert str(tmp_path / "out") in last and "File too large" in last and "/." not in last
     assert files_of(tmp_path / "out") == before
     assert sorted(os.listdir(tmp_path)) == ["out", "scene"]
+
+
+@pytest.fixture(scope="module")
+def ended() -> str:
+    """The number of a process that has ended."""
+    code = "import os; print(os.getpid())"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip()
+
+
+def put_aside(target: Path, process: str) -> None:
+    """What a kill between two renames leaves: the old folder under a hidden name, nothing at its place."""
+    name = hidden_name(target, "old").rsplit("-", 2)
+    target.rename(target.with_name("-".join((name[0], process, name[2]))))
+
+
+def demo_folder(folder: Path) -> list[str]:
+    (folder / "out").mkdir()
+    (folder / "out" / "before_after.png").write_bytes(b"old")
+    return ["demo", "-o", str(folder / "out")]
+
+
+def made_scene(folder: Path) -> list[str]:
+    words = ["make-scene", "chair", "-o", str(folder / "out"), "--views", "2", "--test-views", "1", "--size"]
+    assert main([*words, "12"]) == 0
+    return [*words, "12"]
+
+
+def made_room(folder: Path) -> list[str]:
+    words = ["make-scene", "room-chair", "-o", str(folder / "out"), "--views", "8", "--size", "48"]
+    assert main([*words, "--no-points"]) == 0
+    return [*words, "--no-points"]
+
+
+def made_page(folder: Path) -> list[str]:
+    ball_scene().save(folder / "scene")
+    words = ["export", str(folder / "scene"), "-o", str(folder / "out"), "--as", "page", "--embed"]
+    assert main(words) == 0
+    return words
+
+
+def made_pictures(folder: Path) -> list[str]:
+    ball_scene().save(folder / "scene")
+    old_pictures(folder / "out")
+    return ["render", str(folder / "scene"), "-o", str(folder / "out"), "--views", "0", "--size", "16"]
+
+
+def made_poses(folder: Path) -> list[str]:
+    (folder / "out").mkdir()
+    (folder / "out" / "poses.json").write_text("{}")
+    (folder / "photos").mkdir()
+    return ["poses", str(folder / "photos"), "-o", str(folder / "out")]
+
+
+@pytest.mark.parametrize("make", [demo_folder, made_scene, made_room, made_page, made_pictures, made_poses])
+def test_the_next_run_brings_back_what_an_end_between_two_renames_left(
+    tmp_path: Path,
+    ended: str,
+    make: Callable[[Path], list[str]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """And says so; it is then there, so that only --overwrite replaces it, with the user's own file kept."""
+    for name in ("_photograph", "_train", "_edit", "_render"):
+        monkeypatch.setattr(Demo, name, lambda *_: (None, ""))
+    words, out = make(tmp_path), tmp_path / "out"
+    (out / "notes.txt").write_text("mine")
+    before = files_of(out)
+    put_aside(out, ended)
+    capsys.readouterr()
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert f"{out} was left as .out.old-" in said and "it is back" in said
+    assert said.splitlines()[-1].endswith("give a new one, or --overwrite")
+    assert files_of(out) == before
+    put_aside(out, ended)
+    main([*words, "--overwrite"])  # of no photos there are no poses
+    assert "it is back" in capsys.readouterr().err
+    assert (out / "notes.txt").read_text() == "mine"
+    assert [name for name in os.listdir(tmp_path) if name.startswith(".")] == []
+
+
+def test_an_editor_brings_its_pictures_back(tmp_path: Path, ended: str) -> None:
+    camera, document = ball_scene().cameras["train"][0], Document(())
+    for name in (*NAMES, MARK):
+        (tmp_path / "out").mkdir(exist_ok=True)
+        (tmp_path / "out" / name).write_bytes(b"old")
+    put_aside(tmp_path / "out", ended)
+    with pytest.warns(UserWarning, match="it is back"), pytest.raises(CagefieldError, match="is not empty"):
+        jobs.test_views(1, document, (camera,), tmp_path / "out", (8, 8), False)
+    assert len(os.listdir(tmp_path / "out")) == 4
+
+
+def test_poses_that_a_training_used_come_back(
+    tmp_path: Path, ended: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`train` on photos alone finds them again, and does not begin anew."""
+    from cagefield.cli import poses
+    from cagefield.datasets import dataset, structure_from_motion
+
+    monkeypatch.setattr(dataset, "has_photos_alone", lambda photos: True)
+    monkeypatch.setattr(
+        structure_from_motion, "is_made_of", lambda target, photos: (target / "poses.json").is_file()
+    )
+    made_poses(tmp_path)
+    put_aside(tmp_path / "out", ended)
+    with pytest.warns(UserWarning, match="it is back"):
+        assert poses.posed(tmp_path / "photos", tmp_path / "out") == tmp_path / "out"

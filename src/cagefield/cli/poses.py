@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
+from cagefield.atomic_files import recover_folder
 from cagefield.cli.options import Flag, Output, check_folder, check_number, progress_bar
 from cagefield.errors import DatasetError
 
@@ -93,6 +94,7 @@ def posed(photos: Path, target: Path) -> Path:
     photos = photos.expanduser()
     if not has_photos_alone(photos):
         return photos
+    recover_folder(target.resolve(), lambda folder: (folder / RECORD).is_file())
     if is_made_of(target, photos):
         print(f"{photos} has no poses; those in {target} were found before")
         return target
@@ -120,6 +122,7 @@ def unfolded(dataset: Dataset, target: Path, downscale: int | None) -> Dataset:
         print("no field can show both; find the poses anew with: cagefield poses PHOTOS -o DATA", flush=True)
         return dataset
     photos = folders.pop()
+    recover_folder(target.resolve(), lambda folder: (folder / RECORD).is_file())
     if is_made_of(target, photos):
         print(f"those in {target} were found before")
     else:
