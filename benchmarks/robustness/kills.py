@@ -26,7 +26,7 @@ from cagefield.benchmarking.machine import cpu_model
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
-import kill_commands  # noqa: E402
+import kill_command  # noqa: E402
 import kill_points  # noqa: E402
 import kills  # noqa: E402
 
@@ -114,7 +114,7 @@ def _kill_editor(folder: Path, number: int, found: kills.Killed, told: Told) -> 
 def _begin(client: PageClient, hello: dict[str, object]) -> int:
     """An edit, and a path whose video takes long: its number."""
     client.look_from(hello)
-    client.send("load_edits", text=kill_commands.EDITS)
+    client.send("load_edits", text=kill_command.EDITS)
     edit: int = client.state(lambda state: bool(state["edits"]))["edits"][0]["id"]
     pose = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0]
     keys = [{"c2w": pose, "fov_y_deg": fov, "seconds": 4.0} for fov in (40.0, 44.0)]
