@@ -1,10 +1,11 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
 python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
-    [--step 1] [--only NAME ...] [--out FILE.md]
+    [--step 1] [--writes] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
-wanted, and at random moments. Editors (`cagefield view`) are killed while a page sends changes, saves and
+wanted, and at random moments; with --writes in the middle of every write, half of whose bytes are then in
+the file. Editors (`cagefield view`) are killed while a page sends changes, saves and
 renders a video; what the page was told is compared with what the next editor has. About an hour of one
 processor.
 """
@@ -12,7 +13,9 @@ processor.
 from __future__ import annotations
 
 import argparse
+import os
 import random
+import subprocess
 import sys
 import tempfile
 import threading
@@ -29,6 +32,7 @@ sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 import kill_command  # noqa: E402
 import kill_points  # noqa: E402
 import kills  # noqa: E402
+import write_points  # noqa: E402
 
 from cagefield import Scene  # noqa: E402
 from cagefield.server.editor.persistence import SceneStore  # noqa: E402
@@ -53,9 +57,17 @@ def main() -> None:
     parser.add_argument("--slow", type=int, default=10, help="the same of each command with kernels")
     parser.add_argument("--servers", type=int, default=10)
     parser.add_argument("--step", type=int, default=1, help="kills at every such call only")
+    parser.add_argument(
+        "--writes", action="store_true", help="kills in the middle of writes, of files' content"
+    )
     parser.add_argument("--only", nargs="*", default=None)
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
+    if options.writes and not write_points.is_loaded():
+        if reason := write_points.why_not():
+            parser.error(reason)
+        command = [sys.executable, *sys.argv]
+        sys.exit(subprocess.run(command, env=os.environ | write_points.preloading()).returncode)
     rows, everything = [], []
     for name in kills.ALL if options.only is None else options.only:
         found = kills.Killed()
@@ -79,12 +91,12 @@ def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -
     """Kills a command at all its calls, whose number is returned, and at random."""
     command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
     with tempfile.TemporaryDirectory() as folder:
-        calls, seconds = kills.calls_of(name, Path(folder))
+        calls, seconds = kills.calls_of(name, Path(folder), writes=options.writes)
     points = [*range(1, calls + 1, options.step)] * (1 if slow else options.rounds)
     random.Random(name).shuffle(points)
     for at in points:
         with tempfile.TemporaryDirectory() as folder:
-            kills.kill(command, name, Path(folder), at, found)
+            kills.kill(command, name, Path(folder), at, found, writes=options.writes)
     for after in kills.moments(options.slow if slow else options.random, seconds, len(name)):
         with tempfile.TemporaryDirectory() as folder:
             kills.kill(command, name, Path(folder), 0, found, after)
