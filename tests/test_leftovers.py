@@ -62,8 +62,9 @@ def test_what_is_of_a_name_goes_once_something_is_there(tmp_path: Path, ended: s
     target = tmp_path / name
     aside = left(target, "old", ended)
     autosave = left(tmp_path / f".{name}.cagefield-autosave.json", "part", ended)
+    training = left(tmp_path / f"{name}.training", "part", ended)
     remove_leftovers(target)
-    assert aside.exists() and not autosave.exists()
+    assert aside.exists() and not autosave.exists() and not training.exists()
     left(target, "new", ended)
     target.mkdir()
     remove_leftovers(target)
