@@ -51,6 +51,11 @@ FOUND = {
     "tif": (489,),
     "sog": (295,),
     "glb": (284,),
+    "poses, photos.json": (687, 852),
+    "training, voxels": (8, 18, 43),
+    "training, splats": (14, 140, 334, 383),
+    "token": (2, 53),
+    "lock": (1, 4, 20),
 }
 """Inputs of the benchmark that once ended in a traceback, a page of text, or a gigabyte."""
 
@@ -59,6 +64,13 @@ def test_what_took_memory_stays_cured() -> None:
     """A damaged file that is unpacked to half a million splats, none of which is visible: it took 60 MiB."""
     found = attack(["spz 1"], 5622, 5623)["spz 1"]
     assert (found.refused, found.faults) == (1, [])
+
+
+def test_archives_of_trainings_are_not_unpacked_beyond_their_size() -> None:
+    """Checkpoints that unpack to 256 MiB, or that go on with a step below 0."""
+    pytest.importorskip("torch", reason="these trainings are PyTorch's, which is not installed (extra nerf)")
+    for number in (27, 366, 477):
+        assert attack(["training, nerf"], number, number + 1)["training, nerf"].faults == []
 
 
 @pytest.mark.parametrize("name", FOUND)

@@ -12,7 +12,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from PIL import Image
@@ -129,7 +129,8 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
         photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in kept["photos"]]
         unreadable = {str(name): str(reason) for name, reason in kept["unreadable"].items()}
         whole = all(
-            photo.path.is_file()
+            _is_within(photo.name)
+            and photo.path.is_file()
             and isinstance(photo.width, int)
             and isinstance(photo.height, int)
             and min(photo.width, photo.height) > 0
@@ -138,9 +139,15 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
             and isinstance(photo.alpha, bool)
             for photo in photos
         )
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):  # OSError: a name that is too long
         return None
     return (photos, unreadable) if whole else None
+
+
+def _is_within(name: str) -> bool:
+    """Whether a photo's name leads nowhere out of the folder of photos."""
+    parts = PurePosixPath(name).parts
+    return bool(parts) and ".." not in parts and not Path(name).is_absolute()
 
 
 def _remove_features(work: Path) -> None:
