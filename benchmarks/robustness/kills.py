@@ -190,11 +190,12 @@ def _sum(every: list[kills.Killed]) -> kills.Killed:
 
 def _table(rows: list[str], found: kills.Killed, told: Told, options: argparse.Namespace) -> str:
     command = f"--rounds {options.rounds} --random {options.random} --slow {options.slow}"
-    command += f" --servers {options.servers}"
+    command += f" --servers {options.servers}" + " --writes" * options.writes
     return f"""# Kills
 
 Calls: those that change a name or open a file to write, of the whole command; each is a kill point, and then
-there are random moments. Lost: what the command, or the editor, had said was done, or a file of the user's.
+there are random moments. With --writes they are writes, half of whose bytes are in the file. Lost: what the
+command, or the editor, had said was done, or a file of the user's.
 Unreadable: no scene, old or new, at its place. Left: hidden files after the same command has been run again.
 Outlived: kills after which a process that the killed one had started was there {kill_points.STAYS:g} s later;
 stayed: seconds that the last of them was there at most.

@@ -52,6 +52,7 @@ FOUND = {
     "sog": (295,),
     "glb": (284,),
     "poses, photos.json": (687, 852),
+    "poses, database.db": (7496,),
     "training, voxels": (8, 18, 43),
     "training, splats": (14, 140, 334, 383),
     "token": (2, 53),

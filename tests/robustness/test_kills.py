@@ -18,6 +18,8 @@ import write_points
 from kill_points import Ended, Say, adopted, children, forked
 from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
 
+from cagefield.leftovers import hidden_name
+from cagefield.rendering.images import write_png
 from scenes import files_of
 
 pytestmark = [
@@ -27,7 +29,15 @@ pytestmark = [
 
 
 @pytest.mark.parametrize(
-    ("name", "least", "step"), [("edit --overwrite", 15, 3), ("changes and saves", 60, 9), ("save as", 15, 5)]
+    ("name", "least", "step"),
+    [
+        ("edit --overwrite", 15, 3),
+        ("edit --overwrite, renames", 15, 9),
+        ("changes and saves", 60, 9),
+        ("save as", 15, 5),
+        ("convert .sog", 8, 4),
+        ("export .glb", 8, 4),
+    ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
     command, found = COMMANDS[name], Killed()
@@ -115,6 +125,30 @@ def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     session.make(tmp_path / "other")
     assert (session.check(tmp_path / "other", 4) or "").startswith("lost: change 2 was kept")
+
+
+def test_pictures_and_files_that_would_be_lost_are_seen(tmp_path: Path) -> None:
+    """Pictures of which some are new, an old file that is gone or cut off, a folder that nobody put aside."""
+    command, renamed = SLOW_COMMANDS["render, pictures"], SLOW_COMMANDS["render, pictures, renames"]
+    command.make(tmp_path)
+    assert command.check(tmp_path, 0) is None
+    assert (command.check(tmp_path, 1) or "").startswith("lost: pictures")
+    write_png(tmp_path / "out" / "0001.png", np.zeros((32, 32, 3), np.uint8))
+    assert command.check(tmp_path, 0) == "lost: pictures [4, 32] pixels wide"
+    aside = tmp_path / hidden_name(tmp_path / "out", "old").replace(f"-{os.getpid()}-", "-999999999-")
+    (tmp_path / "out").rename(aside)
+    assert command.check(tmp_path, 0) == "lost: the user's file"
+    assert renamed.check(tmp_path, 0) is None and renamed.check(tmp_path, 1) is not None
+    shutil.rmtree(aside)
+    assert renamed.check(tmp_path, 0) == "lost: the folder"
+    converted = COMMANDS["convert .sog"]
+    (tmp_path / "b").mkdir()
+    converted.make(tmp_path / "b")
+    assert converted.check(tmp_path / "b", 0) is None
+    (tmp_path / "b" / "out.sog").write_bytes(b"half")
+    assert (converted.check(tmp_path / "b", 0) or "").startswith("unreadable")
+    (tmp_path / "b" / "out.sog").unlink()
+    assert converted.check(tmp_path / "b", 0) == "lost: out.sog"
 
 
 def test_poses_that_would_be_lost_are_seen(tmp_path: Path) -> None:
