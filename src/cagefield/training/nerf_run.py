@@ -189,8 +189,8 @@ class NerfRun:
                 for own, values in zip(self.torch.parameters, state["parameters"], strict=True):
                     own.copy_(values)
             # Rates are the run's own; the rest is sums of the gradients, by parameter.
-            own = self.optimizer.state_dict()
-            self.optimizer.load_state_dict({**own, "state": state["optimizer"]["state"]})
+            settings = self.optimizer.state_dict()
+            self.optimizer.load_state_dict({**settings, "state": state["optimizer"]["state"]})
             for parameter, sums in self.optimizer.state.items():
                 self._check_sums(parameter, sums)
             check_run(state, "loss")

@@ -218,7 +218,7 @@ class VoxelRun:
             arrays,
             {
                 "bounds": ("float64", (2, 3)),
-                "resolution": ("int64", (3,)),
+                "resolution": ("int", (3,)),
                 "vertices": ("int64", ("M",)),
                 "density": ("float32", ("M",)),
                 "sh": ("float32", ("M", "K", 3)),
