@@ -5,9 +5,8 @@ python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
 wanted, and at random moments; with --writes in the middle of every write, half of whose bytes are then in
-the file. Editors (`cagefield view`) are killed while a page sends changes, saves and
-renders a video; what the page was told is compared with what the next editor has. About an hour of one
-processor.
+the file. Editors (`cagefield view`) are killed while a page sends changes, saves and renders a video, or
+pictures; what the page was told is compared with what the next editor has. About an hour of one processor.
 """
 
 from __future__ import annotations
@@ -35,6 +34,7 @@ import kills  # noqa: E402
 import write_points  # noqa: E402
 
 from cagefield import Scene  # noqa: E402
+from cagefield.rendering.images import read_image  # noqa: E402
 from cagefield.server.editor.persistence import SceneStore  # noqa: E402
 from cagefield.server.editor.session import Session  # noqa: E402
 from editor_server import PageClient, editor_server, page  # noqa: E402
@@ -47,6 +47,7 @@ class Told:
     changes: int = 0
     saves: int = 0
     videos: int = 0
+    pictures: int = 0
 
 
 def main() -> None:
@@ -111,8 +112,10 @@ def _kill_editor(folder: Path, number: int, found: kills.Killed, told: Told) -> 
         edit = _begin(client, hello)
         if number % 2:  # kernels are there, and ffmpeg soon
             client.final()
-        threading.Timer(random.Random(number).uniform(0.0, 4.0), server.kill).start()
-        kept, saved = _edit_until_killed(client, edit, told)
+        renders = number % 4 == 3  # the video comes first
+        after = random.Random(number).uniform(0.0, 16.0 if renders else 4.0)
+        threading.Timer(after, server.kill).start()
+        kept, saved = (_render_until_killed if renders else _edit_until_killed)(client, edit, told)
         server.process.wait(30)
         # The editor's own process is known, and has ended; its video goes with it.
         left, seconds = kill_points.outliving(others, kill_points.STAYS)
@@ -155,9 +158,22 @@ def _edit_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int, 
     return kept, saved
 
 
+def _render_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int, int]:
+    """Renders the same pictures over and over: pages that wait for nothing leave time for that."""
+    try:
+        while True:
+            client.send("render", what="test_views", out="views", width=32, height=24, overwrite=True)
+            client.until(lambda m: m["type"] == "job" and m["state"] != "running")
+            told.pictures += 1
+    except Exception:  # the socket has gone
+        return 0, 0
+
+
 def _problem(folder: Path, kept: int, saved: int) -> str | None:
     """What the next editor does not find; it then saves what it has."""
     try:
+        for picture in (folder / "views").glob("*.png"):
+            read_image(picture)
         scene = Scene.open(folder / "scene")
         store = SceneStore(scene, folder / "scene")
         store.lock()
@@ -208,8 +224,9 @@ stayed: seconds that the last of them was there at most.
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 {chr(10).join(rows)}
 
-Whole editors draw, keep changes, save and render a video: pages had been told of {told.changes} changes and
-{told.saves} saves before the {found.kills} kills. Hidden there are files after the next save.
+Whole editors draw, keep changes, save and render a video; one in four renders pictures over its last ones, as
+often as it can. Pages had been told of {told.changes} changes, {told.saves} saves and {told.pictures} times
+pictures before the {found.kills} kills. Hidden there are files after the next save.
 """
 
 
