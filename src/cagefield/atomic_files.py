@@ -14,6 +14,9 @@ from pathlib import Path
 from cagefield.exchange import exchanged
 from cagefield.leftovers import hidden_name, put_aside, remove_leftovers
 
+MOST_LINKED = 100_000
+"""Files of a folder that another one takes over, at most: they get other names there."""
+
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
     """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
@@ -104,17 +107,40 @@ def merged_folder(target: Path) -> Iterator[Path]:
 
 
 def _must_stay(folder: Path) -> bool:
-    """Whether no other folder can take a folder's place.
+    """Whether no other folder can take a folder's place, with other names of the files in it.
 
-    Nothing may be made beside it, somebody works in it, or it holds another file system or what may not be
-    read or removed.
+    Nothing may be made beside it, there are no links, somebody works in it, or it holds another file system,
+    what is another user's or may not be read or removed, or MOST_LINKED files and more.
     """
     if not os.access(folder.parent, os.W_OK | os.X_OK) or Path.cwd().is_relative_to(folder):
         return True
-    device, may = folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
-    return any(
-        os.stat(place).st_dev != device or not os.access(place, may) for place, _, _ in os.walk(folder)
-    )
+    if not _has_links(folder):
+        return True
+    count, device, may = 0, folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
+    users = {os.geteuid()} if hasattr(os, "geteuid") and os.geteuid() else None
+    for place, _, files in os.walk(folder):
+        if os.stat(place).st_dev != device or not os.access(place, may):
+            return True
+        count += len(files)
+        if count >= MOST_LINKED:
+            return True
+        if users and not users.issuperset(os.lstat(os.path.join(place, name)).st_uid for name in files):
+            return True
+    return False
+
+
+def _has_links(folder: Path) -> bool:
+    """Whether a file beside a folder can have two names."""
+    probe, other = (folder.with_name(hidden_name(folder, "part")) for _ in range(2))
+    try:
+        probe.touch(exist_ok=False)
+        os.link(probe, other)
+    except (OSError, NotImplementedError):
+        return False
+    finally:
+        for file in (probe, other):
+            file.unlink(missing_ok=True)
+    return True
 
 
 @contextmanager

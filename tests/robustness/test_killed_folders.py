@@ -99,6 +99,32 @@ def test_the_folder_that_one_works_in_stays_that_folder(
     assert sorted(os.listdir(tmp_path / "out")) == ["0000.png", "0001.png", "0002.png", "0003.png", "mine"]
 
 
+@pytest.mark.parametrize("why", ["no links", "many files", "another file system"])
+def test_pictures_go_one_after_another_where_the_folder_must_stay(
+    tmp_path: Path, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder's other files are not copied, nor is another file system taken apart."""
+    old = old_pictures(tmp_path / "out")
+    number = (tmp_path / "out").stat().st_ino
+    if why == "no links":
+
+        def refuse(*_: object, **__: object) -> None:
+            raise PermissionError("no links here")
+
+        monkeypatch.setattr(os, "link", refuse)
+    elif why == "many files":
+        monkeypatch.setattr(atomic_files, "MOST_LINKED", len(old))
+    else:
+        other, walk = tmp_path / "out" / "mine", os.stat
+        elsewhere = os.stat_result((0o40755, 1, 99, 1, 0, 0, 0, 0, 0, 0))
+        monkeypatch.setattr(os, "stat", lambda p, **k: elsewhere if p == str(other) else walk(p, **k))
+    replace_pictures(tmp_path / "out")
+    monkeypatch.undo()
+    assert (tmp_path / "out").stat().st_ino == number
+    assert files_of(tmp_path / "out") == old | dict.fromkeys(NAMES, b"new")
+    assert os.listdir(tmp_path) == ["out"]
+
+
 def test_pictures_that_do_not_fit_leave_the_old_ones(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
