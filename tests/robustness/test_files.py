@@ -51,7 +51,7 @@ FOUND = {
     "tif": (489,),
     "sog": (295,),
     "glb": (284,),
-    "poses, photos.json": (687, 852),
+    "poses, photos.json": (687, 852, 5648),
     "poses, database.db": (7496,),
     "training, voxels": (8, 18, 43),
     "training, splats": (14, 140, 334, 383),

@@ -27,6 +27,9 @@ from cagefield.leftovers import hidden_name, remove_leftovers
 
 _VERSION = 1
 
+_LONGEST = 1 << 20
+"""Pixels of a photo's side: none is longer. Its square is above all focal lengths."""
+
 
 def work_folder(target: Path) -> Path:
     """The folder beside `target` that an interrupted run leaves."""
@@ -131,10 +134,8 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
         whole = all(
             _is_within(photo.name)
             and photo.path.is_file()
-            and isinstance(photo.width, int)
-            and isinstance(photo.height, int)
-            and min(photo.width, photo.height) > 0
-            and isinstance(photo.focal, (int, float, type(None)))
+            and all(isinstance(side, int) and 0 < side <= _LONGEST for side in (photo.width, photo.height))
+            and (photo.focal is None or 0.0 < photo.focal <= _LONGEST**2)
             and isinstance(photo.sharpness, (int, float))
             and isinstance(photo.alpha, bool)
             for photo in photos
