@@ -34,3 +34,5 @@ NEED_TORCH = (
     "splatfacto .ckpt, old",
     "training, nerf",
 )
+
+NEED_OPENSSL = ("certificate",)
