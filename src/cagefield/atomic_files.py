@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cagefield.exchange import exchanged
-from cagefield.leftovers import hidden_name, put_aside, remove_leftovers
+from cagefield.leftovers import hidden_name, is_hidden, put_aside, remove_leftovers
 
 MOST_LINKED = 100_000
 """Files of a folder that another one takes over, at most: they get other names there."""
@@ -151,8 +151,12 @@ def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]
     in the new folder, which has its rights, when it takes its place. After a failure `target` is what it was.
     Where the system can exchange two names at once there is a whole folder at `target` at every moment; else
     `recover_folder`, which whoever calls this has called, puts back what an end between two renames left. An
-    OSError about the new folder, or about none (a full disk), names `target`.
+    OSError about the new folder, or about none (a full disk), names `target`. A `target` that is itself such
+    an empty folder beside another one, which removes it, is filled as it is.
     """
+    if is_hidden(target) and target.is_dir() and not any(target.iterdir()):
+        yield target
+        return
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_leftovers(target)
     draft, retired = (target.with_name(hidden_name(target, role)) for role in ("new", "old"))

@@ -31,6 +31,11 @@ def hidden_name(target: Path, role: str) -> str:
     return f".{_cut(target.name)}.{role}-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
 
 
+def is_hidden(path: Path) -> bool:
+    """Whether this is such a name."""
+    return _MARK.fullmatch(path.name) is not None
+
+
 def is_abandoned(path: Path) -> bool:
     """Whether a hidden name is of a program on this machine that has ended."""
     found = _MARK.fullmatch(path.name)
