@@ -52,6 +52,14 @@ def test_the_users_own_files_are_kept(
     assert list(tmp_path.iterdir()) == [target]
 
 
+def test_a_folder_that_is_to_replace_another_has_none_beside_it(tmp_path: Path) -> None:
+    """`make-scene` writes photos into such a folder: a kill leaves one hidden name, known to the next run."""
+    with replaced_folder(tmp_path / "out", ()) as outer, replaced_folder(outer, ()) as inner:
+        (inner / "photo").write_text("new")
+        assert list(tmp_path.iterdir()) == [outer]
+    assert files_of(tmp_path) == {"out/photo": b"new"} and os.listdir(tmp_path) == ["out"]
+
+
 _KILLED = textwrap.dedent("""
     import os, shutil, signal, sys
     from pathlib import Path
@@ -136,7 +144,8 @@ def test_recovering_takes_the_newest_whole_folder(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
         os.utime(tmp_path / name, (n, n))
     whole = {".out.old-1", ".out.old-2"}
-    assert recover_folder(tmp_path / "out", lambda f: f.name in whole) == tmp_path / ".out.old-2"
+    with pytest.warns(UserWarning, match="it is back"):
+        assert recover_folder(tmp_path / "out", lambda f: f.name in whole) == tmp_path / ".out.old-2"
     assert recover_folder(tmp_path / "out", lambda f: True) is None
     assert sorted(f.name for f in tmp_path.iterdir()) == [".other.old-4", ".out.old-1", ".out.old-3", "out"]
 

@@ -52,7 +52,8 @@ def test_a_folder_that_was_put_aside_is_of_exactly_one_name(
     (tmp_path / name).mkdir()
     remove_leftovers(tmp_path / name, inside=True)
     assert folder.exists()
-    assert recover_folder(tmp_path / other, lambda f: True) == folder
+    with pytest.warns(UserWarning, match="it is back"):
+        assert recover_folder(tmp_path / other, lambda f: True) == folder
     assert (tmp_path / other / "mine.txt").read_text() == "mine"
 
 
@@ -61,8 +62,9 @@ def test_what_is_of_a_name_goes_once_something_is_there(tmp_path: Path, ended: s
     target = tmp_path / name
     aside = left(target, "old", ended)
     autosave = left(tmp_path / f".{name}.cagefield-autosave.json", "part", ended)
+    training = left(tmp_path / f"{name}.training", "part", ended)
     remove_leftovers(target)
-    assert aside.exists() and not autosave.exists()
+    assert aside.exists() and not autosave.exists() and not training.exists()
     left(target, "new", ended)
     target.mkdir()
     remove_leftovers(target)
@@ -91,4 +93,5 @@ def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
     remove_leftovers(target)
     target.rmdir()
     monkeypatch.setattr(leftovers, "UNTOUCHED", -1.0)
-    assert recover_folder(target, lambda f: True) == folder
+    with pytest.warns(UserWarning, match="it is back"):
+        assert recover_folder(target, lambda f: True) == folder

@@ -1,18 +1,20 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
 python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
-    [--step 1] [--only NAME ...] [--out FILE.md]
+    [--step 1] [--writes] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
-wanted, and at random moments. Editors (`cagefield view`) are killed while a page sends changes, saves and
-renders a video; what the page was told is compared with what the next editor has. About an hour of one
-processor.
+wanted, and at random moments; with --writes in the middle of every write, half of whose bytes are then in
+the file. Editors (`cagefield view`) are killed while a page sends changes, saves and renders a video, or
+pictures; what the page was told is compared with what the next editor has. About an hour of one processor.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import random
+import subprocess
 import sys
 import tempfile
 import threading
@@ -26,11 +28,13 @@ from cagefield.benchmarking.machine import cpu_model
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
-import kill_commands  # noqa: E402
+import kill_command  # noqa: E402
 import kill_points  # noqa: E402
 import kills  # noqa: E402
+import write_points  # noqa: E402
 
 from cagefield import Scene  # noqa: E402
+from cagefield.rendering.images import read_image  # noqa: E402
 from cagefield.server.editor.persistence import SceneStore  # noqa: E402
 from cagefield.server.editor.session import Session  # noqa: E402
 from editor_server import PageClient, editor_server, page  # noqa: E402
@@ -43,6 +47,7 @@ class Told:
     changes: int = 0
     saves: int = 0
     videos: int = 0
+    pictures: int = 0
 
 
 def main() -> None:
@@ -53,9 +58,17 @@ def main() -> None:
     parser.add_argument("--slow", type=int, default=10, help="the same of each command with kernels")
     parser.add_argument("--servers", type=int, default=10)
     parser.add_argument("--step", type=int, default=1, help="kills at every such call only")
+    parser.add_argument(
+        "--writes", action="store_true", help="kills in the middle of writes, of files' content"
+    )
     parser.add_argument("--only", nargs="*", default=None)
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
+    if options.writes and not write_points.is_loaded():
+        if reason := write_points.why_not():
+            parser.error(reason)
+        command = [sys.executable, *sys.argv]
+        sys.exit(subprocess.run(command, env=os.environ | write_points.preloading()).returncode)
     rows, everything = [], []
     for name in kills.ALL if options.only is None else options.only:
         found = kills.Killed()
@@ -79,12 +92,12 @@ def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -
     """Kills a command at all its calls, whose number is returned, and at random."""
     command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
     with tempfile.TemporaryDirectory() as folder:
-        calls, seconds = kills.calls_of(name, Path(folder))
+        calls, seconds = kills.calls_of(name, Path(folder), writes=options.writes)
     points = [*range(1, calls + 1, options.step)] * (1 if slow else options.rounds)
     random.Random(name).shuffle(points)
     for at in points:
         with tempfile.TemporaryDirectory() as folder:
-            kills.kill(command, name, Path(folder), at, found)
+            kills.kill(command, name, Path(folder), at, found, writes=options.writes)
     for after in kills.moments(options.slow if slow else options.random, seconds, len(name)):
         with tempfile.TemporaryDirectory() as folder:
             kills.kill(command, name, Path(folder), 0, found, after)
@@ -99,8 +112,10 @@ def _kill_editor(folder: Path, number: int, found: kills.Killed, told: Told) -> 
         edit = _begin(client, hello)
         if number % 2:  # kernels are there, and ffmpeg soon
             client.final()
-        threading.Timer(random.Random(number).uniform(0.0, 4.0), server.kill).start()
-        kept, saved = _edit_until_killed(client, edit, told)
+        renders = number % 4 == 3  # the video comes first
+        after = random.Random(number).uniform(0.0, 16.0 if renders else 4.0)
+        threading.Timer(after, server.kill).start()
+        kept, saved = (_render_until_killed if renders else _edit_until_killed)(client, edit, told)
         server.process.wait(30)
         # The editor's own process is known, and has ended; its video goes with it.
         left, seconds = kill_points.outliving(others, kill_points.STAYS)
@@ -114,7 +129,7 @@ def _kill_editor(folder: Path, number: int, found: kills.Killed, told: Told) -> 
 def _begin(client: PageClient, hello: dict[str, object]) -> int:
     """An edit, and a path whose video takes long: its number."""
     client.look_from(hello)
-    client.send("load_edits", text=kill_commands.EDITS)
+    client.send("load_edits", text=kill_command.EDITS)
     edit: int = client.state(lambda state: bool(state["edits"]))["edits"][0]["id"]
     pose = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0]
     keys = [{"c2w": pose, "fov_y_deg": fov, "seconds": 4.0} for fov in (40.0, 44.0)]
@@ -143,9 +158,22 @@ def _edit_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int, 
     return kept, saved
 
 
+def _render_until_killed(client: PageClient, edit: int, told: Told) -> tuple[int, int]:
+    """Renders the same pictures over and over: pages that wait for nothing leave time for that."""
+    try:
+        while True:
+            client.send("render", what="test_views", out="views", width=32, height=24, overwrite=True)
+            client.until(lambda m: m["type"] == "job" and m["state"] != "running")
+            told.pictures += 1
+    except Exception:  # the socket has gone
+        return 0, 0
+
+
 def _problem(folder: Path, kept: int, saved: int) -> str | None:
     """What the next editor does not find; it then saves what it has."""
     try:
+        for picture in (folder / "views").glob("*.png"):
+            read_image(picture)
         scene = Scene.open(folder / "scene")
         store = SceneStore(scene, folder / "scene")
         store.lock()
@@ -178,11 +206,12 @@ def _sum(every: list[kills.Killed]) -> kills.Killed:
 
 def _table(rows: list[str], found: kills.Killed, told: Told, options: argparse.Namespace) -> str:
     command = f"--rounds {options.rounds} --random {options.random} --slow {options.slow}"
-    command += f" --servers {options.servers}"
+    command += f" --servers {options.servers}" + " --writes" * options.writes
     return f"""# Kills
 
 Calls: those that change a name or open a file to write, of the whole command; each is a kill point, and then
-there are random moments. Lost: what the command, or the editor, had said was done, or a file of the user's.
+there are random moments. With --writes they are writes, half of whose bytes are in the file. Lost: what the
+command, or the editor, had said was done, or a file of the user's.
 Unreadable: no scene, old or new, at its place. Left: hidden files after the same command has been run again.
 Outlived: kills after which a process that the killed one had started was there {kill_points.STAYS:g} s later;
 stayed: seconds that the last of them was there at most.
@@ -195,8 +224,9 @@ stayed: seconds that the last of them was there at most.
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 {chr(10).join(rows)}
 
-Whole editors draw, keep changes, save and render a video: pages had been told of {told.changes} changes and
-{told.saves} saves before the {found.kills} kills. Hidden there are files after the next save.
+Whole editors draw, keep changes, save and render a video; one in four renders pictures over its last ones, as
+often as it can. Pages had been told of {told.changes} changes, {told.saves} saves and {told.pictures} times
+pictures before the {found.kills} kills. Hidden there are files after the next save.
 """
 
 

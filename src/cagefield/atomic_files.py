@@ -5,12 +5,17 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import stat
+import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from cagefield.exchange import exchanged
-from cagefield.leftovers import hidden_name, put_aside, remove_leftovers
+from cagefield.leftovers import hidden_name, is_hidden, put_aside, remove_leftovers
+
+MOST_LINKED = 100_000
+"""Files of a folder that another one takes over, at most: they get other names there."""
 
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
@@ -75,12 +80,18 @@ def _naming(path: Path, hidden: Path) -> Iterator[None]:
 def merged_folder(target: Path) -> Iterator[Path]:
     """A folder to be filled with files that come into `target` together.
 
-    Where `target` holds something already, that is a hidden folder in it: on success its files take their
-    places, on failure they are removed, and `target` is what it was. Else it is `target` itself, not
-    made yet or empty, and what has been written stays.
+    Where `target` holds something already, that is a hidden folder beside it, which takes its place with all
+    that it held under other names (`replaced_folder`); after a failure `target` is what it was. Where it must
+    stay the folder that it is (`_must_stay`), the hidden folder is in it, and its files take their places one
+    after another. Else it is `target` itself, not made yet or empty, and what has been written stays.
     """
     if not target.exists() or not any(target.iterdir()):
         yield target
+        return
+    target = target.resolve()
+    if not _must_stay(target):
+        with replaced_folder(target, None) as draft:
+            yield draft
         return
     remove_leftovers(target, inside=True)
     draft = target / hidden_name(target, "new")
@@ -95,15 +106,57 @@ def merged_folder(target: Path) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def _must_stay(folder: Path) -> bool:
+    """Whether no other folder can take a folder's place, with other names of the files in it.
+
+    Nothing may be made beside it, there are no links, somebody works in it, or it holds another file system,
+    what is another user's or may not be read or removed, or MOST_LINKED files and more.
+    """
+    if not os.access(folder.parent, os.W_OK | os.X_OK) or Path.cwd().is_relative_to(folder):
+        return True
+    if not _has_links(folder):
+        return True
+    count, device, may = 0, folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
+    users = {os.geteuid()} if hasattr(os, "geteuid") and os.geteuid() else None
+    for place, _, files in os.walk(folder):
+        if os.stat(place).st_dev != device or not os.access(place, may):
+            return True
+        count += len(files)
+        if count >= MOST_LINKED:
+            return True
+        if users and not users.issuperset(os.lstat(os.path.join(place, name)).st_uid for name in files):
+            return True
+    return False
+
+
+def _has_links(folder: Path) -> bool:
+    """Whether a file beside a folder can have two names."""
+    probe, other = (folder.with_name(hidden_name(folder, "part")) for _ in range(2))
+    try:
+        probe.touch(exist_ok=False)
+        os.link(probe, other)
+    except (OSError, NotImplementedError):
+        return False
+    finally:
+        for file in (probe, other):
+            file.unlink(missing_ok=True)
+    return True
+
+
 @contextmanager
-def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
+def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]:
     """An empty folder beside `target` to be filled: takes its place on success, is removed on failure.
 
-    What `target` held under the names in `own` goes; other entries stand in the new folder when it takes its
-    place. After a failure `target` is what it was. Where the system can exchange two names at once there is
-    a whole folder at `target` at every moment; else `recover_folder` puts back what an end between two
-    renames left. An OSError about the new folder, or about none (a full disk), names `target`.
+    What `target` held under the names in `own`, None for those in the new folder, goes; other entries stand
+    in the new folder, which has its rights, when it takes its place. After a failure `target` is what it was.
+    Where the system can exchange two names at once there is a whole folder at `target` at every moment; else
+    `recover_folder`, which whoever calls this has called, puts back what an end between two renames left. An
+    OSError about the new folder, or about none (a full disk), names `target`. A `target` that is itself such
+    an empty folder beside another one, which removes it, is filled as it is.
     """
+    if is_hidden(target) and target.is_dir() and not any(target.iterdir()):
+        yield target
+        return
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_leftovers(target)
     draft, retired = (target.with_name(hidden_name(target, role)) for role in ("new", "old"))
@@ -112,16 +165,20 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
     try:
         with _naming(target, draft):
             yield draft
+            if own is None:
+                own = {entry.name for entry in draft.iterdir()}
             others = _others(target, own)
             for entry in others:
                 _linked(entry, draft / entry.name)
             if not target.exists():
                 draft.rename(target)
-            elif exchanged(draft, target):
-                retired = draft
             else:
-                target.rename(retired)
-                draft.rename(target)
+                draft.chmod(stat.S_IMODE(target.stat().st_mode))
+                if exchanged(draft, target):
+                    retired = draft
+                else:
+                    target.rename(retired)
+                    draft.rename(target)
     except BaseException:
         if retired is not draft:
             shutil.rmtree(draft, ignore_errors=True)
@@ -138,7 +195,8 @@ def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
 def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | None:
     """Puts back, where `target` is not there, the newest folder that an end between renames left beside it.
 
-    The name that it had is returned, None where there was nothing to do. `is_whole` says which folders count.
+    Says so in a warning. The name that it had is returned, None where there was nothing to do. `is_whole`
+    says which folders count.
     """
     if target.exists() or not target.parent.is_dir():
         return None
@@ -147,6 +205,10 @@ def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | Non
         return None
     newest = max(left, key=lambda folder: folder.stat().st_mtime)
     newest.rename(target)
+    warnings.warn(
+        f"{target} was left as {newest.name} by a program that was ended while it replaced it; it is back",
+        stacklevel=2,
+    )
     return newest
 
 

@@ -31,6 +31,11 @@ def hidden_name(target: Path, role: str) -> str:
     return f".{_cut(target.name)}.{role}-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
 
 
+def is_hidden(path: Path) -> bool:
+    """Whether this is such a name."""
+    return _MARK.fullmatch(path.name) is not None
+
+
 def is_abandoned(path: Path) -> bool:
     """Whether a hidden name is of a program on this machine that has ended."""
     found = _MARK.fullmatch(path.name)
@@ -56,13 +61,15 @@ def put_aside(target: Path) -> list[Path]:
 
 
 def remove_leftovers(target: Path, *, inside: bool = False) -> None:
-    """Removes what ended programs left beside `target`: for exactly it, its autosave and its work folder.
+    """Removes what ended programs left beside `target`: for exactly it, its autosave, training and work.
 
     With `inside` also what they were writing in the folder itself. A folder that one had put aside stays
     while there is nothing at `target`.
     """
     name = target.name
-    beside = {_cut(each) for each in (name, f".{name}.cagefield-autosave.json", f"{name}.work")}
+    beside = {
+        _cut(each) for each in (name, f".{name}.cagefield-autosave.json", f"{name}.work", f"{name}.training")
+    }
     for path in target.parent.glob(".*"):
         made = _MARK.fullmatch(path.name)
         if made is None or made[1] not in beside or not is_abandoned(path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -57,12 +56,7 @@ def recover(folder: Path) -> None:
 
     Says so in a warning. A scene that is there, and a folder that none was at, stay as they are.
     """
-    found = recover_folder(real_path(folder), is_scene)
-    if found is not None:
-        warnings.warn(
-            f"{folder} was left as {found.name} by a program that was ended while it replaced it; it is back",
-            stacklevel=2,
-        )
+    recover_folder(real_path(folder), is_scene)
 
 
 def is_scene(path: Path | str) -> bool:

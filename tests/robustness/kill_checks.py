@@ -5,10 +5,13 @@ Each check takes the folder of the work, and the last number that it said before
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 from cagefield import Scene
+
+Check = Callable[[Path, int], "str | None"]
 
 
 def scene_problem(folder: Path, said: int, name: str = "scene") -> str | None:
@@ -35,7 +38,7 @@ def new_problem(folder: Path, said: int) -> str | None:
     return scene_problem(folder, said, "new") or scene_problem(folder, 0)
 
 
-def file_problem(ending: str) -> Callable[[Path, int], str | None]:
+def file_problem(ending: str) -> Check:
     def problem(folder: Path, said: int) -> str | None:
         from cagefield.formats.splat_files import read_splats
 
@@ -61,21 +64,28 @@ def trained_problem(folder: Path, said: int) -> str | None:
         Scene.open(folder / "new")
     except Exception as error:
         return f"unreadable: {error}"
+    if said >= 1 and (folder / "new.training").exists():
+        return "lost: the training's end, its checkpoint is still there"
     return None
 
 
 def pictures_problem(folder: Path, said: int) -> str | None:
+    """What is wrong with pictures over old ones of 4 x 4 pixels: all old, or all new and 32 pixels wide."""
     from cagefield.rendering.images import read_image
 
-    pictures = sorted((folder / "out").glob("[0-9]*.png"))
-    if said >= 1 and len(pictures) != 3:
+    out = folder / "out"
+    if not (out / "mine" / "notes.txt").is_file():
+        return "lost: the user's file"
+    pictures = sorted(out.glob("[0-9]*.png"))
+    if len(pictures) != 3:
         return f"lost: {3 - len(pictures)} pictures"
     try:
-        for picture in pictures:
-            read_image(picture)
+        sizes = {max(read_image(picture).shape[:2]) for picture in pictures}
     except Exception as error:
         return f"unreadable: {error}"
-    return None
+    if sizes == {4} and said < 1:
+        return None
+    return None if sizes == {32} else f"lost: pictures {sorted(sizes)} pixels wide"
 
 
 def video_problem(folder: Path, said: int) -> str | None:
@@ -90,26 +100,106 @@ def video_problem(folder: Path, said: int) -> str | None:
     return None if count == 6 else f"unreadable: {count} frames of 6"
 
 
-def mesh_problem(folder: Path, said: int) -> str | None:
-    file = folder / "mesh.glb"
-    if not file.exists():
-        return "lost: the file" if said >= 1 else None
-    content = file.read_bytes()
-    whole = content[:4] == b"glTF" and int.from_bytes(content[8:12], "little") == len(content)
-    return None if whole else "unreadable: the file is cut off"
+def old_problem(name: str, check: Check) -> Check:
+    """The same of what has replaced an older file, or folder: it must be there, whatever was said."""
+
+    def problem(folder: Path, said: int) -> str | None:
+        return check(folder, 1) if (folder / name).exists() else f"lost: {name}"
+
+    return problem
 
 
-def photos_problem(folder: Path, said: int) -> str | None:
-    from cagefield import datasets
+def glb_problem(name: str) -> Check:
+    def problem(folder: Path, said: int) -> str | None:
+        file = folder / name
+        if not file.exists():
+            return "lost: the file" if said >= 1 else None
+        content = file.read_bytes()
+        whole = content[:4] == b"glTF" and int.from_bytes(content[8:12], "little") == len(content)
+        return None if whole else "unreadable: the file is cut off"
 
-    out = folder / "out"
-    if said < 1 and not (out / "transforms_train.json").exists():
+    return problem
+
+
+def _read_with(name: str, read: Callable[[Path], object]) -> Check:
+    def problem(folder: Path, said: int) -> str | None:
+        try:
+            read(folder / name)
+        except Exception as error:
+            return f"unreadable: {error}"
         return None
+
+    return problem
+
+
+def ply_problem(name: str) -> Check:
+    from cagefield.ply import read_ply
+
+    return _read_with(name, read_ply)
+
+
+def picture_problem(name: str) -> Check:
+    from cagefield.rendering.images import read_image
+
+    return _read_with(name, read_image)
+
+
+def json_problem(name: str) -> Check:
+    return _read_with(name, lambda path: json.loads(path.read_text()))
+
+
+def page_folder_problem(name: str) -> Check:
+    """A page in a folder: whole scripts and what they load."""
+
+    def read(folder: Path) -> None:
+        names = {file.name for file in folder.iterdir()}
+        page = (folder / "index.html").read_text()
+        if not page.rstrip().endswith("</html>") or len(names) < 4:
+            raise ValueError(f"the page is cut off, {sorted(names)}")
+
+    return _read_with(name, read)
+
+
+def photos_problem(name: str) -> Check:
+    def problem(folder: Path, said: int) -> str | None:
+        from cagefield import datasets
+        from cagefield.rendering.images import read_image
+
+        out = folder / name
+        if said < 1 and not any(
+            (out / mark).exists() for mark in ("transforms_train.json", "transforms.json")
+        ):
+            return None
+        try:
+            found = datasets.load_dataset(out)
+            for view in (*found.train, *found.test):
+                read_image(view.image_path)
+        except Exception as error:
+            return f"unreadable: {error}"
+        return None
+
+    return problem
+
+
+def demo_problem(folder: Path, said: int) -> str | None:
+    """What is wrong with the results of `demo`: scenes, photos, pictures, the video of 2 frames."""
+    import imageio.v3 as imageio
+
+    from cagefield.edits import load_edits
+    from cagefield.rendering.images import read_image
+
+    out = folder / "demo"
     try:
-        datasets.load_dataset(out)
+        Scene.open(out / "scene")
+        if len(Scene.open(out / "edited").edits) != len(load_edits(out / "edits.yaml")):
+            return "lost: edits of the demo"
+        for name in ("before", "after", "before_after"):
+            read_image(out / f"{name}.png")
+        if len(imageio.imread(out / "turntable.mp4")) != 2:
+            return "unreadable: the video is cut off"
     except Exception as error:
         return f"unreadable: {error}"
-    return None
+    return photos_problem("demo/photos")(folder, 1)
 
 
 def poses_problem(folder: Path, said: int) -> str | None:

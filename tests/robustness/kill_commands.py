@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 from kill_checks import (
     file_problem,
-    mesh_problem,
+    glb_problem,
     new_problem,
     photos_problem,
     pictures_problem,
@@ -24,88 +22,43 @@ from kill_checks import (
     trained_problem,
     video_problem,
 )
+from kill_command import EDITS, Command, cli, put_scene, put_splats, renamed
+from kill_lines import LINES, SLOW_LINES
 from kill_points import Say
 
 from cagefield import Scene
+from cagefield.rendering.images import write_png
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from posed_photos import photos_alone
-from scenes import ball_scene
-from splat_scenes import ball_of_splats
-
-EDITS = """edits:
-  - name: moved
-    adjustment: discrete
-    inner: {center: [0, 0, 0], size: 1}
-    operations: [{translate: [1, 0, 0]}]
-"""
-
-
-@dataclass(frozen=True)
-class Command:
-    """What is killed: `work` runs in a folder that `make` has filled; `check` says what is wrong afterwards.
-
-    `work` says numbers of what it has promised; `check` is given the last one. A user then does the same once
-    more, after which `check` must pass too, and nothing hidden be left.
-    """
-
-    make: Callable[[Path], None]
-    work: Callable[[Path, Say], None]
-    check: Callable[[Path, int], str | None]
-
-
-def _cli(*arguments: object) -> None:
-    from cagefield.cli import main
-
-    said = io.StringIO()
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
-        code = main([str(argument) for argument in arguments])
-    if code != 0:
-        raise RuntimeError(f"exit code {code}: {said.getvalue().splitlines()[-1:]}")
-
-
-def _make(folder: Path) -> None:
-    ball_scene().save(folder / "scene")
-    (folder / "scene" / "notes.txt").write_text("mine")
-    (folder / "e.yaml").write_text(EDITS)
-
-
-def _make_splats(folder: Path) -> None:
-    from cagefield.formats.splat_files import write_splats
-
-    _make(folder)
-    shutil.rmtree(folder / "scene")
-    Scene(ball_of_splats(50), cameras=ball_scene().cameras).save(folder / "scene")
-    (folder / "scene" / "notes.txt").write_text("mine")
-    write_splats(ball_of_splats(50), folder / "x.ply")
 
 
 def _edit(folder: Path, say: Say) -> None:
-    _cli("edit", folder / "scene", folder / "e.yaml", "--overwrite")
+    cli("edit", folder / "scene", folder / "e.yaml", "--overwrite")
     say(1)
 
 
 def _edit_new(folder: Path, say: Say) -> None:
-    _cli("edit", folder / "scene", folder / "e.yaml", "-o", folder / "new", "--overwrite")
+    cli("edit", folder / "scene", folder / "e.yaml", "-o", folder / "new", "--overwrite")
     say(1)
 
 
 def _import(folder: Path, say: Say) -> None:
-    _cli("import", folder / "x.ply", "-o", folder / "scene", "--overwrite")
+    cli("import", folder / "x.ply", "-o", folder / "scene", "--overwrite")
     say(1)
 
 
 def _export(ending: str) -> Callable[[Path, Say], None]:
     def work(folder: Path, say: Say) -> None:
         out = folder / f"out{ending}"
-        _cli("export", folder / "scene", "-o", out, *(["--overwrite"] if out.exists() else []))
+        cli("export", folder / "scene", "-o", out, *(["--overwrite"] if out.exists() else []))
         say(1)
 
     return work
 
 
 def _convert(folder: Path, say: Say) -> None:
-    _cli(
+    cli(
         "convert",
         folder / "x.ply",
         folder / "out.spz",
@@ -160,44 +113,51 @@ def _save_as(folder: Path, say: Say) -> None:
 
 
 def _train(folder: Path, say: Say) -> None:
-    _cli(
-        "train", folder / "photos", "-o", folder / "new", "--steps", "4", "--resolution", "16", "--overwrite"
-    )
+    cli("train", folder / "photos", "-o", folder / "new", "--steps", "4", "--resolution", "16", "--overwrite")
     say(1)
 
 
 def _make_photos(folder: Path) -> None:
-    from cagefield.datasets.procedural import make_scene
+    from cagefield.datasets.procedural import make_scene as photograph
 
-    _make(folder)
-    make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
+    put_scene(folder)
+    photograph("chair", folder / "photos", views=4, size=16, test_views=1)
+
+
+def _make_pictures(folder: Path) -> None:
+    """A scene, and pictures of another size with what else the user has there."""
+    put_scene(folder)
+    (folder / "out" / "mine").mkdir(parents=True)
+    for number in range(3):
+        write_png(folder / "out" / f"{number:04d}.png", np.full((4, 4, 3), 99, np.uint8))
+    (folder / "out" / "mine" / "notes.txt").write_text("mine")
 
 
 def _render(folder: Path, say: Say) -> None:
-    _cli("render", folder / "scene", "-o", folder / "out", "--turntable", "3", "--size", "32", "--overwrite")
+    cli("render", folder / "scene", "-o", folder / "out", "--turntable", "3", "--size", "32", "--overwrite")
     say(1)
 
 
 def _render_video(folder: Path, say: Say) -> None:
     arguments = ("--turntable", "6", "--size", "96", "--overwrite")
-    _cli("render", folder / "scene", "-o", folder / "out.mp4", *arguments)
+    cli("render", folder / "scene", "-o", folder / "out.mp4", *arguments)
     say(1)
 
 
 def _bake(folder: Path, say: Say) -> None:
     arguments = ("--resolution", "16", "--compare", "0", "--overwrite")
-    _cli("bake", folder / "scene", "-o", folder / "new", *arguments)
+    cli("bake", folder / "scene", "-o", folder / "new", *arguments)
     say(1)
 
 
 def _mesh(folder: Path, say: Say) -> None:
-    _cli("export", folder / "scene", "-o", folder / "mesh.glb", "--as", "mesh", "--overwrite")
+    cli("export", folder / "scene", "-o", folder / "mesh.glb", "--as", "mesh", "--overwrite")
     say(1)
 
 
 def _make_scene(folder: Path, say: Say) -> None:
     arguments = ("--views", "2", "--test-views", "1", "--size", "16", "--overwrite")
-    _cli("make-scene", "chair", "-o", folder / "out", *arguments)
+    cli("make-scene", "chair", "-o", folder / "out", *arguments)
     say(1)
 
 
@@ -220,30 +180,38 @@ def _poses(folder: Path, say: Say) -> None:
     from cagefield.datasets import matching
 
     matching._FEW = 3  # six pairs are matched in two processes, as those of many photos are
-    _cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
+    cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
     say(1)
 
 
+_pictures = Command(_make_pictures, _render, pictures_problem)
+_posing = Command(_make_posed, _poses, poses_problem)
+
 COMMANDS: dict[str, Command] = {
-    "edit --overwrite": Command(_make, _edit, scene_problem),
-    "edit -o": Command(_make, _edit_new, new_problem),
-    "import --overwrite": Command(_make_splats, _import, scene_problem),
-    "export .ply": Command(_make_splats, _export(".ply"), file_problem(".ply")),
-    "export .spz": Command(_make_splats, _export(".spz"), file_problem(".spz")),
-    "export .html": Command(_make_splats, _export(".html"), file_problem(".html")),
-    "convert": Command(_make_splats, _convert, file_problem(".spz")),
-    "changes and saves": Command(_make, _session, _session_problem),
-    "save as": Command(_make, _save_as, new_problem),
+    "edit --overwrite": Command(put_scene, _edit, scene_problem),
+    "edit -o": Command(put_scene, _edit_new, new_problem),
+    "import --overwrite": Command(put_splats, _import, scene_problem),
+    "export .ply": Command(put_splats, _export(".ply"), file_problem(".ply")),
+    "export .spz": Command(put_splats, _export(".spz"), file_problem(".spz")),
+    "export .html": Command(put_splats, _export(".html"), file_problem(".html")),
+    "convert": Command(put_splats, _convert, file_problem(".spz")),
+    "changes and saves": Command(put_scene, _session, _session_problem),
+    "save as": Command(put_scene, _save_as, new_problem),
+    "edit --overwrite, renames": renamed(Command(put_scene, _edit, scene_problem)),
+    **LINES,
 }
 """What writes without kernels: a process for each kill takes a tenth of a second."""
 
 SLOW_COMMANDS: dict[str, Command] = {
     "train": Command(_make_photos, _train, trained_problem),
-    "render, pictures": Command(_make, _render, pictures_problem),
-    "render .mp4": Command(_make, _render_video, video_problem),
-    "bake": Command(_make_splats, _bake, trained_problem),
-    "export --as mesh": Command(_make, _mesh, mesh_problem),
-    "make-scene": Command(_make, _make_scene, photos_problem),
-    "poses": Command(_make_posed, _poses, poses_problem),
+    "render, pictures": _pictures,
+    "render .mp4": Command(put_scene, _render_video, video_problem),
+    "bake": Command(put_splats, _bake, trained_problem),
+    "export --as mesh": Command(put_scene, _mesh, glb_problem("mesh.glb")),
+    "make-scene": Command(put_scene, _make_scene, photos_problem("out")),
+    "poses": _posing,
+    "poses, renames": renamed(_posing, "data"),
+    "render, pictures, renames": renamed(_pictures, "out"),
+    **SLOW_LINES,
 }
 """Others: seconds for each kill."""

@@ -1,5 +1,7 @@
 """Programs that are killed where they write: at the n-th call that changes something, or at any moment.
 
+Or in the middle of the n-th write, with half of its bytes in the file (`write_points`).
+
 A process is forked for each kill, so that what it imports is imported once. Python tells of every such call
 (`sys.addaudithook`) just before it is made; the call after it is the next kill point. What a killed process
 had started becomes a child of this one (Linux), which sees how long that goes on.
@@ -21,6 +23,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import write_points
 
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 _EVENTS = (
@@ -49,7 +53,7 @@ class Ended:
 
     killed: bool
     calls: int
-    """Calls that it made which change something in its folder."""
+    """Calls that it made which change something in its folder, or its writes."""
     said: int
     """The last number that it said, or -1."""
     outlived: int = 0
@@ -58,31 +62,34 @@ class Ended:
     """Seconds that the last of them was there."""
 
 
-def forked(work: Callable[[Say], None], folder: Path, at: int, after: float | None = None) -> Ended:
+def forked(
+    work: Callable[[Say], None], folder: Path, at: int, after: float | None = None, *, writes: bool = False
+) -> Ended:
     """The end of work in a forked process.
 
-    It is killed at call number `at` that changes something in `folder`, or by its parent `after` seconds.
+    It is killed at call number `at` that changes something in `folder`, with `writes` in the middle of that
+    write, or by its parent `after` seconds.
     """
     reading, writing = os.pipe()
     others = adopted()
     process = os.fork()
     if process == 0:
         os.close(reading)
-        run(work, folder, at, writing)
+        run(work, folder, at, writing, writes)
     os.close(writing)
     return _waited(process, reading, after, others)
 
 
-def started(name: str, folder: Path, at: int, after: float | None = None) -> Ended:
+def started(name: str, folder: Path, at: int, after: float | None = None, *, writes: bool = False) -> Ended:
     """The same of a command with kernels, whose threads no forked process has: in a new one."""
     reading, writing = os.pipe()
     others = adopted()
     script = str(Path(__file__).with_name("killed_command.py"))
     paths = os.pathsep.join((*sys.path, str(Path(__file__).resolve().parent.parent)))
     process = subprocess.Popen(
-        [sys.executable, script, name, str(folder), str(at), str(writing)],
+        [sys.executable, script, name, str(folder), str(at), str(writing), str(int(writes))],
         pass_fds=[writing],
-        env=os.environ | {"PYTHONPATH": paths},
+        env=os.environ | {"PYTHONPATH": paths} | (write_points.preloading() if writes else {}),
     )
     os.close(writing)
     ended = _waited(process.pid, reading, after, others)
@@ -162,7 +169,7 @@ def _kill(process: int) -> None:
         os.kill(process, signal.SIGKILL)
 
 
-def run(work: Callable[[Say], None], folder: Path, at: int, writing: int) -> None:
+def run(work: Callable[[Say], None], folder: Path, at: int, writing: int, writes: bool = False) -> None:
     """In the process that is killed: never returns."""
     code = 1
     try:
@@ -178,10 +185,15 @@ def run(work: Callable[[Say], None], folder: Path, at: int, writing: int) -> Non
             if calls == at:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        sys.addaudithook(hook)
+        if writes:
+            write_points.arm(folder, at)
+        else:
+            sys.addaudithook(hook)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             work(lambda number: os.write(writing, struct.pack("<bq", 1, number)) and None)
+        if writes:
+            os.write(writing, struct.pack("<bq", 0, write_points.count()))
         code = 0
     except BaseException:
         import traceback

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from kill_commands import COMMANDS, SESSION_STEPS, SLOW_COMMANDS, Command
 from kill_points import Ended, forked, started
+from write_points import is_loaded
 
 ALL = {**COMMANDS, **SLOW_COMMANDS}
 
@@ -49,11 +50,21 @@ class Killed:
 
 
 def kill(
-    command: Command, name: str, folder: Path, at: int, found: Killed, after: float | None = None
+    command: Command,
+    name: str,
+    folder: Path,
+    at: int,
+    found: Killed,
+    after: float | None = None,
+    *,
+    writes: bool = False,
 ) -> bool:
-    """One kill in an empty folder; False where the command came to its end before. Counts what is wrong."""
+    """One kill in an empty folder; False where the command came to its end before. Counts what is wrong.
+
+    At call `at`, `after` seconds, or with `writes` in the middle of write `at`.
+    """
     command.make(folder)
-    ended = _process(command, name, folder, at, after)
+    ended = _process(command, name, folder, at, after, writes)
     if not ended.killed:
         return False
     with warnings.catch_warnings():
@@ -66,7 +77,8 @@ def kill(
             else:
                 problem = command.check(folder, 2 * SESSION_STEPS if name == "changes and saves" else 1)
                 problem = None if problem is None else f"{problem} (after the next start)"
-    where = f"{name}, call {at}" if after is None else f"{name}, after {after:.3f} s"
+    where = f"{name}, {'write' if writes else 'call'} {at}"
+    where = where if after is None else f"{name}, after {after:.3f} s"
     found.count(where, ended, problem, hidden(folder))
     return True
 
@@ -92,18 +104,20 @@ def _warm() -> None:
     parse(["info", "scene"])
 
 
-def _process(command: Command, name: str, folder: Path, at: int, after: float | None = None) -> Ended:
-    if name in SLOW_COMMANDS:
-        return started(name, folder, at, after)
-    return forked(lambda say: command.work(folder, say), folder, at, after)
+def _process(
+    command: Command, name: str, folder: Path, at: int, after: float | None = None, writes: bool = False
+) -> Ended:
+    if name in SLOW_COMMANDS or (writes and not is_loaded()):
+        return started(name, folder, at, after, writes=writes)
+    return forked(lambda say: command.work(folder, say), folder, at, after, writes=writes)
 
 
-def calls_of(name: str, folder: Path) -> tuple[int, float]:
-    """(calls that the command makes, seconds that it takes) in an empty folder."""
+def calls_of(name: str, folder: Path, *, writes: bool = False) -> tuple[int, float]:
+    """(calls that the command makes, or its writes, seconds that it takes) in an empty folder."""
     _warm()
     ALL[name].make(folder)
     begun = time.monotonic()
-    calls = _process(ALL[name], name, folder, 0).calls
+    calls = _process(ALL[name], name, folder, 0, writes=writes).calls
     return calls, time.monotonic() - begun
 
 

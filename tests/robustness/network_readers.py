@@ -52,12 +52,23 @@ nerf:
 """
 
 
+def _import_networks(folder: Path) -> None:
+    """What `cagefield import` makes of a checkpoint, but for the baking."""
+    from cagefield.formats.nerf_pytorch import read_checkpoint as read
+    from cagefield.formats.nerf_pytorch_config import Settings
+    from cagefield.formats.nerf_pytorch_import import import_nerf
+
+    import_nerf(read(folder / "a.tar"), Settings(), None, None)
+
+
 def _make_training(folder: Path) -> None:
     write_checkpoint(folder / "a.training", "x", {"step": 3}, {"noise": np.arange(600.0).reshape(20, 30)})
 
 
 NETWORK_READERS: dict[str, Reader] = {
     "nerf .tar, new": Reader(_torch_file(_YENCHENLIN, False), _read_networks, {"a.tar": "zip"}),
+    "nerf .tar, old": Reader(_torch_file(_YENCHENLIN, True), _read_networks, {"a.tar": "bytes"}),
+    "nerf .tar, imported": Reader(_torch_file(_YENCHENLIN, False), _import_networks, {"a.tar": "zip"}),
     "nerf .ckpt, new": Reader(_torch_file(_KRRISH94, False), _read_networks, {"a.tar": "zip"}),
     "nerf .ckpt, old": Reader(_torch_file(_KRRISH94, True), _read_networks, {"a.tar": "bytes"}),
     "nerf config": Reader(

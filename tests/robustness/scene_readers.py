@@ -127,5 +127,6 @@ SCENE_READERS: dict[str, Reader] = {
     "camera path": Reader(
         _make_path, _read_path, {"path.json": "json", "dataparser_transforms.json": "json"}
     ),
+    "dataparser_transforms": Reader(_make_path, _read_path, {"dataparser_transforms.json": "json"}),
     "keyframes": Reader(_make_path, lambda folder: load_keys(folder / "path.json"), {"path.json": "json"}),
 }

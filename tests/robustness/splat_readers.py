@@ -51,6 +51,15 @@ def _make_sog_folder(folder: Path) -> None:
         archive.extractall(folder / "sog")
 
 
+def _make_old_checkpoint(folder: Path) -> None:
+    """splatfacto's as older versions of PyTorch wrote it."""
+    import torch
+
+    (folder / "new.ckpt").write_bytes(sample_files(random_splats(120), folder)[".ckpt"])
+    content = torch.load(folder / "new.ckpt", weights_only=True)
+    torch.save(content, folder / "a.ckpt", _use_new_zipfile_serialization=False)
+
+
 SPLAT_READERS: dict[str, Reader] = {
     "ply": _splat_reader(".ply", "ply"),
     "text ply": _splat_reader("-text.ply", "ply"),
@@ -72,5 +81,10 @@ SPLAT_READERS: dict[str, Reader] = {
         {"sog/meta.json": "json", "sog/means_l.webp": "bytes", "sog/shN_labels.webp": "bytes"},
     ),
     "glb": _splat_reader(".glb", "glb"),
+    "splatfacto .ckpt, old": Reader(
+        _make_old_checkpoint,
+        lambda folder: import_splats(read_splats(folder / "a.ckpt")) and None,
+        {"a.ckpt": "bytes"},
+    ),
     "splatfacto .ckpt": _splat_reader(".ckpt", "zip"),
 }

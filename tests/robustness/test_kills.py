@@ -8,11 +8,19 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
+import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
+import write_points
 from kill_points import Ended, Say, adopted, children, forked
 from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
+
+from cagefield.leftovers import hidden_name
+from cagefield.rendering.images import write_png
+from scenes import files_of
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="this system forks no processes"),
@@ -21,7 +29,15 @@ pytestmark = [
 
 
 @pytest.mark.parametrize(
-    ("name", "least", "step"), [("edit --overwrite", 15, 3), ("changes and saves", 60, 9), ("save as", 15, 5)]
+    ("name", "least", "step"),
+    [
+        ("edit --overwrite", 15, 3),
+        ("edit --overwrite, renames", 15, 9),
+        ("changes and saves", 60, 9),
+        ("save as", 15, 5),
+        ("convert .sog", 8, 4),
+        ("export .glb", 8, 4),
+    ],
 )
 def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, step: int) -> None:
     command, found = COMMANDS[name], Killed()
@@ -32,6 +48,67 @@ def test_killed_at_a_call_that_writes(tmp_path: Path, name: str, least: int, ste
         assert kill(command, name, tmp_path / str(at), at, found)
     assert found.faults == []
     assert found.kills >= calls // step
+
+
+needs_counted_writes = pytest.mark.skipif(
+    write_points.why_not() is not None, reason=str(write_points.why_not())
+)
+
+_WRITES = """
+    import os, shutil, sys
+    from pathlib import Path
+    import numpy as np
+    sys.path.insert(0, sys.argv[3])
+    import write_points
+    folder = Path(sys.argv[1])
+    write_points.arm(folder, int(sys.argv[2]))
+    (folder / "a").write_bytes(b"ab" * 5)
+    with open(folder / "b", "wb") as file:
+        np.arange(10, dtype="<u2").tofile(file)
+    shutil.copyfile(folder / "b", folder / "c")
+    os.pwrite(os.open(folder / "a", os.O_WRONLY), b"cdefgh", 0)
+    (folder.parent / "elsewhere").write_bytes(b"ab")
+    print(write_points.count())
+"""
+
+
+@needs_counted_writes
+def test_a_process_ends_in_the_middle_of_a_write(tmp_path: Path) -> None:
+    """Python's writes, NumPy's and copies: half of the bytes are there; other folders' are not counted."""
+
+    def run(at: int) -> tuple[int, str, dict[str, bytes]]:
+        folder = tmp_path / str(at) / "x"
+        folder.mkdir(parents=True)
+        arguments = [str(folder), str(at), str(Path(__file__).parent)]
+        done = subprocess.run(
+            [sys.executable, "-c", textwrap.dedent(_WRITES), *arguments],
+            env=os.environ | write_points.preloading(),
+            capture_output=True,
+            text=True,
+        )
+        return done.returncode, done.stdout.strip(), files_of(folder)
+
+    first, numbers = b"ababababab", np.arange(10, dtype="<u2").tobytes()
+    # A copy asks once more for nothing at its end.
+    assert run(0) == (0, "5", {"a": b"cdefghabab", "b": numbers, "c": numbers})
+    assert run(1) == (-9, "", {"a": b"ababa"})
+    assert run(2) == (-9, "", {"a": first, "b": numbers[:10]})
+    assert run(3) == (-9, "", {"a": first, "b": numbers, "c": numbers[:10]})
+    assert run(5) == (-9, "", {"a": b"cdebababab", "b": numbers, "c": numbers})
+
+
+@needs_counted_writes
+@pytest.mark.parametrize(
+    ("name", "least", "step"), [("edit --overwrite", 6, 2), ("changes and saves", 14, 6)]
+)
+def test_killed_in_the_middle_of_a_write(tmp_path: Path, name: str, least: int, step: int) -> None:
+    found = Killed()
+    calls, _ = calls_of(name, tmp_path, writes=True)
+    assert calls >= least
+    for at in range(step, calls + 1, step):
+        (tmp_path / str(at)).mkdir()
+        assert kill(COMMANDS[name], name, tmp_path / str(at), at, found, writes=True)
+    assert found.faults == [] and found.kills >= 2
 
 
 def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
@@ -48,6 +125,30 @@ def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     session.make(tmp_path / "other")
     assert (session.check(tmp_path / "other", 4) or "").startswith("lost: change 2 was kept")
+
+
+def test_pictures_and_files_that_would_be_lost_are_seen(tmp_path: Path) -> None:
+    """Pictures of which some are new, an old file that is gone or cut off, a folder that nobody put aside."""
+    command, renamed = SLOW_COMMANDS["render, pictures"], SLOW_COMMANDS["render, pictures, renames"]
+    command.make(tmp_path)
+    assert command.check(tmp_path, 0) is None
+    assert (command.check(tmp_path, 1) or "").startswith("lost: pictures")
+    write_png(tmp_path / "out" / "0001.png", np.zeros((32, 32, 3), np.uint8))
+    assert command.check(tmp_path, 0) == "lost: pictures [4, 32] pixels wide"
+    aside = tmp_path / hidden_name(tmp_path / "out", "old").replace(f"-{os.getpid()}-", "-999999999-")
+    (tmp_path / "out").rename(aside)
+    assert command.check(tmp_path, 0) == "lost: the user's file"
+    assert renamed.check(tmp_path, 0) is None and renamed.check(tmp_path, 1) is not None
+    shutil.rmtree(aside)
+    assert renamed.check(tmp_path, 0) == "lost: the folder"
+    converted = COMMANDS["convert .sog"]
+    (tmp_path / "b").mkdir()
+    converted.make(tmp_path / "b")
+    assert converted.check(tmp_path / "b", 0) is None
+    (tmp_path / "b" / "out.sog").write_bytes(b"half")
+    assert (converted.check(tmp_path / "b", 0) or "").startswith("unreadable")
+    (tmp_path / "b" / "out.sog").unlink()
+    assert converted.check(tmp_path / "b", 0) == "lost: out.sog"
 
 
 def test_poses_that_would_be_lost_are_seen(tmp_path: Path) -> None:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
-from cagefield.atomic_files import check_writable
+from cagefield.atomic_files import check_writable, recover_folder
 from cagefield.errors import CagefieldError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.training.splat_config import SplatConfig
@@ -148,9 +149,12 @@ def parse_background(text: str | None) -> str | tuple[float, float, float] | Non
 def check_folder(path: Path, overwrite: bool, mark: str | None = None) -> None:
     """Passes where `path` is new or an empty folder; with `overwrite` any (that holds the file `mark`).
 
+    What a program put aside when it was ended while it replaced the folder is back first; a warning says so.
+
     Raises:
         CagefieldError: something is there that may not be replaced.
     """
+    recover_folder(real_path(path), lambda folder: mark is None or (folder / mark).is_file())
     if path.exists() and not path.is_dir():
         raise CagefieldError(f"{path} is a file; give a folder")
     if path.is_dir() and any(path.iterdir()) and not overwrite:

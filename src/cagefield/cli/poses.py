@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import tyro
 
+from cagefield.atomic_files import recover_folder
 from cagefield.cli.options import Flag, Output, check_folder, check_number, progress_bar
 from cagefield.errors import DatasetError
+from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset, View
@@ -93,6 +95,7 @@ def posed(photos: Path, target: Path) -> Path:
     photos = photos.expanduser()
     if not has_photos_alone(photos):
         return photos
+    recover_folder(real_path(target), lambda folder: (folder / RECORD).is_file())
     if is_made_of(target, photos):
         print(f"{photos} has no poses; those in {target} were found before")
         return target
@@ -120,6 +123,7 @@ def unfolded(dataset: Dataset, target: Path, downscale: int | None) -> Dataset:
         print("no field can show both; find the poses anew with: cagefield poses PHOTOS -o DATA", flush=True)
         return dataset
     photos = folders.pop()
+    recover_folder(real_path(target), lambda folder: (folder / RECORD).is_file())
     if is_made_of(target, photos):
         print(f"those in {target} were found before")
     else:

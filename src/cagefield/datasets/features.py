@@ -121,7 +121,8 @@ def opened(path: Path) -> Iterator[Any]:
         free = shutil.disk_usage(path.parent).free
         left = f", and {free // 1000} kB are free on its disk" if free < _LITTLE else ""
         reason = " ".join(str(error).split())
-        raise StoppedError(f"COLMAP stopped at its database {path}: {reason}{left}") from error
+        cure = left or "; where it stops there again, remove that file"
+        raise StoppedError(f"COLMAP stopped at its database {path}: {reason}{cure}") from error
 
 
 def create_database(path: Path, cameras: Sequence[Any], photos: Sequence[Photo]) -> None:
@@ -256,7 +257,10 @@ def _descriptors(database: Any, image_id: int) -> npt.NDArray[np.float32]:
     if not database.exists_descriptors(image_id):
         return np.zeros((0, 128), dtype=np.float32)
     found = database.read_descriptors(image_id)
-    return np.asarray(getattr(found, "data", found), dtype=np.float32)[:2048]
+    rows = np.asarray(getattr(found, "data", found), dtype=np.float32)
+    if rows.shape[1:] != (128,):
+        raise ValueError(f"features of photo {image_id} are {list(rows.shape)} numbers, not 128 each")
+    return rows[:2048]
 
 
 def _vlad(descriptors: npt.NDArray[np.float32], words: npt.NDArray[np.float32]) -> FloatArray:

@@ -14,7 +14,7 @@ import sqlite3
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from PIL import Image
@@ -29,6 +29,9 @@ from cagefield.leftovers import hidden_name, remove_leftovers
 from cagefield.regular_files import check_regular, read_bytes
 
 _VERSION = 1
+
+_LONGEST = 1 << 20
+"""Pixels of a photo's side: none is longer. Its square is above all focal lengths."""
 
 
 def work_folder(target: Path) -> Path:
@@ -132,16 +135,15 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
         photos = [RawPhoto(**{**one, "path": images / one["name"]}) for one in kept["photos"]]
         unreadable = {str(name): str(reason) for name, reason in kept["unreadable"].items()}
         whole = all(
-            photo.path.is_file()
-            and isinstance(photo.width, int)
-            and isinstance(photo.height, int)
-            and min(photo.width, photo.height) > 0
-            and isinstance(photo.focal, (int, float, type(None)))
+            _is_within(photo.name)
+            and photo.path.is_file()
+            and all(isinstance(side, int) and 0 < side <= _LONGEST for side in (photo.width, photo.height))
+            and (photo.focal is None or 0.0 < photo.focal <= _LONGEST**2)
             and isinstance(photo.sharpness, (int, float))
             and isinstance(photo.alpha, bool)
             for photo in photos
         )
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):  # OSError: a name that is too long
         return None
     return (photos, unreadable) if whole else None
 
@@ -180,6 +182,12 @@ def check_database(database: Path, names: Sequence[str]) -> None:
     warnings.warn(f"{database} is damaged ({reason}); features and matches are found anew", stacklevel=2)
     for file in folder.glob("database.db*"):
         file.unlink()
+
+
+def _is_within(name: str) -> bool:
+    """Whether a photo's name leads nowhere out of the folder of photos."""
+    parts = PurePosixPath(name).parts
+    return bool(parts) and ".." not in parts and not Path(name).is_absolute()
 
 
 def _remove_features(work: Path) -> None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from cagefield import json_text
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.datasets import features, repeated_views
 from cagefield.datasets.colmap_files import check_whole
 from cagefield.datasets.features import OnProgress, Photo
@@ -91,6 +91,7 @@ def make_poses(
     """
     features.engine()
     record = record_of(source, frames)
+    recover_folder(target, lambda folder: (folder / RECORD).is_file())
     work = work_folder(target)
     with kept_work(work):
         report = _made(source, target, record, frames, seed, on_progress)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
@@ -147,6 +147,7 @@ def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
 
     What else an older folder holds stays there.
     """
+    recover_folder(folder, lambda left: (left / SCRIPT).is_file())
     with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
         for name, data in written.items():
             (draft / name).write_bytes(data)

@@ -40,6 +40,8 @@ def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[st
         ) from error
     except (OSError, ValueError) as error:
         raise CagefieldError(f"{path}: not a readable checkpoint ({error!s:.160}); start anew") from error
+    if not isinstance(scalars, dict):
+        raise CagefieldError(f"{path}: not a readable checkpoint (its numbers have no names); start anew")
     if written_for != signature:
         raise CagefieldError(f"{path}: written for other photos or settings; start anew")
     return scalars, arrays

@@ -17,12 +17,13 @@ from torch import Tensor
 from cagefield.atomic_files import replaced_file
 from cagefield.cameras import Camera
 from cagefield.datasets.views import Dataset, View
-from cagefield.errors import CagefieldError
+from cagefield.errors import CagefieldError, FieldError
 from cagefield.fields.mlp import Linear, Mlp
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
-from cagefield.regular_files import check_regular
+from cagefield.formats.torch_files import read_tensors_of
 from cagefield.rendering.nerf import Jitter, Rays, march
+from cagefield.training.checkpoint_checks import check_run
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.nerf_space import space_of
 
@@ -179,8 +180,7 @@ class NerfRun:
     def restore(self, path: Path) -> None:
         """Continues from the state in `path`."""
         try:
-            check_regular(path)
-            state = torch.load(path, map_location=self.device, weights_only=True)
+            state = _state_in(path)
             if state["config"] != repr(self._options()):
                 raise CagefieldError(
                     f"{path} was written with other options or photos; give the same ones, or start anew"
@@ -188,7 +188,12 @@ class NerfRun:
             with torch.no_grad():
                 for own, values in zip(self.torch.parameters, state["parameters"], strict=True):
                     own.copy_(values)
-            self.optimizer.load_state_dict(state["optimizer"])
+            # Rates are the run's own; the rest is sums of the gradients, by parameter.
+            settings = self.optimizer.state_dict()
+            self.optimizer.load_state_dict({**settings, "state": state["optimizer"]["state"]})
+            for parameter, sums in self.optimizer.state.items():
+                self._check_sums(parameter, sums)
+            check_run(state, "loss")
             self.step, self.seconds, self.loss = state["step"], state["seconds"], state["loss"]
         except CagefieldError:
             raise
@@ -199,12 +204,28 @@ class NerfRun:
             ) from error
         torch.manual_seed(self.config.seed + self.step)
 
+    def _check_sums(self, parameter: Tensor, sums: dict[str, Any]) -> None:
+        """Passes where these can be Adam's of a parameter. Raises ValueError."""
+        moments = [sums["exp_avg"], sums["exp_avg_sq"]]
+        fits = all(isinstance(each, Tensor) and each.shape == parameter.shape for each in moments)
+        step = sums["step"]
+        if not fits or not isinstance(step, Tensor) or step.shape != () or not 0 <= float(step) < 2**53:
+            raise ValueError("sums of gradients of other networks")
+
     def _options(self) -> dict[str, Any]:
         """What a resumed run must have in common with the one it continues."""
         options = dataclasses.asdict(self.config)
         for name in ("steps", "minutes", "decay", "shown_samples"):
             del options[name]
         return {**options, "views": [view.name for view in self.dataset.train]}
+
+
+def _state_in(path: Path) -> dict[str, Any]:
+    """What `NerfRun.store` wrote, on the CPU. Raises ValueError for a file that is damaged."""
+    try:
+        return read_tensors_of(path)
+    except FieldError as error:
+        raise ValueError(str(error).removeprefix(f"{path}: ")) from error
 
 
 def initial_network(config: NerfConfig, chance: np.random.Generator, box: NDArray[Any]) -> Mlp:

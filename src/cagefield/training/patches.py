@@ -54,6 +54,11 @@ class Patches:
         self.position += count
         return taken
 
+    def are_known(self, chosen: NDArray[np.int32]) -> bool:
+        """Whether these [P,3] are patches of the photos, and some at all."""
+        known = {tuple(patch) for patch in self._all.tolist()}
+        return len(chosen) > 0 and all(tuple(patch) in known for patch in chosen.tolist())
+
     def go_to(self, chosen: NDArray[np.int32], epoch: int, position: int) -> None:
         """Goes on where others with these patches, of the same photos and seed, stood."""
         self.chosen, self.epoch, self.position = chosen, epoch, position

@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,13 @@ from cagefield.rendering.splat_rasterizer import (
     world_to_camera,
 )
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.checkpoint_checks import (
+    Form,
+    check_arrays,
+    check_finite,
+    check_run,
+    refusing_damage,
+)
 from cagefield.training.kernels.gauss_newton_splats import gauss_newton, residuals
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
@@ -279,11 +287,31 @@ class SplatRun:
             CagefieldError: a file that cannot be read, or of other photos or settings.
         """
         scalars, arrays = read_checkpoint(path, self._signature())
+        with refusing_damage(path):
+            self._take(scalars, arrays)
+
+    def _take(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Takes the state of a checkpoint. Raises ValueError where numbers or arrays cannot be a run's."""
+        own = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        forms: dict[str, Form] = {
+            name: (str(array.dtype), ("N", *array.shape[1:])) for name, array in own.items()
+        }
+        count = len(self.views)
+        lengths = check_arrays(
+            arrays, forms | {"gains": ("float32", (count, 3)), "motions": ("float64", (count, 6))}
+        )
+        check_finite(arrays, ("means", "log_scales", "quaternions", "logits", "sh", "gains", "motions"))
+        check_run(scalars, "running_loss")
+        queue = scalars["queue"]
+        if len(arrays) != len(own) + 2 or not lengths["N"]:
+            raise ValueError(f"{lengths['N']} splats and {len(arrays)} arrays")
+        if not isinstance(queue, list) or not set(queue) <= set(range(count)) or len(queue) > count:
+            raise ValueError(f"photos that come next: {queue!s:.40}")
+        self._rng.bit_generator.state = scalars["random"]
         self.gains, self.poses.motions = arrays.pop("gains"), arrays.pop("motions")
         self.state = SplatState(**arrays)
         self.step, self.seconds = scalars["step"], scalars["seconds"]
-        self.running_loss, self._queue = scalars["running_loss"], scalars["queue"]
-        self._rng.bit_generator.state = scalars["random"]
+        self.running_loss, self._queue = scalars["running_loss"], [int(number) for number in queue]
 
     def _signature(self) -> str:
         """What a file must have been written for."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.datasets.views import Dataset
@@ -16,13 +17,20 @@ from cagefield.errors import DatasetError
 from cagefield.fields.voxel import VoxelField
 from cagefield.training.batches import Batches
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.checkpoint_checks import (
+    check_arrays,
+    check_counts,
+    check_finite,
+    check_run,
+    refusing_damage,
+)
 from cagefield.training.exposure import Exposure
 from cagefield.training.floaters import without_specks
 from cagefield.training.grid_state import GridState
 from cagefield.training.patches import Patches
 from cagefield.training.photos import Photos
 from cagefield.training.progress import Progress
-from cagefield.training.schedule import Schedule
+from cagefield.training.schedule import LEAST_RESOLUTION, Schedule, stages
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_defaults import settings
 from cagefield.training.voxel_space import VoxelSpace
@@ -32,6 +40,9 @@ EXPOSURE_FROM = 0.05
 
 EXPOSURE_EVERY = 50
 """Steps between two of their fits."""
+
+_MOST_VERTICES = 1024
+"""Along the longest axis of a grid, as in `VoxelConfig`."""
 
 
 class VoxelRun:
@@ -181,6 +192,8 @@ class VoxelRun:
             CagefieldError: a file that cannot be read, or of other photos or settings.
         """
         scalars, arrays = read_checkpoint(path, self._signature())
+        with refusing_damage(path):
+            schedule = self._checked(scalars, arrays)
         self._grid = GridState.build(
             arrays["bounds"],
             _triple(arrays["resolution"]),
@@ -194,15 +207,53 @@ class VoxelRun:
         self._grid.weight.from_numpy(np.concatenate([np.zeros(1, np.float32), arrays["weight"]]))
         self.step, self.rays = scalars["step"], scalars["rays"]
         self.seconds, self.running_loss = scalars["seconds"], scalars["running_loss"]
-        # By the clock a machine with other threads might have chosen another resolution.
-        self._schedule = dataclasses.replace(
-            self._new_schedule(scalars["resolution"]),
-            stage=scalars["stage"],
-            began=scalars["stage_began"],
-            pruned=scalars["pruned"],
-        )
+        self._schedule = schedule
         self._patches.go_to(arrays["patches"], scalars["epoch"], scalars["position"])
         self.exposure.go_to(arrays["gain_sums"], arrays["gains"])
+
+    def _checked(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Schedule:
+        """The schedule of a checkpoint. Raises ValueError where numbers or arrays cannot be a run's."""
+        photos = len(self._photos.names)
+        lengths = check_arrays(
+            arrays,
+            {
+                "bounds": ("float64", (2, 3)),
+                "resolution": ("int", (3,)),
+                "vertices": ("int64", ("M",)),
+                "density": ("float32", ("M",)),
+                "sh": ("float32", ("M", "K", 3)),
+                "state": ("float32", ("M", 2)),
+                "weight": ("float32", ("M",)),
+                "patches": ("int32", ("P", 3)),
+                "gain_sums": ("float64", (photos, 6)),
+                "gains": (str(self.exposure.gains.to_numpy().dtype), self.exposure.gains.shape),
+            },
+        )
+        check_finite(arrays, ("bounds", "density", "sh", "state", "weight", "gain_sums", "gains"))
+        check_run(scalars, "running_loss")
+        check_counts(scalars, resolution=_MOST_VERTICES, rays=2**62, epoch=2**31, position=lengths["P"])
+        # By the clock a machine with other threads might have chosen another resolution.
+        schedule = self._new_schedule(max(scalars["resolution"], LEAST_RESOLUTION))
+        check_counts(scalars, stage=len(stages(schedule.final)) - 1, stage_began=scalars["step"])
+        schedule = dataclasses.replace(
+            schedule,
+            stage=scalars["stage"],
+            began=scalars["stage_began"],
+            pruned=scalars["pruned"] is True,
+        )
+        low, high = arrays["bounds"]
+        dims, vertices = arrays["resolution"], arrays["vertices"]
+        if not (low < high).all() or dims.min() < 2 or dims.max() > schedule.resolution:
+            raise ValueError(f"a grid of {dims.tolist()} vertices in stage {schedule.stage}")
+        if lengths["K"] != (schedule.sh_degree + 1) ** 2:
+            raise ValueError(f"colours of {lengths['K']} numbers in stage {schedule.stage}")
+        if not len(vertices) or vertices.min() < 0 or vertices.max() >= np.prod(dims):
+            raise ValueError("vertices outside of its grid")
+        if len(np.unique(vertices)) != len(vertices):
+            raise ValueError("vertices that are there twice")
+        if not self._patches.are_known(arrays["patches"]):
+            raise ValueError("patches of no photo")
+        return schedule
 
     def _signature(self) -> str:
         """What a file must have been written for."""

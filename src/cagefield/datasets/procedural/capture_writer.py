@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.captures import capture
 from cagefield.datasets.procedural.hand_held import developed, exposures, picture
@@ -72,6 +72,7 @@ def make_capture(
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = real_path(out_dir)
+    recover_folder(target, Path.is_dir)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
     phone = plan.phone.resized(longer)

@@ -16,7 +16,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.catalogue import procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
@@ -98,6 +98,7 @@ def make_scene(
     if depth not in get_args(DepthViews):
         raise DatasetError(f"depth must be one of {', '.join(get_args(DepthViews))}, not {depth!r}")
     target = real_path(out_dir)
+    recover_folder(target, Path.is_dir)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise DatasetError(f"{target} is not empty; give another folder or remove it first")
 

@@ -64,7 +64,8 @@ def _locked(file: Path, scene: Path) -> int:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            owner = os.read(handle, 20).decode("ascii", "replace").strip()
+            said = os.read(handle, 20).strip()
+            owner = said.decode("ascii") if said.isdigit() else ""
             os.close(handle)
             raise SceneError(
                 f"{scene} is open in another editor{f' (process {owner})' if owner else ''}; use its page, "

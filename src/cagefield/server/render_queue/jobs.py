@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from cagefield.atomic_files import recover_folder
 from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.keyframes import Still, stills
@@ -67,6 +68,7 @@ def test_views(
     """
     if not cameras:
         raise CagefieldError("the scene has no cameras to render from; record a camera path instead")
+    recover_folder(out, lambda folder: (folder / MARK).is_file())
     if out.exists() and not out.is_dir():
         raise CagefieldError(f"{out} is a file; give a folder for the pictures")
     if out.is_dir() and any(out.iterdir()):

@@ -24,6 +24,9 @@ from cagefield.regular_files import read_bytes
 _LEAST = 32
 """Characters of a token that is taken from a file of ours: those nobody guesses."""
 
+_MOST = 256
+"""Of them at most: ours have as many as are needed, and nothing else is one of ours."""
+
 Role = Literal["edit", "look"]
 """What a token lets its holder do."""
 
@@ -53,11 +56,11 @@ def own_token(role: Role = "edit") -> str:
             with os.fdopen(handle, "w", encoding="ascii") as out:
                 out.write(new_token())
         status = file.stat()
-        kept = read_bytes(file, 4096).decode("ascii").strip()
+        kept = read_bytes(file, 4096).decode("ascii", "replace").strip()
         private = os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
-        if private and len(kept) >= _LEAST:
+        if private and _LEAST <= len(kept) <= _MOST and kept.isascii() and kept.isprintable():
             return kept
-        file.unlink()  # read by others, or cut off: the next editor makes another
+        file.unlink()  # read by others, cut off or damaged: the next editor makes another
     except (OSError, ValueError):
         pass
     return new_token()

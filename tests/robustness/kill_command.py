@@ -1,0 +1,86 @@
+"""What a command that is killed consists of, and what several of them have."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from kill_checks import Check
+from kill_points import Say
+
+from cagefield import Scene
+from cagefield.leftovers import put_aside
+from scenes import ball_scene
+from splat_scenes import ball_of_splats
+
+Make = Callable[[Path], None]
+
+EDITS = """edits:
+  - name: moved
+    adjustment: discrete
+    inner: {center: [0, 0, 0], size: 1}
+    operations: [{translate: [1, 0, 0]}]
+"""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What is killed: `work` runs in a folder that `make` has filled; `check` says what is wrong afterwards.
+
+    `work` says numbers of what it has promised; `check` is given the last one. A user then does the same once
+    more, after which `check` must pass too, and nothing hidden be left.
+    """
+
+    make: Make
+    work: Callable[[Path, Say], None]
+    check: Check
+
+
+def cli(*arguments: object) -> None:
+    from cagefield.cli import main
+
+    said = io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+        code = main([str(argument) for argument in arguments])
+    if code != 0:
+        raise RuntimeError(f"exit code {code}: {said.getvalue().splitlines()[-1:]}")
+
+
+def put_scene(folder: Path) -> None:
+    ball_scene().save(folder / "scene")
+    (folder / "scene" / "notes.txt").write_text("mine")
+    (folder / "e.yaml").write_text(EDITS)
+
+
+def put_splats(folder: Path) -> None:
+    from cagefield.formats.splat_files import write_splats
+
+    put_scene(folder)
+    shutil.rmtree(folder / "scene")
+    Scene(ball_of_splats(50), cameras=ball_scene().cameras).save(folder / "scene")
+    (folder / "scene" / "notes.txt").write_text("mine")
+    write_splats(ball_of_splats(50), folder / "x.ply")
+
+
+def renamed(command: Command, target: str | None = None) -> Command:
+    """The same where names cannot be exchanged.
+
+    What was at `target` may then be aside until the next run, which brings it back.
+    """
+
+    def work(folder: Path, say: Say) -> None:
+        from cagefield import atomic_files
+
+        atomic_files.exchanged = lambda one, other: False
+        command.work(folder, say)
+
+    def problem(folder: Path, said: int) -> str | None:
+        if target is not None and said < 1 and not (folder / target).exists():
+            return None if put_aside(folder / target) else "lost: the folder"
+        return command.check(folder, said)
+
+    return replace(command, work=work, check=problem)

@@ -1,0 +1,143 @@
+"""What finding poses keeps for its next run, and videos: honest seeds, and how they are read."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+from reader_seeds import Reader
+
+from cagefield.datasets import left_out, points, poses_work, raw_photos, structure_from_motion
+from cagefield.errors import CagefieldError
+from cagefield.rendering.video_encoder import encoder, is_ours
+from posed_photos import photos_alone
+
+RECORD = {"version": 1, "files": [["a.png", 12, 34]]}
+
+
+def _no_progress(done: float, note: str) -> None:
+    """Nobody is told."""
+
+
+def _make_photos(folder: Path) -> None:
+    from PIL import Image
+
+    photos = photos_alone(folder / "photos")
+    for file in photos.iterdir():
+        with Image.open(file) as image:
+            small = image.resize((16, 12))
+        small.save(file)
+    (folder / "work").mkdir()
+    poses_work.work_photos(photos, folder / "work", 3, _no_progress)
+
+
+def _read_photos(folder: Path) -> None:
+    """The list, copies for COLMAP, and its guesses of cameras."""
+    work = folder / "work"
+    known = poses_work._known_photos(work / "photos.json", work / "images")
+    if known is None:
+        raise CagefieldError("it is damaged, and the photos are read again")
+    shutil.rmtree(work / "colmap", ignore_errors=True)
+    poses_work.plainly_named(known[0], work)
+    structure_from_motion.camera_guesses(known[0])
+
+
+def _make_record(folder: Path) -> None:
+    poses_work.prepare_work(folder / "work", RECORD)
+
+
+def _make_poses(folder: Path) -> None:
+    photos = photos_alone(folder / "photos")
+    (folder / "data").mkdir()
+    made = {"made_of": poses_work.record_of(photos, 80), "photos": 4, "left_out": {"a": "blurred"}}
+    (folder / "data" / "poses.json").write_text(json.dumps(made))
+
+
+def _read_poses(folder: Path) -> None:
+    if not structure_from_motion.is_made_of(folder / "data", folder / "photos"):
+        raise CagefieldError("it is of other photos, or damaged")
+
+
+def _make_points(folder: Path) -> None:
+    from cagefield.datasets.views import SparsePoints
+
+    chance = np.random.default_rng(0)
+    seen = tuple(frozenset((f"photo {n % 3}", f"photo {n % 5}")) for n in range(60))
+    found = SparsePoints(
+        chance.normal(size=(60, 3)), chance.integers(0, 256, (60, 3)).astype(np.uint8), seen, np.ones(60)
+    )
+    points._write(folder / "points-1.npz", found)
+
+
+def _read_points(folder: Path) -> None:
+    found = points._read(folder / "points-1.npz")
+    if found is None:
+        raise CagefieldError("it is damaged, and the points are found again")
+    found.take(np.arange(len(found)) % 2 == 0)
+
+
+def _make_database(folder: Path) -> None:
+    """Three photos of ten features each, all matched."""
+    import pycolmap
+
+    from cagefield.datasets import features
+
+    camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", 30.0, 24, 16)
+    photos = [features.Photo(f"{n:06}.png", 0) for n in range(3)]
+    features.create_database(folder / "database.db", [camera], photos)
+    chance, pairs = np.random.default_rng(0), np.stack([np.arange(10, dtype=np.uint32)] * 2, axis=1)
+    with features.opened(folder / "database.db") as database:
+        for n in range(1, 4):
+            database.write_keypoints(n, chance.uniform(0, 16, (10, 4)).astype(np.float32))
+            kinds = pycolmap.FeatureExtractorType.SIFT
+            found = pycolmap.FeatureDescriptors(kinds, chance.integers(0, 256, (10, 128)).astype(np.uint8))
+            database.write_descriptors(n, found)
+        for first, second in ((1, 2), (1, 3), (2, 3)):
+            database.write_matches(first, second, pairs)
+            geometry = pycolmap.TwoViewGeometry()
+            geometry.inlier_matches = pairs
+            geometry.config = pycolmap.TwoViewGeometryConfiguration.CALIBRATED
+            database.write_two_view_geometry(first, second, geometry)
+
+
+def _read_database(folder: Path) -> None:
+    from cagefield.datasets import features
+
+    for journal in folder.glob("database.db-*"):
+        journal.unlink()
+    features.likely_pairs(folder / "database.db", 3)
+    left_out.verified_matches(folder / "database.db", 3)
+
+
+def _make_video(folder: Path) -> None:
+    chance = np.random.default_rng(0)
+    with encoder(folder / "v.mp4", (32, 24), 10.0, 30) as encode:
+        for _ in range(6):
+            encode(chance.integers(0, 256, (24, 32, 3)).astype(np.uint8).tobytes())
+
+
+def _read_video(folder: Path) -> None:
+    shutil.rmtree(folder / "frames", ignore_errors=True)
+    raw_photos.video_frames(folder / "v.mp4", 3, folder / "frames")
+
+
+def _read_replaced_video(folder: Path) -> None:
+    if not is_ours(folder / "v.mp4"):
+        raise CagefieldError("it is none of ours, and stays")
+
+
+POSES_READERS: dict[str, Reader] = {
+    "poses, photos.json": Reader(_make_photos, _read_photos, {"work/photos.json": "json"}),
+    "poses, made_of.json": Reader(
+        _make_record,
+        lambda folder: poses_work.prepare_work(folder / "work", RECORD),
+        {"work/made_of.json": "json"},
+    ),
+    "poses.json": Reader(_make_poses, _read_poses, {"data/poses.json": "json"}),
+    "poses, points .npz": Reader(_make_points, _read_points, {"points-1.npz": "zip"}),
+    "poses, database.db": Reader(_make_database, _read_database, {"database.db": "bytes"}),
+    "video, frames of": Reader(_make_video, _read_video, {"v.mp4": "bytes"}),
+    "video, replaced": Reader(_make_video, _read_replaced_video, {"v.mp4": "bytes"}),
+}

@@ -1,0 +1,64 @@
+"""Checkpoints that trainings go on from: honest seeds, and runs that take them and make a step."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from reader_seeds import Reader
+
+STATE = "x.training"
+
+
+@cache
+def _run(kind: str, photos: Path) -> Any:
+    """A training of three tiny photos that has made two steps."""
+    from cagefield import devices
+    from cagefield.datasets import load_dataset
+
+    devices.start("cpu")
+    dataset = load_dataset(photos)
+    if kind == "voxel":
+        from cagefield.training.voxel_config import VoxelConfig
+        from cagefield.training.voxel_run import VoxelRun
+
+        run: Any = VoxelRun(dataset, VoxelConfig(steps=4, resolution=16))
+    elif kind == "splat":
+        from cagefield.training.splat_config import SplatConfig
+        from cagefield.training.splat_run import SplatRun
+
+        run = SplatRun(dataset, SplatConfig(steps=4, splats=100))
+    else:
+        from cagefield.training.nerf_config import NerfConfig
+        from cagefield.training.nerf_run import NerfRun
+
+        run = NerfRun(dataset, NerfConfig(steps=4, width=8, depth=2, samples=(4, 4), batch_rays=16))
+    for _ in range(2):
+        run.advance()
+    return run
+
+
+def _training(kind: str, damaged: str) -> Reader:
+    def make(folder: Path) -> None:
+        from cagefield.datasets.procedural import make_scene
+
+        make_scene("chair", folder / "photos", views=3, size=12, test_views=1, depth="none")
+        _run(kind, folder / "photos").store(folder / STATE)
+
+    def read(folder: Path) -> None:
+        run = _run(kind, folder / "photos")
+        run.restore(folder / STATE)
+        run.progress()
+        if run.done < 1.0:
+            run.advance()
+        run.store(folder / "again.training")
+
+    return Reader(make, read, {STATE: damaged})
+
+
+TRAINING_READERS: dict[str, Reader] = {
+    "training, voxels": _training("voxel", "zip"),
+    "training, splats": _training("splat", "zip"),
+    "training, nerf": _training("nerf", "zip"),
+}
