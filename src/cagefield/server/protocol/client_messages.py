@@ -278,7 +278,7 @@ class RenderJob(Message):
     out: Annotated[str, Field(min_length=1, max_length=1000)]
     width: Annotated[int, Field(ge=16, le=4096)] = 800
     height: Annotated[int, Field(ge=16, le=4096)] = 800
-    fps: Annotated[float, Field(gt=0, le=120)] = 24.0
+    fps: Annotated[float, Field(ge=0.001, le=120)] = 24.0
     overwrite: bool = False
 
 
