@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from cagefield.server.web.security import Allowance, Guard, is_loopback, new_token
+from cagefield.server.web.security import Allowance, Guard, is_loopback, new_token, own_token
 
 HOME = Guard("localhost", 8741)
 OPEN = Guard("0.0.0.0", 8741, token="secret-token")
@@ -85,6 +87,19 @@ def test_loopback_addresses() -> None:
 
 def test_tokens_differ_and_are_long() -> None:
     assert new_token() != new_token() and len(new_token()) >= 32
+
+
+@pytest.mark.parametrize("damaged", ["", "short", "x" * 257, "x" * 5000, "x" * 40 + "\x1b[2J"])
+def test_a_damaged_token_is_made_anew_and_then_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damaged: str
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    first = own_token()
+    assert own_token() == first
+    file = tmp_path / "cagefield" / "token"
+    file.write_text(damaged)
+    assert own_token() not in (damaged, first)
+    assert own_token() == own_token()
 
 
 def test_an_allowance_is_spent_and_comes_back() -> None:

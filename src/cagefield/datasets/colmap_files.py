@@ -20,7 +20,6 @@ from cagefield.regular_files import check_regular, open_regular
 _POSE = 56  # rotation quaternion and translation, float64
 _PARAMETERS = (3, 4, 4, 5, 8, 8)  # of the camera models 0 to 5, those that can be read; see `colmap._camera`
 
-
 _MOST_TEXT = 1 << 30
 """Bytes of a model's file in text; one line is held at a time."""
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 from urllib.parse import urlsplit
 
-from cagefield.regular_files import read_bytes
+from cagefield.regular_files import UnreadableError, read_bytes
 
 _LEAST = 32
 """Characters of a token that is taken from a file of ours: those nobody guesses."""
@@ -56,7 +56,10 @@ def own_token(role: Role = "edit") -> str:
             with os.fdopen(handle, "w", encoding="ascii") as out:
                 out.write(new_token())
         status = file.stat()
-        kept = read_bytes(file, 4096).decode("ascii", "replace").strip()
+        try:
+            kept = read_bytes(file, 4096).decode("ascii", "replace").strip()
+        except UnreadableError:  # too long: no token of ours
+            kept = ""
         private = os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o077)
         if private and _LEAST <= len(kept) <= _MOST and kept.isascii() and kept.isprintable():
             return kept

@@ -57,9 +57,8 @@ class TlsHttp(asyncio.Protocol):
             return
         finally:
             no_longer_awaited(self)
-            self._task = (
-                None  # or each would hold the other, and what it has of keys, until garbage is collected
-            )
+            # Or each would hold the other, and what it has of keys, until garbage is collected.
+            self._task = None
         if transport is None or self._ended or raw.is_closing():
             raw.abort()
             return
