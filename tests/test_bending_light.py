@@ -86,17 +86,47 @@ def test_what_is_lifted_takes_its_shade_off_the_ground():
     assert lit > bare + 5.0
 
 
-def test_light_alone_moves_nothing_and_far_things_keep_theirs():
+def test_light_changes_matter_only_right_under_what_is_lifted_and_far_things_keep_theirs():
     field = room(0.0)
     light = bent_voxels(field, EditStack(), RAISED, LIGHT)
     assert light is not None
     block = block_of(field, EditStack([light]), field.bounds)
     plain = block_of(field, EditStack(), field.bounds)
-    np.testing.assert_array_equal(block.density, plain.density)
+    where = plain.positions(block.density != plain.density)
+    assert np.abs(where[:, :2] - [0.1, 0.0]).max() < 0.4
+    assert np.abs(where[:, 2] - FLOOR).max() < 5.0 * plain.spacing[2]
     both = (block.slot >= 0) & (plain.slot >= 0)
     moved = np.abs(block.colours(both) - plain.colours(both)).max(axis=1)
     away = np.linalg.norm(plain.positions(both)[:, :2] - [0.1, 0.0], axis=1)
     assert moved.max() > 0.1 and moved[away > 0.25 * np.sqrt(2.0) + 1.3 * REACH].max() < 0.01
+
+
+def test_what_was_hidden_under_what_is_lifted_is_ground():
+    """Noise in the ground there, that no camera sees, and crumbs over it, do not show."""
+    field = room(0.0)
+    at = np.stack(np.unravel_index(field.vertices, field.resolution), axis=1)
+    where = -1.0 + 2.0 * at / (VERTICES - 1)
+    under = (np.abs(where[:, :2] - [0.1, 0.0]) < 0.2).all(axis=1) & (where[:, 2] < FLOOR + 0.5 * GAP)
+    chance = np.random.default_rng(0)
+    noisy = dataclasses.replace(
+        field,
+        density=np.where(under, field.density * chance.uniform(0.0, 0.3, len(under)), field.density).astype(
+            np.float32
+        ),
+        sh=np.where(under[:, None, None], chance.normal(0.0, 0.8, field.sh.shape), field.sh).astype(
+            np.float32
+        ),
+    )
+    light = bent_voxels(noisy, EditStack(), RAISED, LIGHT)
+    assert light is not None
+    block = block_of(noisy, EditStack([light]), noisy.bounds)
+    top = np.zeros(block.shape, bool)
+    top.reshape(-1)[
+        field.vertices[under & (np.abs(where[:, 2] - FLOOR + 1.0 / VERTICES) < 1.0 / VERTICES)]
+    ] = True
+    known = block.colours(top & (block.slot >= 0))
+    assert len(known) > 50 and known.std() < 0.05 and abs(known.mean() - 0.6) < 0.1
+    assert (block.density[top] > 0.3 * field.density.max()).mean() > 0.9
 
 
 def test_what_stays_where_it_is_has_no_other_light():
@@ -109,7 +139,7 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     field = room(0.0) if kind == "voxels" else splat_room(True)
     edit = RAISED.replace(name="raise")
     patcher = Patcher(field, (), lambda camera: pytest.fail("the light is known"))
-    patcher.__dict__["ambience"] = LIGHT
+    patcher.__dict__.update(ambience=LIGHT, _sight=None)
     light, same = patcher.patched([edit])
     assert same is edit and light.patch is not None and light.changes_anything
     assert patcher.patched([edit])[0] is light

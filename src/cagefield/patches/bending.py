@@ -3,7 +3,9 @@
 A sample of the deformed field shows a canonical point; the light on that point is changed before the edit
 takes it anywhere. So this light is an edit of its own, right before the continuous one, that moves nothing:
 its patch shows the surroundings, and what is between the cages, in the light that falls on it once it is
-bent. With F the edit's map to deformed space, the light on a canonical point p with normal n is multiplied by
+bent. What the part stood on, or hung over, was hidden or in deep shade: it goes on there, as under a part
+that is moved (`patches.rebuilding`). With F the edit's map to deformed space, the light on a canonical point
+p with normal n is multiplied by
 
     o'(F(p), F_*(n)) / o(p, n),
 
@@ -30,14 +32,20 @@ from cagefield.patches.footprint import footprint_of
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
 from cagefield.patches.rebuilding import rebuilt
+from cagefield.patches.seen import Sight
+from cagefield.patches.shown import steadied
 from cagefield.patches.support import support_around
 from cagefield.patches.surfels import Surfels, surfels_of
-from cagefield.patches.work import UNSURE
+from cagefield.patches.work import BEFORE, VIEWS
 from cagefield.typing import Array
 from cagefield.warps.forward import to_deformed
 
 FINEST = 128
 """Vertices along the longest axis of the grid that the light is worked out on."""
+
+DARK = 0.45
+"""Where light is to grow by more than this (log) on what was beneath a part, that is filled. It may well be
+behind the part for all cameras but the lowest ones."""
 
 AROUND = 24.0
 """How far around what was in deep shade its surroundings are looked at, at least; voxels."""
@@ -88,11 +96,17 @@ def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambien
 
 
 def bent_voxels(
-    field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience, block: Block | None = None
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience,
+    block: Block | None = None,
+    sight: Sight | None = None,
 ) -> Edit | None:
     """The edit that changes the light of a voxel field under a continuous edit; None where none changes.
 
-    `block` is its `bent_block`, where that is known.
+    `block` is its `bent_block`, where that is known. What cameras did see, by their `sight` of the field
+    without edits, is not filled.
     """
     box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
     block = block or bent_block(field, below, edit, ambience)
@@ -100,7 +114,7 @@ def bent_voxels(
     where = block.slot >= 0
     log = bent.light.at(bent.block, block.positions(where))
     log[np.abs(log) < UNSEEN] = 0.0
-    relit = _filled(block.relit(where, np.exp(log)), edit, bent)
+    relit = _filled(steadied(block, where, log).relit(where, np.exp(log)), edit, bent, below, sight)
     changed = relit.differs(block)
     if not changed.any():
         return None
@@ -108,13 +122,13 @@ def bent_voxels(
     return light_edit(edit, Patch(region, relit.layer()))
 
 
-def _filled(block: Block, edit: Edit, bent: Bent) -> Block:
+def _filled(block: Block, edit: Edit, bent: Bent, below: EditStack, sight: Sight | None) -> Block:
     """The block, in its new light, with what the part stood on going on where it was in deep shade.
 
     What was photographed there is noise, which the new light would bring out.
     """
     at = block.coordinates(bent.surface.points)
-    dark = bent.log > UNSURE
+    dark = bent.log > DARK
     if not dark.any():
         return block
     # Not all that is bent: what is dark, and as much again around it.
@@ -122,11 +136,22 @@ def _filled(block: Block, edit: Edit, bent: Bent) -> Block:
     margin = max(AROUND, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
-    filled = _continued(small, edit, bent, at - first, dark)
-    return replace(block, sh=filled.sh)
+    filled = _continued(small, edit, bent, at - first, dark, below, sight)
+    part = tuple(slice(a, a + n) for a, n in zip(small.low - block.low, small.shape, strict=True))
+    density, slot = block.density.copy(), block.slot.copy()
+    density[part], slot[part] = filled.density, filled.slot
+    return replace(block, density=density, slot=slot, sh=filled.sh)
 
 
-def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: NDArray[np.bool_]) -> Block:
+def _continued(
+    block: Block,
+    edit: Edit,
+    bent: Bent,
+    at: Array,
+    dark: NDArray[np.bool_],
+    below: EditStack,
+    sight: Sight | None,
+) -> Block:
     """The block with the support going on that surfaces [N] at block coordinates are of; some are dark."""
     inside = edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
     part = block.solid & inside
@@ -141,8 +166,13 @@ def _continued(block: Block, edit: Edit, bent: Bent, at: Array, dark: NDArray[np
     footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), unsure)
     if footprint is None:
         return block
-    known = bent.light.at(bent.block, footprint.points(block)) < UNSURE
-    footprint = footprint.without(known, np.zeros_like(part))
+    points = footprint.points(block)
+    known = bent.light.at(bent.block, points) < DARK
+    if sight is not None:
+        # What an edit below made up under the part is filled again: there is more to go by now.
+        where = below.to_canonical(points).points
+        known &= sight.views_of(where, BEFORE * max(block.spacing)) >= VIEWS
+    footprint = footprint.without(known, part)
     changed = np.zeros(footprint.hole.shape)
     changed[footprint.around] = bent.light.at(bent.block, footprint.points(block, footprint.around))
     return rebuilt(block, replace(footprint, changed=changed), inside, stays=True)

@@ -190,7 +190,7 @@ class Patcher:
             around: Key = (*stack.active, edit.outer, lit)
             if self._around is None or self._around[0] != around:
                 self._around = around, bent_block(self._field, stack, edit, lit)
-            found = bent_voxels(self._field, stack, edit, lit, self._around[1])
+            found = bent_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
         else:
             found = bent_splats(self._field, stack, edit, lit)
         self._keep(key, found)

@@ -47,7 +47,7 @@ FIRM = 0.01
 def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = False) -> Block:
     """The block with the support going on in its hole; `removed` [X,Y,Z] are the vertices of V^c.
 
-    Where that `stays`, under a continuous edit, colours alone change, and none in V^c.
+    Where that `stays`, under a continuous edit, nothing in V^c changes.
     """
     voxels = np.argwhere(np.ones(block.shape, bool))
     u, v, height = footprint.column(voxels.astype(np.float64))
@@ -65,8 +65,7 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     known_columns = (u[around], v[around], height[around])
     hole &= ~_sides(block, footprint, removed)[tuple(voxels.T)]
     if stays:
-        new = hole & level & ~gone
-        return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
+        hole &= ~gone
     profile = _profile(block, voxels[around & level], height[around & level])
     # Crusts of what was taken away, between the support and V^c.
     nearby = ndimage.binary_dilation(removed, iterations=4)

@@ -21,6 +21,7 @@ from cagefield.patches.footprint import Footprint
 from cagefield.patches.light import Ambience, Lighting
 from cagefield.patches.planes import flattened
 from cagefield.patches.seen import Sight
+from cagefield.patches.shown import steadied
 from cagefield.patches.support import Support, support_around
 from cagefield.patches.surfels import Surfels, cut_through, joined, surfels_of, with_seen
 from cagefield.typing import Array, Mask
@@ -49,7 +50,9 @@ VIEWS = 2
 
 
 def lit_by(block: Block, light: Lighting | None) -> Block:
-    return block if light is None else block.relit(light.where, np.exp(light.log_ratio))
+    if light is None:
+        return block
+    return steadied(block, light.where, light.log_ratio).relit(light.where, np.exp(light.log_ratio))
 
 
 @dataclass(frozen=True, eq=False)

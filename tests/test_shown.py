@@ -1,0 +1,72 @@
+"""What shows of a block's surfaces, and light that brings out no noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.edits import EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.block import Block, block_of
+from cagefield.patches.shown import FROM, TO, shown, steadied
+from cagefield.patches.surfels import surfels_of
+from cagefield.sh import C0
+
+VERTICES, TOP = 24, 12
+
+
+def ground(seed: int = 0) -> Block:
+    """Foggy ground up to height TOP, grey 0.2 on the whole, each vertex with noise of its own."""
+    shape = (VERTICES,) * 3
+    z = np.broadcast_to(np.arange(VERTICES), shape)
+    vertices = np.flatnonzero(z <= TOP + 1)
+    solid = (z <= TOP).reshape(-1)[vertices]
+    voxel = 2.0 / (VERTICES - 1)
+    colour = 0.2 + 0.15 * np.random.default_rng(seed).standard_normal((len(vertices), 1, 3))
+    field = VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]),
+        shape,
+        vertices,
+        np.where(solid, 0.7 / voxel, 0.0).astype(np.float32),
+        ((colour - 0.5) / C0).astype(np.float32),
+    )
+    return block_of(field, EditStack(), field.bounds)
+
+
+def inner(block: Block) -> np.ndarray:
+    """[X,Y,Z]: the ground's topmost vertices, away from the block's faces."""
+    where = np.zeros(block.shape, bool)
+    where[4:-4, 4:-4, TOP - 1 : TOP + 1] = True
+    return where
+
+
+def test_what_shows_is_the_mean_of_what_a_ray_meets():
+    block = ground()
+    surface = surfels_of(block)
+    facing = surface.normals[:, 2] > 0.9
+    colours, opacity = shown(block, surface.take(facing))
+    mean = 0.5 + C0 * colours[:, 0]
+    assert opacity.min() > 0.9
+    assert mean.std() < 0.7 * 0.15 and abs(float(mean.mean()) - 0.2) < 0.02
+
+
+def test_light_that_grows_brings_no_noise_out():
+    block = ground()
+    where = inner(block)
+    before = block.colours(where)
+    after = steadied(block, where, np.full(int(where.sum()), TO + 0.1)).colours(where)
+    assert after.std() < 0.6 * before.std()
+    assert abs(after.mean() - before.mean()) < 0.02
+
+
+def test_light_that_stays_or_fades_changes_no_colour():
+    block = ground()
+    where = inner(block)
+    for log in (-1.0, 0.0, FROM):
+        assert steadied(block, where, np.full(int(where.sum()), log)) is block
+
+
+def test_blocks_without_surfaces_stay():
+    block = ground()
+    empty = block.with_density(np.ones(block.shape, bool), np.zeros(block.density.size, np.float32))
+    where = empty.slot >= 0
+    assert steadied(empty, where, np.ones(int(where.sum()))) is empty
