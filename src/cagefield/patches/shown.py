@@ -26,12 +26,19 @@ FROM, TO = 0.2, 0.6
 NEAREST, DEEP = 4, 8.0
 """Surface elements that a vertex's colour is the mean of, and how far beneath them it may be; voxels."""
 
+MARGIN = 12
+"""Vertices around those whose colours change that surfaces are looked for in: DEEP, and a normal's own."""
+
 
 def steadied(block: Block, where: Mask, log: Array) -> Block:
     """The block, without noise at vertices `where` [X,Y,Z] whose light is to be multiplied by e^log [N]."""
     share = np.clip((log - FROM) / (TO - FROM), 0.0, 1.0)
     rows = np.flatnonzero(share > 0.0)
-    surface = surfels_of(block) if len(rows) else Surfels(np.zeros((0, 3)), np.zeros((0, 3)))
+    if not len(rows):
+        return block
+    at = np.argwhere(where)[rows]
+    near = block.cropped(at.min(axis=0) - MARGIN, at.max(axis=0) + MARGIN)
+    surface = surfels_of(near)
     if not len(surface.points):
         return block
     voxel = max(block.spacing)
@@ -39,11 +46,11 @@ def steadied(block: Block, where: Mask, log: Array) -> Block:
     found, nearest = cKDTree(surface.points).query(
         block.positions(where)[rows], k=count, distance_upper_bound=DEEP * voxel, workers=-1
     )
-    near = np.isfinite(found[:, 0])
-    rows, found, nearest = rows[near], found[near], nearest[near]
+    over = np.isfinite(found[:, 0])
+    rows, found, nearest = rows[over], found[over], nearest[over]
     nearest = np.where(np.isfinite(found), nearest, nearest[:, :1])
     used, place = np.unique(nearest, return_inverse=True)
-    colours, opacity = shown(block, surface.take(used))
+    colours, opacity = shown(near, surface.take(used))
     place = place.reshape(nearest.shape)
     weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / voxel**2) * opacity[place]
     total = weight.sum(axis=1)
