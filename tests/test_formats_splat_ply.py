@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tracemalloc
 import warnings
 from pathlib import Path
 
@@ -12,7 +14,7 @@ from cagefield.errors import FieldError
 from cagefield.formats.splat_files import read_splats, write_splats
 from cagefield.ply import read_ply
 from scenes import SH_C0
-from splat_scenes import assert_same_splats, random_splats
+from splat_scenes import assert_same_splats, ball_of_splats, random_splats
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "splats"
 
@@ -279,3 +281,20 @@ def test_files_that_others_wrote() -> None:
     assert -3.3 < biker.means[:, 1].min() < -3.0 and -0.01 < biker.means[:, 1].max() < 0.01
     assert not tiny.sh[:, 1:].any() and fruit.sh[:, 9:].any()
     np.testing.assert_allclose(tiny.opacities, 0.95, atol=1e-6)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="files with holes are POSIX's")
+def test_a_row_of_text_without_an_end_is_not_read_to_its_own(tmp_path: Path) -> None:
+    """20 GB of zeros where rows of text should be: one line that says so, at once."""
+    write_splats(ball_of_splats(3), tmp_path / "a.ply")
+    header, _, _ = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
+    file = tmp_path / "text.ply"
+    file.write_bytes(header.replace(b"binary_little_endian", b"ascii") + b"end_header\n")
+    os.truncate(file, 20 << 30)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FieldError, match="its 3 rows of vertex are not 17 numbers each"):
+            read_splats(file)
+        assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    finally:
+        tracemalloc.stop()

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.errors import DatasetError, SceneError
+from cagefield.errors import CagefieldError, DatasetError, SceneError
 from cagefield.npz import DEFLATED, read_array, read_arrays
 from cagefield.regular_files import MOST_TEXT, UnreadableError, check_regular, open_regular, read_text
 from cagefield.scene import Scene
@@ -50,6 +50,34 @@ def test_a_pipe_that_nobody_writes_to_is_not_waited_for(tmp_path: Path) -> None:
         read_text(tmp_path / "pipe.json")
     with pytest.raises(UnreadableError, match="it is a device, not a file"):
         read_text("/dev/zero")
+
+
+@pytest.mark.parametrize(
+    "name", ["field.safetensors", "edits.yaml", "cameras.json", "scene.json", "original.safetensors"]
+)
+def test_what_is_no_file_in_a_scene_is_called_what_it_is(tmp_path: Path, name: str) -> None:
+    ball_scene().save(tmp_path / "scene")
+    part = tmp_path / "scene" / name
+    part.unlink(missing_ok=True)
+    os.mkfifo(part)
+    with pytest.raises(CagefieldError, match=f"{name}: it is a pipe, not a file"):
+        Scene.open(tmp_path / "scene")
+    part.unlink()
+    part.symlink_to("/dev/zero")
+    with pytest.raises(CagefieldError, match=f"{name}: it is a device, not a file"):
+        Scene.open(tmp_path / "scene")
+    part.unlink()
+    part.mkdir()
+    with pytest.raises(CagefieldError, match=rf"{name}( |: ).*([Ii]s a|it is a|a folder)"):
+        Scene.open(tmp_path / "scene")
+
+
+def test_a_camera_path_that_is_a_pipe_is_not_passed_over(tmp_path: Path) -> None:
+    ball_scene().save(tmp_path / "scene")
+    os.mkfifo(tmp_path / "scene" / "camera_path.json")
+    store = SceneStore(Scene.open(tmp_path / "scene"), tmp_path / "scene")
+    with pytest.raises(CagefieldError, match=r"camera_path.json cannot be read \(it is a pipe"):
+        store.document()
 
 
 def test_what_takes_the_place_of_a_file_meanwhile_is_no_file(

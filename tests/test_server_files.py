@@ -20,7 +20,7 @@ from cagefield.kernel_cache import kernel_cache
 from cagefield.scene import Scene
 from cagefield.server.editor.persistence import SceneStore, stem_of
 from cagefield.server.render_worker.own_process import in_own_process
-from cagefield.server.web import uploads
+from cagefield.server.web import opening, uploads
 from cagefield.server.web.app import application
 from cagefield.server.web.launch import open_scene
 from cagefield.server.web.opening import KEPT_DAYS, opened_folder, scene_of_file
@@ -123,6 +123,23 @@ def test_scenes_that_nobody_opened_for_long_leave_the_cache(file: Path, tmp_path
     newest = scene_of_file(tmp_path / "third.ply")
     assert (old.exists(), kept.exists(), newest.exists()) == (False, True, True)
     assert scene_of_file(tmp_path / "third.ply") == newest
+
+
+@pytest.mark.skipif(os.name != "posix", reason="files with holes are POSIX's")
+def test_what_memory_cannot_hold_is_refused_before_its_digest(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file of 20 GB, all holes, would take minutes to go through; one that fits is opened as others are."""
+    monkeypatch.setattr(opening, "_LARGE", 1)
+    scene = scene_of_file(file)
+    assert len(read_splats(file)) == len(Scene.open(scene).field) and scene_of_file(file) == scene
+    huge = tmp_path / "huge.splat"
+    huge.touch()
+    os.truncate(huge, 20 << 30)
+    monkeypatch.setattr("cagefield.devices.free_memory", lambda: 16 << 30)
+    monkeypatch.setattr(opening, "_digest", lambda file: pytest.fail("it was gone through"))
+    with pytest.raises(CagefieldError, match=r"its 671088640 splats are too many: it takes 37\.6 GB"):
+        scene_of_file(huge)
 
 
 def test_a_file_with_a_long_name_is_opened(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, BinaryIO, cast
@@ -30,6 +31,7 @@ _TYPES = {
 _ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 _HEADER = 1 << 20  # bytes that a header may take
 _LINES = 1 << 16  # rows of text that are held at a time
+_LINE = 1 << 16  # bytes that a row of text may take
 
 
 @dataclass(frozen=True)
@@ -134,9 +136,10 @@ def _text(path: Path, file: BinaryIO, element: _Element) -> Callable[[int, int],
     names = [name for name, _ in element.properties]
     row = np.dtype((np.float64, (len(names),)))
     spool = cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 26))  # noqa: SIM115 - it ends with `rows`
+    every = iter(partial(file.readline, _LINE), b"")  # what has no end of lines is not read to its own
     done = 0
     while done < element.count:
-        lines = [line.split() for line in islice(file, min(_LINES, element.count - done))]
+        lines = [line.split() for line in islice(every, min(_LINES, element.count - done))]
         try:
             if not lines:
                 raise ValueError

@@ -57,6 +57,7 @@ from cagefield.scene_files import (
     ORIGINAL,
     VERSION,
     check_destination,
+    check_part,
     read_cameras,
     read_field,
     read_manifest,
@@ -190,12 +191,11 @@ class Scene:
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
         background, gains, preserve_opacity = read_manifest(folder)
         for name in (FIELD, CAMERAS, EDITS):
-            if not (folder / name).is_file():
-                raise SceneError(f"{folder / name} is missing; copy it back or train the scene again")
+            check_part(folder / name)
         cameras = read_cameras(folder / CAMERAS)
         edits = load_edits(folder / EDITS, check=False, mend=True)
         field = read_field(folder / FIELD)
-        original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).is_file() else None
+        original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
         try:
             return cls(
                 field,

@@ -14,7 +14,7 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.regular_files import read_text, real_path
+from cagefield.regular_files import UnreadableError, check_regular, read_text, real_path
 from cagefield.rendering.render_result import background_rgb
 
 FORMAT = "cagefield-scene"
@@ -68,13 +68,29 @@ def is_scene(path: Path | str) -> bool:
     return isinstance(document, dict) and document.get("format") == FORMAT
 
 
+def check_part(path: Path) -> None:
+    """Passes where a file of a scene is there to be read. Raises SceneError with what is there instead."""
+    cure = "copy it back or train the scene again"
+    try:
+        check_regular(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise SceneError(f"{path} is missing; {cure}") from None
+    except IsADirectoryError:
+        raise SceneError(f"{path} is a folder, not a file; {cure}") from None
+    except UnreadableError as error:
+        raise SceneError(f"{path}: {error}") from None
+    except OSError as error:
+        raise SceneError(f"{path} cannot be read ({error.strerror}); {cure}") from None
+
+
 def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool]:
     """Background, gains, unchecked, and the opacity choice."""
     path = folder / MANIFEST
-    if not path.is_file():
+    if not path.exists():
         raise SceneError(
             f"folder {folder} holds no {MANIFEST}: it is not a scene; give the folder of a scene"
         )
+    check_part(path)
     document = _read_json(path)
     if document.get("format") != FORMAT:
         raise SceneError(

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import json
 import random
+import sys
+import tempfile
 import time
 import warnings
 from dataclasses import dataclass, field
@@ -10,7 +15,7 @@ from functools import cache
 from pathlib import Path
 
 from kill_commands import COMMANDS, SESSION_STEPS, SLOW_COMMANDS, Command
-from kill_points import Ended, forked, started
+from kill_points import Ended, Say, forked, started
 from write_points import is_loaded
 
 ALL = {**COMMANDS, **SLOW_COMMANDS}
@@ -104,10 +109,35 @@ def _warm() -> None:
     parse(["info", "scene"])
 
 
+_IMPORTED: set[str] = set()
+"""Slow commands whose modules this process has."""
+
+
+def import_for(name: str) -> None:
+    """Imports what a slow command imports, once for all forked processes; it has been run once for that.
+
+    Its kernels and its threads begin after the fork; this process must have begun none.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        folder, found = Path(place, "folder"), Path(place, "modules.json")
+        folder.mkdir()
+        ALL[name].make(folder)
+
+        def work(say: Say) -> None:
+            ALL[name].work(folder, say)
+            found.write_text(json.dumps([module for module in sys.modules if not module.startswith("_")]))
+
+        forked(work, folder, 0)
+        for module in json.loads(found.read_text()):
+            with contextlib.suppress(Exception):  # some are not found by their names
+                importlib.import_module(module)
+    _IMPORTED.add(name)
+
+
 def _process(
     command: Command, name: str, folder: Path, at: int, after: float | None = None, writes: bool = False
 ) -> Ended:
-    if name in SLOW_COMMANDS or (writes and not is_loaded()):
+    if (name in SLOW_COMMANDS and name not in _IMPORTED) or (writes and not is_loaded()):
         return started(name, folder, at, after, writes=writes)
     return forked(lambda say: command.work(folder, say), folder, at, after, writes=writes)
 

@@ -113,7 +113,7 @@ class Export:
         scene = Scene.open(self.scene)
         devices.start(self.device)
         path = self.scene / "camera_path.json"
-        keys, loop = load_keys(path) if path.is_file() else ((), False)
+        keys, loop = load_keys(path) if path.exists() else ((), False)
         with progress_bar("Edits along the path") as move:
             page = ScenePage.of(
                 scene,

@@ -97,13 +97,31 @@ def read_splats(
         FieldError: no such file, a format that is not known, a file that is damaged or holds no splat that is
             visible.
     """
-    source = open_splats(Path(path))
-    count, degree = source.count, min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
-    shapes = ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
-    if (lacking := lacking_memory(4 * count * sum(map(math.prod, shapes)))) is not None:
-        raise FieldError(f"{path}: its {count} splats are too many: {lacking}")
+    return read_opened(open_fitting(Path(path)), axes, on_progress)
+
+
+def open_fitting(path: Path) -> SplatSource:
+    """The open file of splats. Raises FieldError as `open_splats`, and for more than memory can hold."""
+    source = open_splats(path)
+    needed = 4 * source.count * sum(map(math.prod, _shapes(source)))
+    if (lacking := lacking_memory(needed)) is not None:
+        raise FieldError(f"{path}: its {source.count} splats are too many: {lacking}")
+    return source
+
+
+def _shapes(source: SplatSource) -> tuple[tuple[int, ...], ...]:
+    """The shapes of a splat's values."""
+    degree = min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
+    return ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
+
+
+def read_opened(
+    source: SplatSource, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
+) -> SplatField:
+    """The splats of an open file, as `read_splats` has them. Raises FieldError where none is visible."""
+    count = source.count
     found = _with_visible(source)  # before memory is taken for all of them
-    arrays = [np.empty((count, *shape), np.float32) for shape in shapes]
+    arrays = [np.empty((count, *shape), np.float32) for shape in _shapes(source)]
     done = 0
     for batch in _batches(source, found, axes):
         parts = (batch.means, batch.log_scales, batch.quaternions, batch.opacities, batch.sh)

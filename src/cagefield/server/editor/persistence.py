@@ -73,7 +73,7 @@ class SceneStore:
         """What the scene's folder holds. Raises CagefieldError for a camera path that cannot be read."""
         keys: tuple[Keyframe, ...] = ()
         loop = False
-        if (self.path / CAMERA_PATH).is_file():
+        if (self.path / CAMERA_PATH).exists():
             keys, loop = load_keys(self.path / CAMERA_PATH)
         return Document.of(
             absolute(self.scene.edits, self.origin),

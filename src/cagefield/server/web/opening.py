@@ -12,7 +12,7 @@ import shutil
 import time
 from pathlib import Path
 
-from cagefield.regular_files import open_regular
+from cagefield.regular_files import check_regular, open_regular
 from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import stem_of
 
@@ -23,6 +23,9 @@ _LONGEST = 100
 """Bytes of a file's name in its scene's: names have 255 at most, with what autosaves and drafts add."""
 
 _BLOCK = 1 << 22
+
+_LARGE = 1 << 28
+"""Bytes of a file that is opened before its digest is made."""
 
 
 def opened_folder() -> Path:
@@ -35,16 +38,18 @@ def scene_of_file(file: Path) -> Path:
 
     Raises CagefieldError for a file that holds no splats.
     """
-    from cagefield.formats.splat_files import read_splats
+    from cagefield.formats.splat_files import open_fitting, read_opened
     from cagefield.formats.splat_import import import_splats
     from cagefield.scene import Scene
 
     stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
+    # What memory cannot hold is refused before minutes go into its digest.
+    source = open_fitting(file) if file.is_file() and check_regular(file) > _LARGE else None
     folder = opened_folder() / f"{stem}-{_digest(file)}"
     if is_scene(folder):
         os.utime(folder)
     else:
-        found = import_splats(read_splats(file))
+        found = import_splats(read_opened(source or open_fitting(file)))
         folder.parent.mkdir(parents=True, exist_ok=True)
         _tidy(folder.parent)
         Scene(found.field, cameras=found.cameras, background=found.background).save(folder)
