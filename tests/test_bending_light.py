@@ -127,6 +127,10 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     known = block.colours(top & (block.slot >= 0))
     assert len(known) > 50 and known.std() < 0.05 and abs(known.mean() - 0.6) < 0.1
     assert (block.density[top] > 0.3 * field.density.max()).mean() > 0.9
+    light = bent_voxels(noisy, EditStack(), RAISED.replace(fill="none"), LIGHT)
+    assert light is not None
+    block, plain = (block_of(noisy, EditStack(stack), noisy.bounds) for stack in ([light], []))
+    np.testing.assert_array_equal(block.density, plain.density)
 
 
 def test_what_stays_where_it_is_has_no_other_light():

@@ -66,7 +66,8 @@ class Edit:
     - allow_folding: True evaluates a folded shell instead of raising; where it overlaps itself, one of the
       sheets is shown.
     - fill: what a move or a delete uncovers: "surroundings" goes on with the surface that it stood on, "none"
-      leaves it as it was trained, a `Clone` copies a cage.
+      leaves it as it was trained, a `Clone` copies a cage. Under a continuous edit that takes its light along
+      "surroundings" does so where that grows a lot.
     - relight: "occlusion" takes contact shadows along, "shadow" those of a dominant light too, where one is
       found, a `CastShadow` those of a light that is set by hand; "none" leaves all.
     - feather: of a discrete edit of voxels, how many voxels along the faces of V blend into what is there.

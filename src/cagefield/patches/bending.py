@@ -106,7 +106,7 @@ def bent_voxels(
     """The edit that changes the light of a voxel field under a continuous edit; None where none changes.
 
     `block` is its `bent_block`, where that is known. What cameras did see, by their `sight` of the field
-    without edits, is not filled.
+    without edits, is not filled; nothing is unless the edit's `fill` is "surroundings".
     """
     box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
     block = block or bent_block(field, below, edit, ambience)
@@ -114,7 +114,9 @@ def bent_voxels(
     where = block.slot >= 0
     log = bent.light.at(bent.block, block.positions(where))
     log[np.abs(log) < UNSEEN] = 0.0
-    relit = _filled(steadied(block, where, log).relit(where, np.exp(log)), edit, bent, below, sight)
+    relit = steadied(block, where, log).relit(where, np.exp(log))
+    if edit.fill == "surroundings":
+        relit = _filled(relit, edit, bent, below, sight)
     changed = relit.differs(block)
     if not changed.any():
         return None

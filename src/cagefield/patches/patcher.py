@@ -181,7 +181,7 @@ class Patcher:
             return None
         stack = EditStack(below)
         shape = edit.inner, edit.outer, edit.deformed, edit.shell, edit.falloff, edit.width
-        key: Key = ("light", *stack.active, *shape, edit.allow_folding, edit.relight)
+        key: Key = ("light", *stack.active, *shape, edit.allow_folding, edit.relight, edit.fill)
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Edit | None", self._kept[key])
