@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from reader_seeds import Reader
 
 from cagefield.datasets import left_out, points, poses_work, raw_photos, structure_from_motion
+from cagefield.datasets.database_check import check_database
+from cagefield.datasets.features import Photo
 from cagefield.errors import CagefieldError
 from cagefield.rendering.video_encoder import encoder, is_ours
 from posed_photos import photos_alone
@@ -78,15 +82,20 @@ def _read_points(folder: Path) -> None:
     found.take(np.arange(len(found)) % 2 == 0)
 
 
+def _cameras_and_photos() -> tuple[list[Any], list[Photo]]:
+    import pycolmap
+
+    camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", 30.0, 24, 16)
+    return [camera], [Photo(f"{n:06}.png", 0) for n in range(3)]
+
+
 def _make_database(folder: Path) -> None:
     """Three photos of ten features each, all matched."""
     import pycolmap
 
     from cagefield.datasets import features
 
-    camera = pycolmap.Camera.create_from_model_name(1, "SIMPLE_RADIAL", 30.0, 24, 16)
-    photos = [features.Photo(f"{n:06}.png", 0) for n in range(3)]
-    features.create_database(folder / "database.db", [camera], photos)
+    features.create_database(folder / "database.db", *_cameras_and_photos())
     chance, pairs = np.random.default_rng(0), np.stack([np.arange(10, dtype=np.uint32)] * 2, axis=1)
     with features.opened(folder / "database.db") as database:
         for n in range(1, 4):
@@ -107,6 +116,11 @@ def _read_database(folder: Path) -> None:
 
     for journal in folder.glob("database.db-*"):
         journal.unlink()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        check_database(folder / "database.db", *_cameras_and_photos())
+    if not (folder / "database.db").exists():
+        raise CagefieldError("it is damaged, and the features are found again")
     features.likely_pairs(folder / "database.db", 3)
     left_out.verified_matches(folder / "database.db", 3)
 

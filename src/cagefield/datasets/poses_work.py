@@ -10,8 +10,6 @@ import contextlib
 import json
 import os
 import shutil
-import sqlite3
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
@@ -26,7 +24,7 @@ from cagefield.datasets.features import OnProgress
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError, line_of
 from cagefield.leftovers import hidden_name, remove_leftovers
-from cagefield.regular_files import check_regular, read_bytes
+from cagefield.regular_files import read_bytes
 
 _VERSION = 1
 
@@ -146,42 +144,6 @@ def _known_photos(note: Path, images: Path) -> tuple[list[RawPhoto], dict[str, s
     except (OSError, ValueError, TypeError, KeyError, AttributeError):  # OSError: a name that is too long
         return None
     return (photos, unreadable) if whole else None
-
-
-def check_database(database: Path, names: Sequence[str]) -> None:
-    """Removes a database that is damaged or of other photos than `names`, with a warning that says so.
-
-    Raises DatasetError for one that may not be written. Nothing else has it open meanwhile: SQLite's locks
-    do not know of each other where two libraries of it are in one process.
-    """
-    if not database.exists():
-        return
-    try:
-        check_regular(database)
-    except OSError as error:
-        raise DatasetError(f"{database} is in the way ({error.strerror}); move it away") from None
-    folder = database.parent
-    if not (os.access(database, os.R_OK | os.W_OK) and os.access(folder, os.W_OK)):
-        raise DatasetError(f"{database} may not be written; make it and {folder} writable, or move it away")
-    try:
-        with contextlib.closing(sqlite3.connect(database)) as opened:
-            said = str(opened.execute("PRAGMA quick_check(1)").fetchone()[0])
-            tables = {name for (name,) in opened.execute("SELECT name FROM sqlite_master")}
-            known = "SELECT name FROM images ORDER BY image_id"
-            if said == "ok" and "images" not in tables:
-                said = "it holds no photos"
-            elif said == "ok" and [name for (name,) in opened.execute(known)] != list(names):
-                said = "it is of other photos"
-    except sqlite3.OperationalError:  # locked, or the disk's fault: COLMAP says what
-        return
-    except sqlite3.DatabaseError as error:
-        said = str(error)
-    if said == "ok":
-        return
-    reason = " ".join(said.split())[:120]
-    warnings.warn(f"{database} is damaged ({reason}); features and matches are found anew", stacklevel=2)
-    for file in folder.glob("database.db*"):
-        file.unlink()
 
 
 def _is_within(name: str) -> bool:

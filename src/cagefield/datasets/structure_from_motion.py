@@ -22,11 +22,11 @@ from cagefield import json_text
 from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.datasets import features, repeated_views
 from cagefield.datasets.colmap_files import check_whole
+from cagefield.datasets.database_check import check_database
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.left_out import Matches, reasons_left_out, verified_matches, why_none
 from cagefield.datasets.matching import match
 from cagefield.datasets.poses_work import (
-    check_database,
     kept_work,
     plainly_named,
     prepare_work,
@@ -117,10 +117,10 @@ def _made(
         raise DatasetError(f"{source}: {len(photos)} photos can be read, at least 3 are needed{reasons}")
     names = plainly_named(photos, work)
     database = work / "database.db"
-    check_database(database, names)
+    cameras, shared = camera_guesses(photos)
+    listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
+    check_database(database, cameras, listed)
     if not database.is_file():
-        cameras, shared = camera_guesses(photos)
-        listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
         features.create_database(database, cameras, listed)
     masks = work / "masks"
     features.extract(
