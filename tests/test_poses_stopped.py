@@ -184,6 +184,7 @@ WRONG = {
         "UPDATE descriptors SET rows = 9, data = substr(data, 1, 9 * 128) WHERE image_id = 2",
         "photo 2 has .* features, and 9 are described",
     ),
+    "descriptors of another type": ("UPDATE descriptors SET type = 7", "features are of another type"),
     "a number for an array": ("UPDATE descriptors SET data = 5", "numbers in 1 bytes"),
     "less than it says": ("UPDATE keypoints SET rows = 1000000000", "keypoints are 1000000000 x"),
     "less than nothing": ("UPDATE keypoints SET rows = -1", "keypoints are -1 x"),

@@ -40,6 +40,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--floods", type=int, default=4)
     parser.add_argument("--only", nargs="*", default=None)
+    parser.add_argument("--encrypted", action="store_true", help="all of them over TLS")
     parser.add_argument("--out", type=Path, default=None)
     options = parser.parse_args()
     rows = []
@@ -49,7 +50,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             ball_scene().save(Path(folder) / "scene")
             secure = []
-            if name in ENCRYPTED:
+            if options.encrypted or name in ENCRYPTED:
                 file, key = certificate_of_localhost(Path(folder))
                 secure = ["--certificate", str(file), "--certificate-key", str(key)]
             with editor_server(Path(folder) / "scene", *secure) as server:
@@ -67,6 +68,7 @@ def main() -> None:
 
 
 def _table(rows: list[str], options: argparse.Namespace) -> str:
+    secure = " --encrypted" * options.encrypted
     return f"""# Floods
 
 {options.floods} pages or programs flood one editor; another page asks a question every {EVERY:g} s. Seconds
@@ -74,7 +76,7 @@ from its question to the answer, how many took more than a second, and by how mu
 
 {cpu_model()}, {devices.threads()} cores, on which the floods and other work ran too.
 
-    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods}
+    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods}{secure}
 
 | flood | questions | median, s | 95 %, s | longest, s | above 1 s | memory, MiB |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |

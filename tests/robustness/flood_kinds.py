@@ -7,13 +7,14 @@ import http.client
 import itertools
 import json
 import socket
+import ssl
 import threading
 import time
 from collections.abc import Callable, Iterator
 
 from websockets.sync.client import ClientConnection, connect
 
-from editor_server import EditorAt
+from editor_server import EditorAt, trusting_all
 
 Flood = Callable[[EditorAt, threading.Event], None]
 """Floods an editor until the event is set."""
@@ -21,10 +22,12 @@ Flood = Callable[[EditorAt, threading.Event], None]
 
 @contextlib.contextmanager
 def _socket(server: EditorAt) -> Iterator[ClientConnection]:
-    origin = f"http://localhost:{server.port}"
+    origin = f"{server.scheme}://localhost:{server.port}"
     cookie = {"Cookie": f"cagefield_{server.port}={server.token}"}
+    encrypted = server.scheme == "https"
     with connect(
-        f"ws://localhost:{server.port}/socket",
+        f"{'wss' if encrypted else 'ws'}://localhost:{server.port}/socket",
+        ssl=trusting_all() if encrypted else None,
         origin=origin,  # type: ignore[arg-type]
         max_size=None,
         additional_headers=cookie,
@@ -70,31 +73,75 @@ def _edits(count: int, operations: int) -> str:
     return json.dumps({"type": "load_edits", "text": json.dumps({"edits": [edit] * count})})
 
 
-def _never_reading(server: EditorAt, over: threading.Event) -> None:
-    """Pages that send what has answers, and read none: their lines are small, and stay full."""
-    key = f"cagefield_{server.port}={server.token}"
+def page_line(server: EditorAt, *, waiting: bool = True) -> socket.socket:
+    """A page's socket, whose line back is small; no message has been read from it."""
+    place = f"localhost:{server.port}"
     head = (
-        f"GET /socket HTTP/1.1\r\nHost: localhost:{server.port}\r\nOrigin: http://localhost:{server.port}\r\n"
-        f"Cookie: {key}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+        f"GET /socket HTTP/1.1\r\nHost: {place}\r\nOrigin: {server.scheme}://{place}\r\n"
+        f"Cookie: cagefield_{server.port}={server.token}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
     )
-    text = b'{"type": "nothing"}'
-    frame = bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text
-    lines = []
-    for _ in range(20):
-        line = socket.socket()
-        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        line.connect(("127.0.0.1", server.port))
-        line.sendall(head.encode())
-        line.setblocking(False)
-        lines.append(line)
-    while not over.is_set():
+    line = socket.socket()
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    line.settimeout(20)
+    line.connect(("127.0.0.1", server.port))
+    if server.scheme == "https":
+        line = trusting_all().wrap_socket(line, server_hostname="localhost")
+    line.sendall(head.encode())
+    answer = b""
+    while waiting and not answer.endswith(b"\r\n\r\n"):  # what comes before it would be passed over
+        part = line.recv(1)
+        if not part:
+            raise ConnectionResetError("the page was not let in")
+        answer += part
+    return line
+
+
+def frame(kind: int, content: bytes) -> bytes:
+    """A frame of a page's, of fewer than 126 bytes; its mask changes nothing."""
+    return bytes([kind, 0x80 | len(content), 0, 0, 0, 0]) + content
+
+
+def _never_reading(
+    content: bytes, pages: int = 20, at_once: int = 50, pause: float = 0.05, first: bytes = b""
+) -> Flood:
+    """Pages that send what has answers, and read none: their lines are small, and stay full."""
+
+    def flood(server: EditorAt, over: threading.Event) -> None:
+        lines: list[socket.socket | None] = [None] * pages
+        while not over.is_set():
+            for number, line in enumerate(lines):
+                try:
+                    if line is None:
+                        line = page_line(server)
+                        line.sendall(first)
+                        line.setblocking(False)
+                        lines[number] = line
+                    line.send(content * at_once)
+                except (BlockingIOError, ssl.SSLWantWriteError):  # full
+                    pass
+                except OSError:  # closed: another page
+                    lines[number] = None
+            time.sleep(pause)
         for line in lines:
-            with contextlib.suppress(OSError):
-                line.send(frame * 50)
-        time.sleep(0.05)
-    for line in lines:
-        line.close()
+            if line is not None:
+                line.close()
+
+    return flood
+
+
+def _pinging(server: EditorAt, over: threading.Event) -> None:
+    """Pings as fast as they are taken; the answers are read."""
+    frames = frame(0x89, bytes(125)) * 500
+    while not over.is_set():
+        with contextlib.suppress(OSError), page_line(server) as line:
+            line.setblocking(False)
+            while not over.is_set():
+                with contextlib.suppress(BlockingIOError, ssl.SSLWantWriteError, ssl.SSLWantReadError):
+                    line.send(frames)
+                with contextlib.suppress(BlockingIOError, ssl.SSLWantWriteError, ssl.SSLWantReadError):
+                    while line.recv(1 << 16):
+                        pass
 
 
 def _beginning(start: bytes) -> Flood:
@@ -151,7 +198,11 @@ FLOODS: dict[str, Flood] = {
     "changes that all pages are told of": _sending(
         lambda number: json.dumps({"type": "scene_change", "preserve_opacity": bool(number % 2)})
     ),
-    "pages that never read": _never_reading,
+    "pages that never read": _never_reading(frame(0x81, b'{"type": "nothing"}')),
+    "pings that nobody reads the answers of": _never_reading(frame(0x89, bytes(125)), 4, 500, 0.001),
+    "pings": _pinging,
+    "texts that are none": _never_reading(frame(0x81, b"\xff"), 4, 500, 0.001),
+    "empty parts of a message": _never_reading(frame(0x00, b"") * 2000, 4, 1, 0.001, frame(0x01, b"")),
     "requests half sent": _beginning(b"GET /edits.yaml HTTP/1.1\r\nHost: local"),
     "handshakes half sent": _beginning(b"\x16\x03\x01"),
     "connections that never shake hands": _beginning(b""),

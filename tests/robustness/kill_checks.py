@@ -148,6 +148,17 @@ def json_problem(name: str) -> Check:
     return _read_with(name, lambda path: json.loads(path.read_text()))
 
 
+def table_problem(name: str) -> Check:
+    """A table in Markdown: whole lines, some of them rows."""
+
+    def read(path: Path) -> None:
+        text = path.read_text()
+        if not text.endswith("\n") or text.count("\n|") < 3:
+            raise ValueError("the table is cut off")
+
+    return _read_with(name, read)
+
+
 def page_folder_problem(name: str) -> Check:
     """A page in a folder: whole scripts and what they load."""
 

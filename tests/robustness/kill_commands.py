@@ -184,6 +184,34 @@ def _poses(folder: Path, say: Say) -> None:
     say(1)
 
 
+@cache
+def _posed_video() -> tempfile.TemporaryDirectory[str]:
+    """The photos as a video, and the data set that was made of it; made once, by another process."""
+    from cagefield.rendering.images import read_image
+    from cagefield.rendering.video_encoder import encoder
+
+    folder = tempfile.TemporaryDirectory(prefix="cagefield-posed-video-")
+    video = Path(folder.name) / "v.mp4"
+    pictures = [read_image(file) for file in sorted((Path(_posed().name) / "photos").iterdir())]
+    height, width = pictures[0].shape[:2]
+    with encoder(video, (width, height), 4.0, 10) as encode:
+        for picture in pictures:
+            encode(picture[..., :3].tobytes())
+    words = ["poses", str(video), "-o", f"{folder.name}/data", "--frames", "4"]
+    subprocess.run([sys.executable, "-m", "cagefield", *words], check=True, capture_output=True)
+    return folder
+
+
+def _make_posed_video(folder: Path) -> None:
+    shutil.copytree(_posed_video().name, folder, dirs_exist_ok=True)
+    (folder / "data" / "notes.txt").write_text("mine")
+
+
+def _poses_of_video(folder: Path, say: Say) -> None:
+    cli("poses", folder / "v.mp4", "-o", folder / "data", "--frames", "4", "--overwrite")
+    say(1)
+
+
 _pictures = Command(_make_pictures, _render, pictures_problem)
 _posing = Command(_make_posed, _poses, poses_problem)
 
@@ -211,6 +239,7 @@ SLOW_COMMANDS: dict[str, Command] = {
     "make-scene": Command(put_scene, _make_scene, photos_problem("out")),
     "poses": _posing,
     "poses, renames": renamed(_posing, "data"),
+    "poses of a video": Command(_make_posed_video, _poses_of_video, poses_problem),
     "render, pictures, renames": renamed(_pictures, "out"),
     **SLOW_LINES,
 }

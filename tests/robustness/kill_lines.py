@@ -20,6 +20,7 @@ from kill_checks import (
     picture_problem,
     ply_problem,
     scene_problem,
+    table_problem,
     trained_problem,
 )
 from kill_command import Check, Command, Make, cli, put_scene, put_splats, renamed
@@ -67,6 +68,15 @@ _OLD_LINES = {
     "fitted.ply": "export {}/scene -o {}/fitted.ply --steps 2 --splats 100",
     "grids.png": "bench grids -o {}/grids.png --methods trilinear",
     "speed.json": "bench speed {}/scene -o {}/speed.json --size 24 --cameras 1 --rounds 1",
+    "curve.csv": "bench training {}/made -o {}/curve.csv --steps 3 --resolution 16 --scene-out {}/new",
+    "edits.md": (
+        "bench edits -o {}/edits.md --scenes chair --edits lean_back --views 3 --size 16 --test-views 1 "
+        "--steps 3 --resolution 16 --exact-size 16 --exact-views 1 --no-methods --workdir {}/work"
+    ),
+    "captures.md": (
+        "bench captures room-chair -o {}/captures.md --room-views 8 --room-size 48 --steps 2 --splats 100 "
+        "--workdir {}/work"
+    ),
     "one.png": "render {}/scene -o {}/one.png --views 0 --size 24",
     "out": "export {}/scene -o {}/out --as page --embed",
     "made": "make-scene chair -o {}/made --views 2 --test-views 1 --size 16",
@@ -179,6 +189,32 @@ def _appended_problem(folder: Path, said: int) -> str | None:
     return found
 
 
+def _make_curve(folder: Path) -> None:
+    """Photos, a curve, and the scene that came of it."""
+    put_scene(folder)
+    shutil.copytree(_old("made"), folder / "made")
+    _old_curve()
+    for name in ("curve.csv", "curve.md"):
+        shutil.copyfile(Path(_old_curve().name) / name, folder / name)
+    shutil.copytree(Path(_old_curve().name) / "new", folder / "new")
+
+
+@cache
+def _old_curve() -> tempfile.TemporaryDirectory[str]:
+    folder = tempfile.TemporaryDirectory(prefix="cagefield-old-")
+    shutil.copytree(_old("made"), Path(folder.name) / "made")
+    words = [word.replace("{}", folder.name) for word in _OLD_LINES["curve.csv"].split()]
+    subprocess.run([sys.executable, "-m", "cagefield", *words], check=True, capture_output=True)
+    return folder
+
+
+def _curve_problem(folder: Path, said: int) -> str | None:
+    """What is wrong with a curve, its table or its scene."""
+    if not (folder / "curve.csv").read_text().startswith("seconds,"):
+        return "unreadable: the curve is cut off"
+    return table_problem("curve.md")(folder, said) or scene_problem(folder, 0, "new")
+
+
 _pages = _over_old_folder("out", page_folder_problem("out"))
 _photos = _over_old_folder("made", photos_problem("made"))
 _demo = _over_old_folder("demo", demo_problem)
@@ -207,6 +243,9 @@ SLOW_LINES: dict[str, Command] = {
     "make-scene, renames": renamed(_photos, "made"),
     "make-scene, a room": _over_old_folder("room", photos_problem("room")),
     "render .png": _over_old_file("one.png", picture_problem("one.png")),
+    "bench edits": _over_old_file("edits.md", table_problem("edits.md")),
+    "bench captures": _over_old_file("captures.md", table_problem("captures.md")),
+    "bench training": _line(_OLD_LINES["curve.csv"], _make_curve, old_problem("curve.csv", _curve_problem)),
     "bench speed": _over_old_file("speed.json", json_problem("speed.json")),
     "demo": _demo,
     "demo, renames": renamed(_demo, "demo"),

@@ -42,6 +42,7 @@ def encrypted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer
     [
         "binary messages",
         "pages that never read",
+        "pings that nobody reads the answers of",
         "edit files of 300 edits",
         "requests half sent",
         "wrong tokens",
@@ -51,7 +52,7 @@ def test_another_page_has_its_answers(server: EditorServer, name: str) -> None:
     _check(server, name)
 
 
-@pytest.mark.parametrize("name", ENCRYPTED)
+@pytest.mark.parametrize("name", (*ENCRYPTED, "pages that never read", "pings"))
 def test_another_encrypted_page_has_its_answers(encrypted: EditorServer, name: str) -> None:
     _check(encrypted, name)
 

@@ -129,6 +129,8 @@ def _features_problem(opened: sqlite3.Connection, counts: dict[int, int]) -> str
         if not np.isfinite(np.frombuffer(values, np.float32)).all():
             return f"features of photo {photo} have no places"
     counts.update(opened.execute("SELECT image_id, rows FROM keypoints"))
+    if opened.execute("SELECT 1 FROM descriptors WHERE type != 0").fetchone():
+        return "its features are of another type"
     for photo, rows, cols, size in opened.execute(
         "SELECT image_id, rows, cols, length(CAST(data AS BLOB)) FROM descriptors"
     ):

@@ -36,6 +36,7 @@ from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
 from cagefield.server.web.opening import scene_of_file
 from cagefield.server.web.patience import PatientHttp
+from cagefield.server.web.patient_socket import PatientSocket
 from cagefield.server.web.security import Guard
 from cagefield.server.web.tls import TlsHttp
 
@@ -210,6 +211,7 @@ def serve(
         application(coordinator, hello, guard, reopen),
         log_level="warning",
         http=PatientHttp if certificate is None else _encrypted(certificate),
+        ws=PatientSocket,
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=2,

@@ -12,7 +12,10 @@ HEAD_SECONDS = 10.0
 """Seconds that the head of a request may take, from the connection or its first byte; and a handshake."""
 
 MOST_WAITING = 256
-"""Connections that owe a handshake, a head, or a body that was answered; the oldest is closed for another."""
+"""Connections that owe a handshake, a head, the rest of a body that was answered, or TLS's goodbye.
+
+The oldest is closed for another.
+"""
 
 AT_A_TIME = 8 << 10
 """Bytes of a page's messages that are read before other connections have their turn."""
@@ -28,12 +31,12 @@ class Impatient(Protocol):
 _waiting: dict[Impatient, asyncio.TimerHandle] = {}
 
 
-def awaited(connection: Impatient, loop: asyncio.AbstractEventLoop) -> None:
+def awaited(connection: Impatient, loop: asyncio.AbstractEventLoop, seconds: float = HEAD_SECONDS) -> None:
     """The connection is given up unless it is `no_longer_awaited` in time, or when too many others come."""
     no_longer_awaited(connection)
     while len(_waiting) >= MOST_WAITING:
         next(iter(_waiting)).give_up()
-    _waiting[connection] = loop.call_later(HEAD_SECONDS, connection.give_up)
+    _waiting[connection] = loop.call_later(seconds, connection.give_up)
 
 
 def no_longer_awaited(connection: Impatient) -> None:

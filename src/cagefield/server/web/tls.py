@@ -1,15 +1,54 @@
 """Connections that are encrypted: each agrees on its keys within the limits of `patience`, then speaks HTTP.
 
-asyncio's own way gives a client that says nothing a minute, and tells nobody of it until then.
+asyncio's own way gives a client that says nothing a minute, and tells nobody of it until then; and one that
+says no goodbye another half (Python 3.10: for ever).
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ssl
 from typing import Any
 
 from cagefield.server.web.patience import PatientHttp, awaited, no_longer_awaited
+
+GOODBYE_SECONDS = 3.0
+"""Seconds in which a client must say goodbye of a connection that is closed, or take more of what is left."""
+
+
+class _Goodbye:
+    """A connection that is closed, until its client has taken what is left for it and has said goodbye."""
+
+    def __init__(self, transport: asyncio.Transport, raw: asyncio.Transport) -> None:
+        """From now on `transport.close` begins it; `raw` is what it speaks by."""
+        self._transport, self._raw, self._close = transport, raw, transport.close
+        self._left: int | None = None
+        transport.close = self._begin  # type: ignore[method-assign]
+
+    def _begin(self) -> None:
+        self._close()
+        if self._left is None:
+            self._await()
+
+    def _await(self) -> None:
+        if self._raw.is_closing():
+            return
+        loop, left = asyncio.get_running_loop(), self._raw.get_write_buffer_size()
+        with contextlib.suppress(AttributeError):  # asyncio's, of one that has been closed twice
+            left += self._transport.get_write_buffer_size()
+        if not left:
+            awaited(self, loop, GOODBYE_SECONDS)
+        elif self._left is None or left < self._left:
+            self._left = left
+            loop.call_later(GOODBYE_SECONDS, self._await)
+        else:
+            self.give_up()
+
+    def give_up(self) -> None:
+        """Closes the connection at once."""
+        no_longer_awaited(self)
+        self._raw.abort()
 
 
 class TlsHttp(asyncio.Protocol):
@@ -63,6 +102,7 @@ class TlsHttp(asyncio.Protocol):
             raw.abort()
             return
         protocol = PatientHttp(**self._http)
+        _Goodbye(transport, raw)
         transport.set_protocol(protocol)
         protocol.connection_made(transport)
         for data in self._early:
