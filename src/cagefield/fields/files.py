@@ -8,17 +8,15 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from cagefield.atomic_files import replaced_file
 from cagefield.devices import lacking_memory
 from cagefield.errors import FieldError
+from cagefield.fields.tensor_file import Tensor, read_header
 from cagefield.regular_files import UnreadableError, check_regular, open_regular
-
-_NUMBERS = ("F64", "F32", "F16", "I64", "I32", "I16", "I8", "U64", "U32", "U16", "U8", "BOOL")
-"""Types of tensors that numpy knows and that are real."""
 
 
 def kind_of(path: str | Path) -> str | None:
@@ -27,8 +25,8 @@ def kind_of(path: str | Path) -> str | None:
     Raises:
         FieldError: the file is missing or cannot be read.
     """
-    with _opened(path) as file:
-        return (file.metadata() or {}).get("kind")
+    with _opened(path) as (_, metadata, _):
+        return metadata.get("kind")
 
 
 def read_tensors(
@@ -42,8 +40,7 @@ def read_tensors(
     """
     if not Path(path).exists():
         raise FieldError(f"{path}: no such field file; {cure}")
-    with _opened(path) as file:
-        metadata = file.metadata() or {}
+    with _opened(path) as (file, metadata, known):
         if metadata.get("kind") != kind:
             raise FieldError(f"{path}: kind is {metadata.get('kind')!r:.60}, expected {kind!r}")
         if metadata.get("version") != version:
@@ -51,34 +48,31 @@ def read_tensors(
                 f"{path}: field format {metadata.get('version')!r:.60}, this cagefield reads "
                 f"{version!r}; update cagefield"
             )
-        tensors = {}
-        for name in file.keys():  # noqa: SIM118
-            numbers = file.get_slice(name).get_dtype()
-            if numbers not in _NUMBERS:
+        for name, tensor in known.items():
+            if not tensor.is_number:
                 raise FieldError(
-                    f"{path}: tensor {name!r:.60} is of type {numbers}, which is not read; write it as F32"
+                    f"{path}: tensor {name!r:.60} is of type {tensor.kind:.20}, which is not read; "
+                    "write it as F32"
                 )
-            tensors[name] = file.get_tensor(name)
+        tensors = {name: tensor.read(file) for name, tensor in known.items()}
     return metadata, tensors
 
 
 @contextmanager
-def _opened(path: str | Path) -> Iterator[Any]:
-    """A safetensors file; what goes wrong within is a FieldError that names it."""
-    from safetensors import SafetensorError, safe_open
-
+def _opened(path: str | Path) -> Iterator[tuple[BinaryIO, dict[str, str], dict[str, Tensor]]]:
+    """(open file, its notes, its tensors); what goes wrong within is a FieldError that names it."""
     try:
-        with open_regular(path):  # safetensors calls a file that may not be read one that is not there
-            size = check_regular(path)
-        if (lacking := lacking_memory(size)) is not None:
-            raise FieldError(f"{path}: {lacking}")
-        with safe_open(str(path), framework="numpy") as file:
-            yield file
+        with open_regular(path) as file:
+            if (lacking := lacking_memory(check_regular(path))) is not None:
+                raise FieldError(f"{path}: {lacking}")
+            yield file, *read_header(file)
     except PermissionError as error:
         raise FieldError(f"{path}: it may not be read ({error.strerror}); make it readable") from error
     except UnreadableError as error:
         raise FieldError(f"{path}: {error}") from None
-    except (SafetensorError, OSError) as error:
+    except FieldError:
+        raise
+    except (ValueError, OSError) as error:
         raise FieldError(
             f"{path}: not a readable field file ({error!s:.160}); it may be truncated, write it again"
         ) from error

@@ -25,6 +25,7 @@ from cagefield.keyframes import Keyframe
 from cagefield.leftovers import remove_leftovers, remove_unfinished
 from cagefield.regular_files import read_bytes, read_text, real_path
 from cagefield.scene import Scene
+from cagefield.scene_files import FIELD
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -62,7 +63,8 @@ class SceneStore:
         self.damaged: str | None = None
         """What became of an autosave that could not be read, or None."""
         self._written = self._fingerprint()
-        self._warned = ""
+        self._field = self._field_state()
+        self._warned: object = None
         self._kept: Document | None = None
         self._values: IdentityCache[Edit, object] = IdentityCache(4 * MOST_EDITS)
         """What files have of the edits that were written last."""
@@ -215,9 +217,14 @@ class SceneStore:
             raise SceneError(f"{self.source.name} is a file and stays as it is; use Save as")
         if not self.path.is_dir():
             raise SceneError(f"{self.path} is not there any more; use Save as, with a new folder")
-        now = self._fingerprint()
-        if now not in (self._written, self._warned):
-            self._warned = now
+        now, field = self._fingerprint(), self._field_state()
+        if (now, field) not in ((self._written, self._field), self._warned):
+            self._warned = now, field
+            if field != self._field:
+                raise SceneError(
+                    f"{self.path / FIELD} was replaced by another program, these edits are of the old one; "
+                    "save again to keep them there all the same, or Save as"
+                )
             raise SceneError(
                 f"{self.path / _EDITS} was changed by another program; save again to replace it, or Save as"
             )
@@ -269,7 +276,7 @@ class SceneStore:
 
     def _done(self, session: Session) -> None:
         session.mark_saved()
-        self._written, self._warned = self._fingerprint(), ""
+        self._written, self._field, self._warned = self._fingerprint(), self._field_state(), None
         self._kept = None
         self.autosave(session)
 
@@ -278,6 +285,14 @@ class SceneStore:
         return dataclasses.replace(
             self.scene, edits=edits, preserve_opacity=document.preserve_opacity, folder=folder
         )
+
+    def _field_state(self) -> tuple[int, int] | None:
+        """When the field's file was written, and its bytes; None where there is none."""
+        try:
+            state = (self.path / FIELD).stat()
+        except OSError:
+            return None
+        return state.st_mtime_ns, state.st_size
 
     def _fingerprint(self) -> str:
         try:

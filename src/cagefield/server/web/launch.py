@@ -29,6 +29,7 @@ from cagefield.scene import Scene
 from cagefield.scene_files import FIELD, is_scene
 from cagefield.server.editor.pasted_sources import source_problem
 from cagefield.server.editor.persistence import SceneStore
+from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
@@ -66,9 +67,13 @@ def open_cached(
     path: Path, source: Path | None, device: str = "auto", root: Path | None = None
 ) -> tuple[Coordinator, server_messages.Hello]:
     """The same of a scene folder, which is that of a file `source` where one is given."""
-    scene = Scene.open(path)
-    store = SceneStore(scene, path, source, root)
-    store.lock()
+    lock = SceneLock(real_path(path))  # what is read is what the last editor saved
+    try:
+        scene = Scene.open(path)
+        store = SceneStore(scene, path, source, root)
+        store.lock()
+    finally:
+        lock.release()
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing, source_problem)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()

@@ -1,0 +1,119 @@
+"""Files that other programs change while they are read, and scenes that change beneath an open editor."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from kill_command import EDITS
+
+from cagefield.edits import EditStack, load_edits
+from cagefield.edits.files import save_edits
+from cagefield.errors import FieldError, SceneError
+from cagefield.fields.tensor_file import read_header
+from cagefield.scene import Scene
+from cagefield.server.editor.persistence import SceneStore
+from cagefield.server.editor.scene_lock import SceneLock
+from cagefield.server.editor.session import Session
+from cagefield.server.web import launch
+from scenes import ball_scene
+from splat_scenes import splat_scene
+
+FIELD = "field.safetensors"
+
+_READ = """
+import sys, time
+from cagefield.errors import FieldError
+from cagefield.scene_files import read_field
+end = time.monotonic() + 3
+while time.monotonic() < end:
+    try:
+        read_field(sys.argv[1])
+    except FieldError:
+        pass
+"""
+
+
+def test_a_field_that_is_cut_off_while_it_is_read_is_a_line(tmp_path: Path) -> None:
+    """Mapped into memory, it ended the process: a bus error."""
+    splat_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / FIELD
+    with file.open("rb") as stream:
+        _, tensors = read_header(stream)
+        os.truncate(file, file.stat().st_size - 4)
+        last = max(tensors.values(), key=lambda tensor: tensor.begin)
+        with pytest.raises(ValueError, match="it has become shorter while it was read"):
+            last.read(stream)
+    with pytest.raises(FieldError, match=r"not a readable field file \(it has .* bytes, its header says"):
+        Scene.open(tmp_path / "scene")
+
+
+def test_a_field_that_is_copied_over_while_it_is_read(tmp_path: Path) -> None:
+    splat_scene().save(tmp_path / "scene")
+    file = tmp_path / "scene" / FIELD
+    whole, over = file.read_bytes(), threading.Event()
+
+    def copy() -> None:
+        while not over.is_set():
+            with file.open("wb") as stream:
+                for start in range(0, len(whole), 4096):
+                    stream.write(whole[start : start + 4096])
+
+    copying = threading.Thread(target=copy)
+    copying.start()
+    try:
+        command = [sys.executable, "-c", _READ, str(file)]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    finally:
+        over.set()
+        copying.join()
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def _opened(folder: Path) -> tuple[SceneStore, Session]:
+    scene = Scene.open(folder)
+    store = SceneStore(scene, folder)
+    session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
+    session.load_edits(EDITS, False)
+    return store, session
+
+
+def test_edits_are_not_saved_onto_another_field_unasked(tmp_path: Path) -> None:
+    """Its edits are the same, none, so that these alone do not tell."""
+    ball_scene().save(tmp_path / "scene")
+    store, session = _opened(tmp_path / "scene")
+    splat_scene().save(tmp_path / "scene", overwrite=True)
+    save_edits(EditStack([]), tmp_path / "scene" / "edits.yaml")
+    with pytest.raises(SceneError, match=r"field\.safetensors was replaced by another program"):
+        store.save(session)
+    assert len(load_edits(tmp_path / "scene" / "edits.yaml")) == 0
+    store.save(session)
+    assert len(load_edits(tmp_path / "scene" / "edits.yaml")) == 1
+    store.save(session)  # known from then on
+    (tmp_path / "scene" / FIELD).unlink()
+    with pytest.raises(SceneError, match="was replaced by another program"):
+        store.save(session)
+
+
+def test_an_editor_reads_what_the_one_before_it_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has the scene to itself before it reads it, or what the other one saves meanwhile would be lost."""
+    ball_scene().save(tmp_path / "scene")
+    file = tmp_path / ".scene.cagefield-lock"
+    held: list[bool] = []
+
+    def opens(path: Path) -> Scene:
+        held.append(file.exists())
+        raise SceneError("enough")
+
+    monkeypatch.setattr(launch.Scene, "open", opens)
+    with pytest.raises(SceneError, match="enough"):
+        launch.open_cached(tmp_path / "scene", None)
+    assert held == [True] and not file.exists()
+    lock = SceneLock(tmp_path / "scene")
+    lock.release()
