@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
-from cagefield.regular_files import open_regular
+from cagefield.regular_files import open_regular, read_array
 
 Columns = dict[str, NDArray[Any]]
 
@@ -178,7 +178,7 @@ def _binary(
         count = max(0, min(last, element.count) - first)
         if not row.itemsize:
             return {}
-        table = np.fromfile(path, row, count, offset=begin + first * row.itemsize)
+        table = read_array(path, row, count, offset=begin + first * row.itemsize)
         return {name: table[name] for name in row.names or ()}
 
     return rows

@@ -11,6 +11,12 @@ import stat
 from pathlib import Path
 from typing import BinaryIO, cast
 
+import numpy as np
+from numpy.typing import DTypeLike
+
+from cagefield.errors import FieldError
+from cagefield.typing import AnyArray
+
 MOST_TEXT = 32 << 20
 """Bytes of a text that is read whole: JSON of some 20,000 cameras."""
 
@@ -63,6 +69,17 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_TEXT) -> str:
     Raises as `open_regular`, and UnicodeDecodeError.
     """
     return read_bytes(path, most).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_array(path: str | os.PathLike[str], dtype: DTypeLike, count: int, offset: int = 0) -> AnyArray:
+    """`count` values of a file from a byte on, which were there when it was opened.
+
+    Raises FieldError where they are not any more: another program has cut the file off.
+    """
+    values: AnyArray = np.fromfile(path, dtype, count, offset=offset)
+    if len(values) != count:
+        raise FieldError(f"{path}: it has become shorter while it was read; wait until it is whole")
+    return values
 
 
 def real_path(path: str | os.PathLike[str]) -> Path:

@@ -15,13 +15,14 @@ from cagefield.edits import EditStack, load_edits
 from cagefield.edits.files import save_edits
 from cagefield.errors import FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
+from cagefield.formats.splat_files import open_splats, read_opened, write_splats
 from cagefield.scene import Scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
 from cagefield.server.web import launch
 from scenes import ball_scene
-from splat_scenes import splat_scene
+from splat_scenes import ball_of_splats, splat_scene
 
 FIELD = "field.safetensors"
 
@@ -72,6 +73,16 @@ def test_a_field_that_is_copied_over_while_it_is_read(tmp_path: Path) -> None:
         over.set()
         copying.join()
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("ending", [".ply", ".compressed.ply", ".splat", ".glb"])
+def test_splats_that_are_cut_off_while_they_are_read_are_a_line(tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"a{ending}"
+    write_splats(ball_of_splats(300), file)
+    source = open_splats(file)
+    os.truncate(file, file.stat().st_size // 2)
+    with pytest.raises(FieldError, match="it has become shorter while it was read"):
+        read_opened(source)
 
 
 def _opened(folder: Path) -> tuple[SceneStore, Session]:

@@ -28,7 +28,7 @@ from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import Axes
 from cagefield.formats.splat_colour_space import srgb_harmonics
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
-from cagefield.regular_files import MOST_TEXT, open_regular
+from cagefield.regular_files import MOST_TEXT, open_regular, read_array
 from cagefield.sh_rotation import turned_sh
 from cagefield.typing import AnyArray
 
@@ -215,7 +215,7 @@ class _Column:
 
     def rows(self, first: int, last: int) -> AnyArray:
         size = (last - first - 1) * self._stride + self._dtype.itemsize
-        raw = np.fromfile(self._path, np.uint8, size, offset=self._begin + first * self._stride)
+        raw = read_array(self._path, np.uint8, size, offset=self._begin + first * self._stride)
         raw = np.concatenate([raw, np.zeros(self._stride - self._dtype.itemsize, np.uint8)])
         raw = raw.reshape(last - first, self._stride)[:, : self._dtype.itemsize]
         base, _ = self._dtype.subdtype or (self._dtype, ())

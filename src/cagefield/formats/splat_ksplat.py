@@ -23,7 +23,7 @@ from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
-from cagefield.regular_files import open_regular
+from cagefield.regular_files import open_regular, read_array
 from cagefield.typing import AnyArray
 
 _HEADER, _SECTION = 4096, 1024
@@ -116,14 +116,14 @@ def _batches(
     degree: int,
     limits: tuple[float, float],
 ) -> Iterator[SplatBatch]:
-    lengths = np.fromfile(path, "<u4", section.lengths, offset=section.lengths_at).astype(np.int64)
+    lengths = read_array(path, "<u4", section.lengths, offset=section.lengths_at).astype(np.int64)
     ends = section.full_buckets * section.bucket_size + np.cumsum(lengths)
-    raw = np.fromfile(path, np.uint8, section.centres * section.centre_bytes, offset=section.centres_at)
+    raw = read_array(path, np.uint8, section.centres * section.centre_bytes, offset=section.centres_at)
     centres = np.zeros((0, 3))
     if section.centres and section.centre_bytes >= 12:
         centres = raw.reshape(section.centres, -1)[:, :12].copy().view("<f4").astype(np.float64)
     for first in range(0, section.count, BATCH):
-        rows = np.fromfile(
+        rows = read_array(
             path, row, min(BATCH, section.count - first), offset=section.splats_at + first * row.itemsize
         )
         means = rows["mean"].astype(np.float64)

@@ -18,7 +18,7 @@ from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
-from cagefield.regular_files import check_regular
+from cagefield.regular_files import check_regular, read_array
 
 _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rotation", "u1", 4)])
 
@@ -36,7 +36,7 @@ def open_splat_rows(path: Path) -> SplatSource:
 
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, count, BATCH):
-            rows = np.fromfile(path, _ROW, min(BATCH, count - first), offset=first * _ROW.itemsize)
+            rows = read_array(path, _ROW, min(BATCH, count - first), offset=first * _ROW.itemsize)
             yield of_rows(rows["mean"], rows["scale"], rows["rgba"], rows["rotation"])
 
     return SplatSource(path, count, 0, PLY, batches)
