@@ -11,7 +11,6 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from cagefield.patches.block import Block
 from cagefield.patches.surfels import Surfels, surfels_of
@@ -42,10 +41,7 @@ def steadied(block: Block, where: Mask, log: Array) -> Block:
     if not len(surface.points):
         return block
     voxel = max(block.spacing)
-    count = [*range(1, min(NEAREST, len(surface.points)) + 1)]
-    found, nearest = cKDTree(surface.points).query(
-        block.positions(where)[rows], k=count, distance_upper_bound=DEEP * voxel, workers=-1
-    )
+    found, nearest = surface.nearest(block.positions(where)[rows], NEAREST, DEEP * voxel)
     over = np.isfinite(found[:, 0])
     rows, found, nearest = rows[over], found[over], nearest[over]
     nearest = np.where(np.isfinite(found), nearest, nearest[:, :1])
