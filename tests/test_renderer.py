@@ -124,6 +124,21 @@ EDITS = {
             ).translate((0.5, 0.1, 0)),
         ]
     ),
+    # Of the second edit alone rays go straight, but what it shows the first one has changed.
+    "copy of what was changed": EditStack(
+        [
+            Edit(INNER, Cage.box((0.1, 0, 0.1), (1.2, 1.1, 1.3)), shell="trilinear").translate((0, 0, 0.2)),
+            Edit(INNER, adjustment="discrete", keep_source=True).translate((-0.65, -0.9, 0)),
+        ]
+    ),
+    "turned copy": EditStack(
+        [
+            Edit(INNER, adjustment="discrete", keep_source=True)
+            .rotate((0.7, 0.5, 0.9))
+            .scale(1.4)
+            .translate((-0.4, -0.9, 0.2))
+        ]
+    ),
     "two": EditStack(
         [
             Edit(INNER, adjustment="discrete").rotate((0, 0, 0.8)).translate((0, -0.5, 0)),

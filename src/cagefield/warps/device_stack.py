@@ -22,9 +22,13 @@ from cagefield.warps.kernels.edit_maps import EditArgs
 from cagefield.warps.packing import (
     ALONE,
     BOX,
+    FIRST,
     FLOW,
+    IMAGE,
     OFFSET,
     PART,
+    RECORD,
+    RECORDS,
     RESOLUTION,
     UNDER,
     WIDTH,
@@ -128,7 +132,11 @@ def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
 
 
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
-    """True where the box of one of the other rows meets that of `row`."""
+    """True where the box of one of the other rows meets that of `row`, or the box of what V shows."""
     low, high = row[BOX : BOX + 3], row[BOX + 3 : BOX + 6]
+    if row[FIRST] == 0:
+        image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
+        reach = np.abs(image[1:]).sum(axis=0)
+        low, high = np.minimum(low, image[0] - reach), np.maximum(high, image[0] + reach)
     meets = (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low)
     return bool(meets.all(axis=1).any())

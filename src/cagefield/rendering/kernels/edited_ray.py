@@ -3,7 +3,8 @@
 A ray that meets one edit only, whose cages are parallelepipeds and whose shell is a lattice (`SIMPLE` in
 `cagefield.warps.packing`), runs straight through the inner region also in canonical space, and straight
 through the lattice. Both lines and where they begin and end are found once; a sample on them costs a
-multiplication in the inner region and one lattice lookup in the shell.
+multiplication in the inner region and one lattice lookup in the shell. Of a discrete edit, V and the region
+are such stretches of the ray.
 """
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
@@ -16,22 +17,33 @@ from cagefield.warps.kernels.edit_maps import EditArgs, map_sample
 from cagefield.warps.kernels.lattice import displacement, first_node, to_nodes
 from cagefield.warps.kernels.trilinear_hex import image, read3, times
 from cagefield.warps.packing import (
+    AFFINE,
     ALONE,
     BOX,
     CENTRE,
+    CONTINUOUS,
     EDGE,
+    FIRST,
+    LAST,
     MATRIX,
     NODE_BOX,
+    PART,
+    RECORD,
     RECORDS,
     RESOLUTION,
     SIMPLE,
     TO_NODES,
+    UNDER,
 )
+
+STRAIGHT = 2
 
 EditedRay = qd.types.struct(
     edit=qd.i32,
     resolution=qd.i32,
     first=qd.i32,
+    part=qd.i32,
+    under=qd.i32,
     inner=vec2,
     outer=vec2,
     canonical=vec3,
@@ -41,9 +53,11 @@ EditedRay = qd.types.struct(
 )
 """A ray o + t d in deformed space, in the one simple edit that it meets.
 
-edit: its number, or -1 where samples must be mapped one by one; resolution, first: its lattice; inner, outer:
-[t_in, t_out] in the inner region and in the outer cage; canonical + t velocity: the inner region's samples in
-canonical space; node + t node_velocity: the ray in node units of the lattice.
+edit: its number, or -1 where samples must be mapped one by one; resolution, first: its lattice, of 0 nodes
+for a discrete edit; part, under: the places (`fields.layers`) at which samples of V and of a discrete edit's
+region are read; inner, outer: [t_in, t_out] in the inner region and in the outer cage, or the region;
+canonical + t velocity: the inner region's samples in canonical space; node + t node_velocity: the ray in node
+units of the lattice.
 """
 
 
@@ -55,32 +69,58 @@ def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
     met = 0
     e = -1
     for n in range(edits.count):
-        through = slab(origin, inverse, read3(edits.params, n, BOX), read3(edits.params, n, BOX + 3))
-        if through.x <= through.y:
+        box = slab(origin, inverse, read3(edits.params, n, BOX), read3(edits.params, n, BOX + 3))
+        if box.x <= box.y:
             met += 1
             e = n
     if met == 1:
-        if edits.params[e, SIMPLE] > 0.5 and edits.params[e, ALONE] > 0.5:
-            ray.edit = e
-            ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
-            ray.first = first_node(edits.params, e)
-            at = RECORDS
-            xi = times(edits.params, e, at + MATRIX, origin - read3(edits.params, e, at + CENTRE))
-            xi_velocity = times(edits.params, e, at + MATRIX, d)
-            one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
-            ray.inner = slab(xi, safe_inverse(xi_velocity), -one, one)
-            q, v = image(xi, d, edits.params, e, at)
-            ray.canonical = q
-            ray.velocity = v
-            ray.node = to_nodes(origin, edits.params, e)
-            ray.node_velocity = times(edits.params, e, TO_NODES + 3, d)
-            ray.outer = slab(
-                ray.node,
-                safe_inverse(ray.node_velocity),
-                read3(edits.params, e, NODE_BOX),
-                read3(edits.params, e, NODE_BOX + 3),
-            )
+        if edits.params[e, ALONE] > 0.5:
+            if edits.params[e, SIMPLE] > 0.5:
+                ray.edit = e
+                ray.resolution = qd.cast(edits.params[e, RESOLUTION], qd.i32)
+                ray.first = first_node(edits.params, e)
+                ray.node = to_nodes(origin, edits.params, e)
+                ray.node_velocity = times(edits.params, e, TO_NODES + 3, d)
+                ray.outer = slab(
+                    ray.node,
+                    safe_inverse(ray.node_velocity),
+                    read3(edits.params, e, NODE_BOX),
+                    read3(edits.params, e, NODE_BOX + 3),
+                )
+            elif is_straight(edits.params, e):
+                ray.edit = e
+                ray.part = qd.cast(edits.params[e, PART], qd.i32)
+                ray.under = qd.cast(edits.params[e, UNDER], qd.i32)
+                ray.outer = vec2(1e30, -1e30)
+                if edits.params[e, LAST] > 1.5:
+                    ray.outer, _at, _along = through(origin, d, edits.params, e, RECORDS + RECORD)
+        if ray.edit >= 0:
+            ray.inner = vec2(1e30, -1e30)
+            if edits.params[e, FIRST] < 0.5:
+                ray.inner, at, _along = through(origin, d, edits.params, e, RECORDS)
+                q, v = image(at, d, edits.params, e, RECORDS)
+                ray.canonical = q
+                ray.velocity = v
     return ray
+
+
+@qd.func
+def is_straight(params: qd.template(), e: qd.i32):
+    """True for a discrete edit whose V and region, where it has them, are parallelepipeds, V^c too."""
+    return (
+        params[e, CONTINUOUS] < 0.5
+        and (params[e, FIRST] > 0.5 or params[e, RECORDS + AFFINE] > 0.5)
+        and (params[e, LAST] < 1.5 or params[e, RECORDS + RECORD + AFFINE] > 0.5)
+    )
+
+
+@qd.func
+def through(origin: vec3, d: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
+    """([t_in, t_out] in a record's parallelepiped, xi of the ray's origin, d xi / dt)."""
+    xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
+    velocity = times(params, e, at + MATRIX, d)
+    one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
+    return slab(xi, safe_inverse(velocity), -one, one), xi, velocity
 
 
 @qd.func
@@ -92,7 +132,7 @@ def map_along(
     edits: EditArgs,
     flows: qd.template(),
 ):
-    """As `map_sample` for p = o + t d on the ray, and 1 where p was moved, else 0."""
+    """As `map_sample` for p = o + t d on the ray, and how p was moved: 0 not, 1, `STRAIGHT` in `inner`."""
     q = p
     v = d
     place = 0
@@ -101,14 +141,22 @@ def map_along(
         if t >= ray.inner.x and t <= ray.inner.y:
             q = ray.canonical + t * ray.velocity
             v = ray.velocity
-            moved = 1
+            place = ray.part
+            moved = STRAIGHT
         elif t >= ray.outer.x and t <= ray.outer.y:
-            u, along = displacement(
-                ray.node + t * ray.node_velocity, ray.node_velocity, edits.lattice, ray.first, ray.resolution
-            )
-            q = p + u
-            v = d + along
-            moved = 1
+            if ray.resolution > 0:
+                u, along = displacement(
+                    ray.node + t * ray.node_velocity,
+                    ray.node_velocity,
+                    edits.lattice,
+                    ray.first,
+                    ray.resolution,
+                )
+                q = p + u
+                v = d + along
+                moved = 1
+            else:
+                place = ray.under
     else:
         q, v, place = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
