@@ -133,6 +133,31 @@ def test_what_was_hidden_under_what_is_lifted_is_ground():
     np.testing.assert_array_equal(block.density, plain.density)
 
 
+def test_fog_between_the_ground_and_what_is_lifted_makes_no_veil():
+    """Thin as it was, an edit that lifts a part would draw it out, also beside what is filled."""
+    field = room(0.0)
+    full = np.zeros(int(np.prod(field.resolution)), np.float32)
+    full[field.vertices] = field.density
+    axis = np.linspace(-1.0, 1.0, VERTICES)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    edge = axis[1] - axis[0]
+    beside = np.maximum(np.abs(x - 0.1), np.abs(y)) < 0.25 + 4.0 * edge
+    fog = beside & (z > FLOOR + 1.2 * edge) & (z < FLOOR + GAP - 0.5 * edge)
+    full[(fog.reshape(-1)) & (full == 0.0)] = 0.2 / edge
+    vertices = np.union1d(field.vertices, np.flatnonzero(fog))
+    sh = np.full((full.size, 1, 3), (0.2 - 0.5) / C0, np.float32)
+    sh[field.vertices] = field.sh
+    foggy = dataclasses.replace(field, vertices=vertices, density=full[vertices], sh=sh[vertices])
+    truth = seen(room(LIFT), EditStack())
+    left = []
+    for fill in ("none", "surroundings"):
+        edit = RAISED.replace(fill=fill)
+        light = bent_voxels(foggy, EditStack(), edit, LIGHT)
+        assert light is not None
+        left.append(db(seen(foggy, EditStack([light, edit])), truth))
+    assert left[1] > left[0] + 3.0
+
+
 def test_what_stays_where_it_is_has_no_other_light():
     still = Edit(INNER, OUTER, lattice=32).translate((0.0, 0.0, 1e-6))
     assert bent_voxels(room(0.0), EditStack(), still, LIGHT) is None

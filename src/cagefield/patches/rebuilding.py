@@ -37,6 +37,9 @@ RING, UNSURE, DOUBTED = 6.0, 0.4, 0.1
 """Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and
 fade into their own. From this share on they do not hold the membrane."""
 
+SKIRT, FOG = 1.0, 0.5
+"""Height over a support, voxels, and optical depth per voxel up to which what is over it is fog."""
+
 VIEWS = 32
 """Directions from which colours are looked at."""
 
@@ -84,7 +87,33 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     deep[tuple(voxels[new & (height < -1.5)].T)] = True
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where], slots=True)
+    if stays:
+        over = (around | hole) & (height > SKIRT) & (height <= HIGH + 2.0)
+        over &= _beneath(footprint, np.argwhere(removed))[u, v]
+        block = _unveiled(block, voxels[over], np.interp(height[over], heights, profile))
     return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)
+
+
+def _beneath(footprint: Footprint, at: NDArray[np.int64]) -> Mask:
+    """Columns [U,V] under block coordinates [N,3] of a part, and RING around them."""
+    u, v, _ = footprint.column(at.astype(np.float64))
+    columns = np.zeros(footprint.hole.shape, bool)
+    columns[u[u >= 0], v[u >= 0]] = True
+    return np.asarray(ndimage.distance_transform_edt(~columns) <= RING)
+
+
+def _unveiled(block: Block, at: NDArray[np.int64], most: Array) -> Block:
+    """The block with no fog at vertices [N,3], of which a support shows `most` [N] by its density.
+
+    A continuous edit that lifts a part draws what is between it and the support out to a veil.
+    """
+    rows = tuple(at.T)
+    fog = (block.depth[rows] < FOG) & (block.density[rows] > np.maximum(most, 0.0))
+    where = np.zeros(block.shape, bool)
+    where[tuple(at[fog].T)] = True
+    values = np.zeros(block.shape, np.float32)
+    values[tuple(at[fog].T)] = np.maximum(most[fog], 0.0)
+    return block.with_density(where, values[where])
 
 
 def _sides(block: Block, footprint: Footprint, removed: Mask) -> Mask:
