@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -17,10 +19,14 @@ from cagefield.errors import FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
 from cagefield.formats.splat_files import open_splats, read_opened, write_splats
 from cagefield.scene import Scene
+from cagefield.scene_files import field_states
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
+from cagefield.server.render_worker.process import Worker
+from cagefield.server.render_worker.tasks import Answered, Failed, PageFieldTask, Ready, Replaced, Result
 from cagefield.server.web import launch
+from editor_server import EditorServer, editor_server, page
 from scenes import ball_scene
 from splat_scenes import ball_of_splats, splat_scene
 
@@ -128,3 +134,94 @@ def test_an_editor_reads_what_the_one_before_it_saved(
     assert held == [True] and not file.exists()
     lock = SceneLock(tmp_path / "scene")
     lock.release()
+
+
+PATIENCE = 120.0
+
+
+def _field_of(worker: Worker, results: queue.Queue[Result]) -> object:
+    """What a rendering process has read, as pages get it."""
+    worker.send(PageFieldTask(-1))
+    answer = results.get(timeout=PATIENCE)
+    assert isinstance(answer, Answered), answer
+    return answer.value
+
+
+@pytest.mark.parametrize("becomes", ["another", "none", "the same"])
+def test_a_renderer_that_starts_again_shows_the_scene_that_was_opened(tmp_path: Path, becomes: str) -> None:
+    """It read what was there then: another scene beneath the edits, and nobody was told."""
+    folder = tmp_path / "scene"
+    splat_scene().save(folder)
+    store, results = SceneStore(Scene.open(folder), folder), queue.Queue[Result]()
+    worker = Worker(str(folder), "cpu", results.put, lambda: None)
+    worker.files, worker.write_opened = store.files, store.write_opened
+    worker.start()
+    try:
+        assert results.get(timeout=PATIENCE) == Ready()
+        before = _field_of(worker, results)
+        worker.close()
+        if becomes == "another":
+            ball_scene().save(folder, overwrite=True)
+        elif becomes == "none":
+            (folder / FIELD).unlink()
+        else:
+            save_edits(EditStack([]), folder / "edits.yaml")  # as saving does
+        worker.start()
+        said = [Ready()] if becomes == "the same" else [Replaced(), Ready()]
+        assert [results.get(timeout=PATIENCE) for _ in said] == said
+        assert _field_of(worker, results) == before
+    finally:
+        worker.close()
+
+
+def test_a_renderer_is_not_given_half_a_scene(tmp_path: Path) -> None:
+    """There is no room for the copy: that is said, and no other scene shown."""
+    folder = tmp_path / "scene"
+    splat_scene().save(folder)
+    results: queue.Queue[Result | None] = queue.Queue()
+
+    def no_room(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    worker = Worker(str(folder), "cpu", results.put, lambda: results.put(None))
+    worker.files, worker.write_opened = field_states(folder), no_room
+    ball_scene().save(folder, overwrite=True)
+    worker.start()
+    try:
+        assert results.get(timeout=PATIENCE) == Replaced()
+        failed = results.get(timeout=PATIENCE)
+        assert isinstance(failed, Failed)
+        assert failed.text.startswith("the scene that was opened cannot be kept for pictures: ")
+        assert failed.text.endswith("No space left on device")
+        assert results.get(timeout=PATIENCE) is None
+    finally:
+        worker.close()
+
+
+def _renderer(server: EditorServer) -> int:
+    lines = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in server.children()}
+    (renderer,) = (pid for pid, line in lines.items() if b"spawn_main" in line)
+    return renderer
+
+
+def test_pages_are_told_that_their_scene_was_replaced(tmp_path: Path) -> None:
+    folder = tmp_path / "scene"
+    splat_scene().save(folder)
+    said = f"{folder} was replaced by another program"
+    with editor_server(folder) as server, page(server) as (client, hello):
+        client.look_from(hello)
+        client.until(lambda message: message["type"] == "picture")  # the renderer has the scene
+        ball_scene().save(folder, overwrite=True)
+        os.kill(_renderer(server), signal.SIGKILL)
+        notice = client.until(lambda message: said in message.get("text", ""))
+        assert notice["level"] == "warning" and "stay those of the scene that was opened" in notice["text"]
+        with page(server) as (late, _):
+            late.until(lambda message: said in message.get("text", ""))
+        client.send("save_as", path="kept", overwrite=False)
+        client.until(lambda message: "saved to" in message.get("text", ""))
+        with page(server) as (last, again):
+            last.look_from(again)
+            last.until(lambda message: message["type"] == "picture")
+            assert not [message for message in last.messages if said in message.get("text", "")]
+    kept = Scene.open(tmp_path / "kept").field
+    assert type(kept) is type(splat_scene().field)
