@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import queue
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 from kill_command import EDITS
 
+from cagefield.datasets import colmap
 from cagefield.edits import EditStack, load_edits
 from cagefield.edits.files import save_edits
-from cagefield.errors import FieldError, SceneError
+from cagefield.errors import DatasetError, FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
 from cagefield.formats.splat_files import open_splats, read_opened, write_splats
 from cagefield.scene import Scene
@@ -89,6 +93,69 @@ def test_splats_that_are_cut_off_while_they_are_read_are_a_line(tmp_path: Path, 
     os.truncate(file, file.stat().st_size // 2)
     with pytest.raises(FieldError, match="it has become shorter while it was read"):
         read_opened(source)
+
+
+_CUT_OFF = """
+import os, sys
+from pathlib import Path
+from cagefield.datasets import colmap_files
+from cagefield.errors import DatasetError
+file, walk = Path(sys.argv[1]), colmap_files._walk
+def cut_off(*args):
+    os.truncate(file, 100)
+    walk(*args)
+colmap_files._walk = cut_off
+try:
+    colmap_files.check_whole(file.parent)
+except DatasetError as error:
+    print(error)
+"""
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A COLMAP model whose files are longer than what is mapped or read at a time."""
+    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed (extra colmap)")
+    options = pycolmap.SyntheticDatasetOptions()
+    options.num_rigs, options.num_frames_per_rig, options.num_points3D = 1, 5, 200
+    folder: Path = tmp_path_factory.mktemp("model")
+    pycolmap.synthesize_dataset(options).write_binary(folder)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["images.bin", "points3D.bin"])
+def test_a_colmap_model_that_is_cut_off_while_it_is_looked_at_is_a_line(
+    model: Path, tmp_path: Path, name: str
+) -> None:
+    """Mapped into memory, it ended the process."""
+    file = tmp_path / name
+    shutil.copyfile(model / name, file)
+    assert file.stat().st_size > 2 * mmap.PAGESIZE
+    ended = subprocess.run([sys.executable, "-c", _CUT_OFF, str(file)], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith(f"{file}: the file is cut off after ")
+
+
+@pytest.mark.parametrize("meets", ["nothing", "an error"])
+def test_a_colmap_model_that_changes_while_it_is_read_is_refused(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, meets: str
+) -> None:
+    """pycolmap reads zeros from a file that ends before, and says nothing."""
+    shutil.copytree(model, tmp_path, dirs_exist_ok=True)
+    assert colmap.read_model(tmp_path)[1]
+
+    def read(folder: Path) -> Any:
+        os.truncate(folder / "cameras.bin", 30)
+        if meets == "an error":
+            raise IndexError("unordered_map::at")
+        return whole
+
+    import pycolmap
+
+    whole = pycolmap.Reconstruction(tmp_path)
+    monkeypatch.setattr(pycolmap, "Reconstruction", read)
+    with pytest.raises(DatasetError, match=r"cameras\.bin: it has changed while it was read; wait until"):
+        colmap.read_model(tmp_path)
 
 
 def _opened(folder: Path) -> tuple[SceneStore, Session]:
