@@ -222,6 +222,7 @@ def test_a_renderer_that_starts_again_shows_the_scene_that_was_opened(tmp_path: 
     store, results = SceneStore(Scene.open(folder), folder), queue.Queue[Result]()
     worker = Worker(str(folder), "cpu", results.put, lambda: None)
     worker.files, worker.write_opened = store.files, store.write_opened
+    worker.background = store.scene.background
     worker.start()
     try:
         assert results.get(timeout=PATIENCE) == Ready()
@@ -233,6 +234,9 @@ def test_a_renderer_that_starts_again_shows_the_scene_that_was_opened(tmp_path: 
             (folder / FIELD).unlink()
         else:
             save_edits(EditStack([]), folder / "edits.yaml")  # as saving does
+            manifest = folder / "scene.json"
+            manifest.write_text(manifest.read_text().replace('"background"', '"before"'))
+            assert Scene.open(folder).background != store.scene.background
         worker.start()
         said = [Ready()] if becomes == "the same" else [Replaced(), Ready()]
         assert [results.get(timeout=PATIENCE) for _ in said] == said

@@ -79,6 +79,7 @@ class Coordinator:
         self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self.spread > 0.0)
         worker = self.dispatcher.worker
         worker.files, worker.write_opened = store.files, store.write_opened
+        worker.background = store.scene.background
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
         self.greeting: str | None = None
         """A line for the pages that come."""

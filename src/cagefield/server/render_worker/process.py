@@ -10,6 +10,7 @@ is given a copy of the one that the server has.
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import multiprocessing
 import signal
 import tempfile
@@ -30,17 +31,25 @@ if TYPE_CHECKING:
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
 
+Colour = tuple[float, float, float] | None
+
 _LOST = (EOFError, OSError)
 """What sending and receiving raise where the other process has gone."""
 
 
 @warnings_in_one_line()
 def serve(
-    connection: Connection, generation: ctypes.c_ulong, scene: str, device: str, files: object = None
+    connection: Connection,
+    generation: ctypes.c_ulong,
+    scene: str,
+    device: str,
+    files: object = None,
+    background: Colour = None,
 ) -> None:
     """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`.
 
-    `files` are the states (`scene_files.field_states`) of the scene that is edited; None for any.
+    `files` are the states (`scene_files.field_states`) of the scene that is edited, and `background` its
+    colour; None for any scene, with its own.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
@@ -53,6 +62,8 @@ def serve(
         opened = _opened(connection, scene, files)
         if opened is None:
             return
+        if files is not None:
+            opened = dataclasses.replace(opened, background=background)
         handlers = TaskHandlers(RendererCache(opened))
     except CagefieldError as error:
         _sent(connection, Failed(0, str(error)))
@@ -134,6 +145,8 @@ class Worker:
         """The folder that is read when the process starts."""
         self.files: object = None
         """The states that its files have as long as it is the scene that is edited; None for any."""
+        self.background: Colour = None
+        """The colour behind the scene that is edited."""
         self.write_opened: Callable[[Path], None] | None = None
         """Writes the scene that is edited as another folder."""
         self._device = device
@@ -153,7 +166,7 @@ class Worker:
         here, there = self._context.Pipe()
         process = self._context.Process(
             target=serve,
-            args=(there, self._generation, self.scene, self._device, self.files),
+            args=(there, self._generation, self.scene, self._device, self.files, self.background),
             daemon=True,
             name="cagefield-renderer",
         )
