@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cagefield.datasets import load_dataset
+from cagefield.datasets import colmap_files, load_dataset
 from cagefield.datasets.colmap_files import check_whole
 from cagefield.datasets.normalisation import in_unit_cube
 from cagefield.errors import DatasetError
@@ -227,7 +227,10 @@ def rigs(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"])
-def test_binary_files_cut_off_anywhere_are_noticed(rigs, tmp_path, name):
+@pytest.mark.parametrize("part", [1 << 20, 64, 5])
+def test_binary_files_cut_off_anywhere_are_noticed(rigs, tmp_path, monkeypatch, name, part):
+    """However much of them is held at a time, at least one byte; what is asked for is read anew."""
+    monkeypatch.setattr(colmap_files, "_PART", part)
     check_whole(rigs)
     whole = (rigs / name).read_bytes()
     for length in {*range(0, len(whole), 7), len(whole) - 1}:

@@ -7,10 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cagefield import leftovers
 from cagefield.atomic_files import recover_folder
+from cagefield.benchmarking.workbench import Settings, Workbench
+from cagefield.cameras import Camera
+from cagefield.datasets import points
+from cagefield.datasets.views import SparsePoints
 from cagefield.leftovers import hidden_name, remove_leftovers
 
 LONG = "scene-" + "x" * 150
@@ -27,7 +32,7 @@ def left(target: Path, role: str, process: str) -> Path:
     """What a process has left for a target: a folder with a file."""
     name = hidden_name(target, role).rsplit("-", 2)
     folder = target.with_name("-".join((name[0], process, name[2])))
-    folder.mkdir()
+    folder.mkdir(parents=True)
     (folder / "mine.txt").write_text("mine")
     return folder
 
@@ -95,3 +100,18 @@ def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
     monkeypatch.setattr(leftovers, "UNTOUCHED", -1.0)
     with pytest.warns(UserWarning, match="it is back"):
         assert recover_folder(target, lambda f: True) == folder
+
+
+def test_half_a_file_with_a_digests_name_goes_with_the_next_that_is_written(
+    tmp_path: Path, ended: str
+) -> None:
+    """Its own name may not come again: the digest is of a run that was killed."""
+    half = [left(tmp_path / "chair" / f"{kind}-00.npz", "part", ended) for kind in ("truth", "other")]
+    camera = Camera.look_at((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), width=16, height=16, fov_x=0.5)
+    Workbench(Settings(), tmp_path).modelled("chair", [camera])
+    assert not any(file.exists() for file in half)
+    assert [file.suffix for file in (tmp_path / "chair").iterdir()] == [".npz"]
+
+    half = [left(tmp_path / "points" / "00.npz", "part", ended)]
+    points._write(tmp_path / "points" / "01.npz", SparsePoints(np.zeros((1, 3)), np.zeros((1, 3), np.uint8)))
+    assert [file.name for file in (tmp_path / "points").iterdir()] == ["01.npz"]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import tempfile
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import httpx
 import numpy as np
@@ -27,7 +28,8 @@ from cagefield.server.web.opening import KEPT_DAYS, opened_folder, scene_of_file
 from cagefield.server.web.security import Guard
 from editor_server import EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
-from splat_scenes import ball_of_splats, splat_scene
+from splat_damage import ksplat_of
+from splat_scenes import ball_of_splats, random_splats, splat_scene
 
 EDIT = (
     "version: 1\nedits:\n  - name: ball\n    inner: {center: [0, 0, 0], size: 1.2}\n"
@@ -137,9 +139,53 @@ def test_what_memory_cannot_hold_is_refused_before_its_digest(
     huge.touch()
     os.truncate(huge, 20 << 30)
     monkeypatch.setattr("cagefield.devices.free_memory", lambda: 16 << 30)
-    monkeypatch.setattr(opening, "_digest", lambda file: pytest.fail("it was gone through"))
+    monkeypatch.setattr(opening, "_digest", lambda *_: pytest.fail("it was gone through"))
     with pytest.raises(CagefieldError, match=r"its 671088640 splats are too many: it takes 37\.6 GB"):
         scene_of_file(huge)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="files with holes are POSIX's")
+@pytest.mark.parametrize("ending", [".ply", ".compressed.ply", ".glb", ".ksplat"])
+def test_of_a_file_that_ends_in_a_hole_only_what_it_declares_is_gone_through(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    """20 GB more than its splats take, which nobody reads."""
+    file, read = tmp_path / f"a{ending}", list[int]()
+    if ending == ".ksplat":
+        file.write_bytes(ksplat_of(random_splats(300, degree=1)))
+    else:
+        write_splats(random_splats(300, degree=1), file)
+    size = file.stat().st_size
+    os.truncate(file, 20 << 30)
+    whole = opening.open_regular
+
+    @contextlib.contextmanager
+    def counted(path: Path) -> Iterator[BinaryIO]:
+        with whole(path) as stream:
+            yield stream
+            read.append(stream.tell())
+
+    monkeypatch.setattr(opening, "open_regular", counted)
+    scene = scene_of_file(file)
+    assert read == [size]
+    os.truncate(file, size)
+    assert scene_of_file(file) == scene  # a small file's is the digest of all of it
+    assert len(Scene.open(scene).field) == len(read_splats(file))
+
+
+def test_a_large_file_of_few_splats_is_refused_before_its_digest(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a format that does not say where it ends."""
+    packed = file.with_suffix(".spz")
+    write_splats(read_splats(file), packed)
+    size = packed.stat().st_size
+    monkeypatch.setattr(opening, "_LARGE", 1)
+    scene_of_file(packed)
+    monkeypatch.setattr(opening, "_MOST_OF_ONE", 1)
+    monkeypatch.setattr(opening, "_digest", lambda *_: pytest.fail("it was gone through"))
+    with pytest.raises(CagefieldError, match=f"it has {size} bytes for 600 splats; it is damaged"):
+        scene_of_file(packed)
 
 
 def test_a_file_with_a_long_name_is_opened(tmp_path: Path) -> None:

@@ -44,11 +44,15 @@ class Ply:
 
 @dataclass(frozen=True, eq=False)
 class PlyTable:
-    """An element of an open file: `rows(first, last)` reads some of its rows, column by column."""
+    """An element of an open file: `rows(first, last)` reads some of its rows, column by column.
+
+    `end` is the first byte of the file after it.
+    """
 
     count: int
     columns: tuple[str, ...]
     rows: Callable[[int, int], Columns]
+    end: int = 0
 
 
 @dataclass
@@ -91,7 +95,7 @@ def open_ply(path: str | Path) -> tuple[tuple[str, ...], dict[str, PlyTable]]:
             row = np.dtype([(name, _ORDERS[kind] + code) for name, code in element.properties])
             names = tuple(name for name, _ in element.properties)
             reader = _text(path, file, element) if kind == "ascii" else _binary(path, file, element, row)
-            tables[element.name] = PlyTable(element.count, names, reader)
+            tables[element.name] = PlyTable(element.count, names, reader, file.tell())
     return tuple(comments), tables
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from cagefield import json_text
 from cagefield.atomic_files import check_writable, recover_folder
@@ -23,6 +23,9 @@ VERSION = 1
 FIELD, EDITS, CAMERAS, MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
 ORIGINAL = "original.safetensors"
 FILES = (FIELD, ORIGINAL, EDITS, CAMERAS, MANIFEST)
+
+FileState: TypeAlias = tuple[int, int] | None
+"""When a file was written, ns, and its bytes; None where there is none."""
 
 
 def check_destination(path: Path | str, overwrite: bool) -> Path:
@@ -66,6 +69,23 @@ def is_scene(path: Path | str) -> bool:
     except (OSError, ValueError):
         return False
     return isinstance(document, dict) and document.get("format") == FORMAT
+
+
+def field_states(folder: Path | str) -> tuple[FileState, FileState, FileState]:
+    """Of the field, the original and the cameras, which programs that edit a scene leave as they are.
+
+    Others than they were: the scene was replaced.
+    """
+    field, original, cameras = (_state(Path(folder) / name) for name in (FIELD, ORIGINAL, CAMERAS))
+    return field, original, cameras
+
+
+def _state(file: Path) -> FileState:
+    try:
+        state = file.stat()
+    except OSError:
+        return None
+    return state.st_mtime_ns, state.st_size
 
 
 def check_part(path: Path) -> None:

@@ -34,6 +34,7 @@ from cagefield.datasets.procedural import ProceduralScene, make_scene, procedura
 from cagefield.edits import EditStack
 from cagefield.edits.files import dump_edits
 from cagefield.errors import CagefieldError
+from cagefield.leftovers import remove_unfinished
 from cagefield.npz import DEFLATED, read_arrays
 from cagefield.scene import Scene
 from cagefield.training.nerf_config import NerfConfig
@@ -236,6 +237,7 @@ class Workbench:
         path = self.folder / name / f"truth-{key}.npz"
         with contextlib.suppress(OSError, ValueError, KeyError):  # not there, or damaged
             return read_arrays(path, DEFLATED)["pictures"]
+        remove_unfinished(path.parent)
         made = []
         with self.bar(what) as move:
             for picture in make():

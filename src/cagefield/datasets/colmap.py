@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets.captures import stored_camera, unbounded_capture, uniform_size, warn_of_scaling
-from cagefield.datasets.colmap_files import check_whole
+from cagefield.datasets.colmap_files import check_unchanged, check_whole
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders, read_header
 from cagefield.datasets.region import cube_of_interest, depths_of_points, levelling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View, report_missing
@@ -122,7 +122,7 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
         raise DatasetError(
             f"{folder}: reading a COLMAP model needs pycolmap; pip install 'cagefield[colmap]'"
         ) from None
-    check_whole(folder)
+    states = check_whole(folder)
     try:
         model = pycolmap.Reconstruction(folder)
         images = [model.image(image_id) for image_id in model.reg_image_ids()]
@@ -130,16 +130,19 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
             image.name.encode()  # its bytes may be no UTF-8
             if len(image.name) > _LONGEST_NAME:
                 raise ValueError(f"the name of an image has {len(image.name)} characters")
-        return model, images
     except UnicodeError:
+        check_unchanged(folder, states)
         raise DatasetError(
             f"{folder}: names of its images are no UTF-8 text; rename the photos and export the model again"
         ) from None
     except Exception as error:  # pycolmap raises whatever C++ threw
+        check_unchanged(folder, states)
         reason = " ".join(str(error).split())
         raise DatasetError(
             f"{folder}: pycolmap cannot read the model ({reason:.200}); export it again"
         ) from error
+    check_unchanged(folder, states)
+    return model, images
 
 
 def _upwards(folder: Path) -> Sequence[Path]:

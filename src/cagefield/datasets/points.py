@@ -21,6 +21,7 @@ from cagefield.datasets.photos import read_header
 from cagefield.datasets.triangulation import triangulate
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import DatasetError
+from cagefield.leftovers import remove_unfinished
 from cagefield.npz import read_arrays
 from cagefield.regular_files import open_regular
 
@@ -208,6 +209,7 @@ def _write(file: Path, points: SparsePoints) -> None:
     names = sorted({name for seen in points.seen_by for name in seen})
     numbers = {name: number for number, name in enumerate(names)}
     flat = [sorted(numbers[name] for name in seen) for seen in points.seen_by]
+    remove_unfinished(file.parent)  # of any name: it has a digest's, that of a run which may not come again
     try:
         with replaced_file(file) as draft, draft.open("wb") as stream:
             np.savez(

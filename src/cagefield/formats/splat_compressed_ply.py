@@ -71,7 +71,8 @@ def open_compressed_ply(path: Path) -> SplatSource:
             chunks = chunk.rows(first // CHUNK, -(-last // CHUNK))
             yield _unpacked(vertex.rows(first, last), chunks, harmonics.rows(first, last), degree)
 
-    return SplatSource(path, vertex.count, degree, PLY, batches, *said_of(comments))
+    end = max(table.end for table in (vertex, chunk, harmonics))
+    return SplatSource(path, vertex.count, degree, PLY, batches, *said_of(comments), end=end)
 
 
 def write_compressed_ply(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:

@@ -143,7 +143,7 @@ def _source(
                 srgb_harmonics(colours) if linear else colours,
             )
 
-    return SplatSource(path, mean.count, degree, GLTF_AXES, batches)
+    return SplatSource(path, mean.count, degree, GLTF_AXES, batches, end=sum(binary))
 
 
 def _is_linear(path: Path, primitive: dict[str, Any]) -> bool:

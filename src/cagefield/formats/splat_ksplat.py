@@ -81,7 +81,7 @@ def open_ksplat(path: Path) -> SplatSource:
         for section in found:
             yield from _batches(path, section, row[section.degree], level, degree, limits)
 
-    return SplatSource(path, sum(section.count for section in found), degree, PLY, batches)
+    return SplatSource(path, sum(section.count for section in found), degree, PLY, batches, end=at)
 
 
 def _row(level: int, degree: int) -> np.dtype[np.void]:

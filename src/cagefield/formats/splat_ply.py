@@ -57,7 +57,7 @@ def open_splat_ply(path: Path) -> SplatSource:
     antialiased, discs = said_of(comments)
     if vertex.count and "scale_2" not in vertex.columns:
         antialiased, discs = False, True
-    return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs)
+    return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs, end=vertex.end)
 
 
 def write_splat_ply(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:

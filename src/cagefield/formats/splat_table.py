@@ -73,7 +73,8 @@ class SplatBatch:
 class SplatSource:
     """An open file of splats: `batches` hands them out from the first on, each time it is called.
 
-    `axes` are the file's own where it says so, or those its format prescribes.
+    `axes` are the file's own where it says so, or those its format prescribes. `end` is the first byte that
+    is not read any more, None where the file does not say.
     """
 
     path: Path
@@ -83,6 +84,7 @@ class SplatSource:
     batches: Callable[[], Iterator[SplatBatch]]
     antialiased: bool = False
     discs: bool = False
+    end: int | None = None
 
 
 class SplatTable(Protocol):

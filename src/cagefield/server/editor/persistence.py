@@ -25,7 +25,7 @@ from cagefield.keyframes import Keyframe
 from cagefield.leftovers import remove_leftovers, remove_unfinished
 from cagefield.regular_files import read_bytes, read_text, real_path
 from cagefield.scene import Scene
-from cagefield.scene_files import FIELD
+from cagefield.scene_files import FIELD, FileState, field_states
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
@@ -48,9 +48,18 @@ class SceneStore:
     """
 
     def __init__(
-        self, scene: Scene, path: Path, source: Path | None = None, root: Path | None = None
+        self,
+        scene: Scene,
+        path: Path,
+        source: Path | None = None,
+        root: Path | None = None,
+        *,
+        files: tuple[FileState, FileState, FileState] | None = None,
     ) -> None:
-        """`root` is the folder that pages may write into; None for the one that the scene is in."""
+        """`root` is the folder that pages may write into; None for the one that the scene is in.
+
+        `files` are the states of the scene's files before it was read; None for those of now.
+        """
         self.scene = scene
         self.source = None if source is None else real_path(source)
         self.origin = real_path(path)
@@ -63,7 +72,9 @@ class SceneStore:
         self.damaged: str | None = None
         """What became of an autosave that could not be read, or None."""
         self._written = self._fingerprint()
-        self._field = self._field_state()
+        self.files = field_states(path) if files is None else files
+        """The states that the files of the scene, as it is edited here, have in the folder that has it."""
+        self._field = self.files[0]
         self._warned: object = None
         self._kept: Document | None = None
         self._values: IdentityCache[Edit, object] = IdentityCache(4 * MOST_EDITS)
@@ -217,7 +228,7 @@ class SceneStore:
             raise SceneError(f"{self.source.name} is a file and stays as it is; use Save as")
         if not self.path.is_dir():
             raise SceneError(f"{self.path} is not there any more; use Save as, with a new folder")
-        now, field = self._fingerprint(), self._field_state()
+        now, field = self._fingerprint(), field_states(self.path)[0]
         if (now, field) not in ((self._written, self._field), self._warned):
             self._warned = now, field
             if field != self._field:
@@ -272,27 +283,24 @@ class SceneStore:
         with contextlib.suppress(OSError):
             self.autosave_path.unlink(missing_ok=True)
         self.path, self.source = real_path(target), None
+        self.files = field_states(self.path)
         self._done(session)
 
     def _done(self, session: Session) -> None:
         session.mark_saved()
-        self._written, self._field, self._warned = self._fingerprint(), self._field_state(), None
+        self._written, self._field, self._warned = self._fingerprint(), field_states(self.path)[0], None
         self._kept = None
         self.autosave(session)
+
+    def write_opened(self, folder: Path) -> None:
+        """Writes the scene as it was opened, without edits, as a new folder: its own may hold another now."""
+        self.scene.with_edits(EditStack([])).save(folder)
 
     def _scene(self, document: Document, folder: Path) -> Scene:
         edits = written(document.stack, folder, self.root)
         return dataclasses.replace(
             self.scene, edits=edits, preserve_opacity=document.preserve_opacity, folder=folder
         )
-
-    def _field_state(self) -> tuple[int, int] | None:
-        """When the field's file was written, and its bytes; None where there is none."""
-        try:
-            state = (self.path / FIELD).stat()
-        except OSError:
-            return None
-        return state.st_mtime_ns, state.st_size
 
     def _fingerprint(self) -> str:
         try:

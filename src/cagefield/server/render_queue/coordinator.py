@@ -77,9 +77,14 @@ class Coordinator:
         """How far beside where an edit maps points its content shows, world units."""
         self._patches = PatchExtent(shown)
         self.dispatcher = Dispatcher(str(store.origin), device, self, whole_at_rest=self.spread > 0.0)
+        worker = self.dispatcher.worker
+        worker.files, worker.write_opened = store.files, store.write_opened
+        worker.background = store.scene.background
         self.background = BackgroundWork(session, store, self._measured, self.broadcast)
         self.greeting: str | None = None
         """A line for the pages that come."""
+        self._replaced: str | None = None
+        """That the scene on disk is another one, for pages that come, or None."""
         self._pages = 0
         self._shown = self._what_is_shown()
         self._drawn = session.drawn()
@@ -108,6 +113,8 @@ class Coordinator:
         page.send_queue.put(self.state())
         if self.greeting is not None:
             page.notice("info", self.greeting)
+        if self._replaced is not None:
+            page.notice("warning", self._replaced)
         if self._preview is not None:
             page.send_queue.put(
                 server_messages.Preview(page=self._preview[0], play=self._preview[1], on=True)
@@ -156,6 +163,14 @@ class Coordinator:
         for page in self.pages.values():
             page.notice(level, text)
 
+    def replaced(self) -> None:
+        """The scene's folder holds another scene; tells the pages that pictures are not of that."""
+        self._replaced = (
+            f"{self.dispatcher.worker.scene} was replaced by another program; pictures and edits stay those "
+            "of the scene that was opened: Save as keeps it, and opening it again shows the new one"
+        )
+        self.notice("warning", self._replaced)
+
     def broadcast(self, message: server_messages.ServerMessage, but: Page | None = None) -> None:
         """A message for every page, but one."""
         for page in self.pages.values():
@@ -193,7 +208,8 @@ class Coordinator:
     def save_as(self, path: str, overwrite: bool) -> None:
         """Saves the scene with its edits as another folder, which is edited from then on."""
         self.store.save_as(self.session, path, overwrite)
-        self.dispatcher.worker.scene = str(self.store.path)
+        worker = self.dispatcher.worker
+        worker.scene, worker.files, self._replaced = str(self.store.path), self.store.files, None
         self.notice("info", f"saved to {self.store.path}")
 
     # ---- rendering ----

@@ -28,6 +28,7 @@ from cagefield.server.render_worker.tasks import (
     PictureDone,
     PictureTask,
     Ready,
+    Replaced,
     Result,
     Stopped,
     Task,
@@ -86,6 +87,9 @@ class TaskSource(Protocol):
 
     def notice(self, level: Level, text: str) -> None:
         """A line for the users."""
+
+    def replaced(self) -> None:
+        """The scene's folder holds another scene, but pictures are of the one that was opened."""
 
     def background_task(self) -> BackgroundTask | None:
         """What may be done now that no page waits for anything."""
@@ -253,6 +257,8 @@ class Dispatcher:
     def _result(self, result: Result) -> None:
         if isinstance(result, Ready):
             self._ready = True
+        elif isinstance(result, Replaced):
+            self._source.replaced()
         elif result.number == 0:
             if isinstance(result, Failed):
                 self._source.notice("error", result.text)

@@ -2,43 +2,69 @@
 
 `serve` runs in it, told what to do over a pipe, one task at a time. `Worker` is the server's side: starts it,
 hands it tasks, passes results on, and starts it again when it is lost.
+
+The process reads the scene by itself. Where another program has replaced that on disk, it says `Replaced` and
+is given a copy of the one that the server has.
 """
 
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import multiprocessing
 import signal
+import tempfile
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.server.render_worker.lifeline import end_with_parent
-from cagefield.server.render_worker.tasks import Failed, Ready, Result, Task
+from cagefield.server.render_worker.tasks import Failed, Ready, Replaced, Result, Task
 from cagefield.server.render_worker.unused_memory import UnusedMemory
+
+if TYPE_CHECKING:
+    from cagefield.scene import Scene
 
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
+
+Colour = tuple[float, float, float] | None
 
 _LOST = (EOFError, OSError)
 """What sending and receiving raise where the other process has gone."""
 
 
 @warnings_in_one_line()
-def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device: str) -> None:
-    """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`."""
+def serve(
+    connection: Connection,
+    generation: ctypes.c_ulong,
+    scene: str,
+    device: str,
+    files: object = None,
+    background: Colour = None,
+) -> None:
+    """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`.
+
+    `files` are the states (`scene_files.field_states`) of the scene that is edited, and `background` its
+    colour; None for any scene, with its own.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
     from cagefield import devices
-    from cagefield.scene import Scene
     from cagefield.server.render_worker.renderer_cache import RendererCache
     from cagefield.server.render_worker.task_handlers import TaskHandlers
 
     try:
         devices.start(device)
-        handlers = TaskHandlers(RendererCache(Scene.open(scene)))
+        opened = _opened(connection, scene, files)
+        if opened is None:
+            return
+        if files is not None:
+            opened = dataclasses.replace(opened, background=background)
+        handlers = TaskHandlers(RendererCache(opened))
     except CagefieldError as error:
         _sent(connection, Failed(0, str(error)))
         return
@@ -52,6 +78,33 @@ def serve(connection: Connection, generation: ctypes.c_ulong, scene: str, device
             break
         going_on = task is not None and _sent(connection, _done(handlers, task, generation))
     handlers.close()
+
+
+def _opened(connection: Connection, folder: str, files: object) -> Scene | None:
+    """The scene that is edited, from `folder` or, where that holds another, one that the server names.
+
+    None where the server has none, or has gone.
+    """
+    from cagefield.scene import Scene
+    from cagefield.scene_files import field_states
+
+    if files is None:
+        return Scene.open(folder)
+    if field_states(folder) == files:
+        try:
+            scene = Scene.open(folder)
+        except CagefieldError:
+            if field_states(folder) == files:
+                raise
+        else:
+            if field_states(folder) == files:  # and it was while it was read
+                return scene
+    try:
+        connection.send(Replaced())
+        copy = connection.recv()
+    except _LOST:
+        return None
+    return None if copy is None else Scene.open(copy)
 
 
 def _sent(connection: Connection, content: Any) -> bool:
@@ -90,6 +143,12 @@ class Worker:
     ) -> None:
         self.scene = scene
         """The folder that is read when the process starts."""
+        self.files: object = None
+        """The states that its files have as long as it is the scene that is edited; None for any."""
+        self.background: Colour = None
+        """The colour behind the scene that is edited."""
+        self.write_opened: Callable[[Path], None] | None = None
+        """Writes the scene that is edited as another folder."""
         self._device = device
         self._on_result, self._on_lost = on_result, on_lost
         context = multiprocessing.get_context("spawn")
@@ -107,7 +166,7 @@ class Worker:
         here, there = self._context.Pipe()
         process = self._context.Process(
             target=serve,
-            args=(there, self._generation, self.scene, self._device),
+            args=(there, self._generation, self.scene, self._device, self.files, self.background),
             daemon=True,
             name="cagefield-renderer",
         )
@@ -154,9 +213,27 @@ class Worker:
         while True:
             try:
                 result = connection.recv()
+                if isinstance(result, Replaced):
+                    self._on_result(result)
+                    result = self._hand_over(connection)
             except (*_LOST, TypeError):
                 if self._connection is connection:
                     self._on_lost()
                 return
             self._has_scene = True
             self._on_result(result)
+
+    def _hand_over(self, connection: Connection) -> Result:
+        """Gives the process a copy of the scene that is edited; what it says to that."""
+        assert self.write_opened is not None  # nothing is replaced where `files` are not known
+        with tempfile.TemporaryDirectory(prefix="cagefield-", ignore_cleanup_errors=True) as folder:
+            copy = Path(folder) / "scene"
+            try:
+                self.write_opened(copy)
+            except (CagefieldError, OSError) as error:
+                _sent(connection, None)
+                why = str(error) if isinstance(error, CagefieldError) else line_of(error)
+                return Failed(0, f"the scene that was opened cannot be kept for pictures: {why}")
+            connection.send(str(copy))
+            result: Result = connection.recv()
+            return result

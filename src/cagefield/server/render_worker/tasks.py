@@ -193,6 +193,13 @@ class Ready:
 
 
 @dataclass(frozen=True)
+class Replaced:
+    """The scene's folder holds another scene than the one that is edited, of which pictures stay."""
+
+    number: int = 0
+
+
+@dataclass(frozen=True)
 class PictureDone:
     """A rendered part: encoded picture and depths (see `server_messages.PictureHeader`)."""
 
@@ -242,4 +249,4 @@ class Answered:
     value: Any = field(default=None)
 
 
-Result: TypeAlias = Ready | PictureDone | EditsDone | Stopped | Failed | Answered
+Result: TypeAlias = Ready | Replaced | PictureDone | EditsDone | Stopped | Failed | Answered

@@ -26,7 +26,7 @@ from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
 from cagefield.regular_files import MOST_TEXT, check_regular, real_path
 from cagefield.scene import Scene
-from cagefield.scene_files import FIELD, is_scene
+from cagefield.scene_files import FileState, field_states, is_scene, recover
 from cagefield.server.editor.pasted_sources import source_problem
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
@@ -69,8 +69,10 @@ def open_cached(
     """The same of a scene folder, which is that of a file `source` where one is given."""
     lock = SceneLock(real_path(path))  # what is read is what the last editor saved
     try:
+        recover(path)
+        files = field_states(path)
         scene = Scene.open(path)
-        store = SceneStore(scene, path, source, root)
+        store = SceneStore(scene, path, source, root, files=files)
         store.lock()
     finally:
         lock.release()
@@ -83,11 +85,11 @@ def open_cached(
     elif store.damaged is not None:
         coordinator.greeting = store.damaged
     name = real_path(path).name if source is None else source.name
-    return coordinator, hello_of(scene, name, str(real_path(path)))
+    return coordinator, hello_of(scene, name, str(real_path(path)), files[0])
 
 
-def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
-    """What a page is told first; `path` tells the scene from others."""
+def hello_of(scene: Scene, name: str, path: str = "", field: FileState = None) -> server_messages.Hello:
+    """What a page is told first; `path` tells the scene from others, and its field's file `field`."""
     cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds
@@ -98,7 +100,7 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
         version=cagefield.__version__,
         page=0,
         scene=path,
-        field=_field_name(path),
+        field=_field_name(path, field),
         name=name,
         splats=isinstance(scene.field, SplatField),
         bounds=(vec3(lower), vec3(upper)),
@@ -115,11 +117,9 @@ def hello_of(scene: Scene, name: str, path: str = "") -> server_messages.Hello:
     )
 
 
-def _field_name(path: str) -> str:
+def _field_name(path: str, state: FileState) -> str:
     """A name for the content of a scene's field, another one once that is written anew."""
-    file = Path(path) / FIELD
-    state = file.stat() if file.is_file() else None
-    what = (path, *((state.st_mtime_ns, state.st_size) if state else ()), FIELD_VERSION)
+    what = (path, *(state or ()), FIELD_VERSION)
     return hashlib.blake2b(repr(what).encode(), digest_size=8).hexdigest()
 
 

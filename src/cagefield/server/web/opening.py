@@ -11,10 +11,15 @@ import os
 import shutil
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from cagefield.errors import FieldError
 from cagefield.regular_files import check_regular, open_regular
 from cagefield.scene_files import is_scene
 from cagefield.server.editor.persistence import stem_of
+
+if TYPE_CHECKING:
+    from cagefield.formats.splat_table import SplatSource
 
 KEPT_DAYS = 30
 """Cached scenes that were not opened for longer are removed, but those with an autosave."""
@@ -26,6 +31,9 @@ _BLOCK = 1 << 22
 
 _LARGE = 1 << 28
 """Bytes of a file that is opened before its digest is made."""
+
+_MOST_OF_ONE = 1 << 14
+"""Bytes of a splat, with whatever else is known of it, in a file that is _LARGE."""
 
 
 def opened_folder() -> Path:
@@ -45,7 +53,8 @@ def scene_of_file(file: Path) -> Path:
     stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
     # What memory cannot hold is refused before minutes go into its digest.
     source = open_fitting(file) if file.is_file() and check_regular(file) > _LARGE else None
-    folder = opened_folder() / f"{stem}-{_digest(file)}"
+    end = None if source is None else _end(source)
+    folder = opened_folder() / f"{stem}-{_digest(file, end)}"
     if is_scene(folder):
         os.utime(folder)
     else:
@@ -56,12 +65,27 @@ def scene_of_file(file: Path) -> Path:
     return folder
 
 
-def _digest(file: Path) -> str:
-    """A name for the content of a file."""
+def _end(source: SplatSource) -> int:
+    """Bytes of a file that is _LARGE up to the last that is read of it.
+
+    Raises FieldError where it does not say, and has far more than its splats can take.
+    """
+    if source.end is not None:
+        return source.end
+    size, most = check_regular(source.path), _LARGE + _MOST_OF_ONE * source.count
+    if size > most:
+        raise FieldError(
+            f"{source.path}: it has {size} bytes for {source.count} splats; it is damaged, copy it again"
+        )
+    return size
+
+
+def _digest(file: Path, end: int | None) -> str:
+    """A name for the content of a file, up to its byte `end`."""
     content = hashlib.blake2b(digest_size=8)
     for part in sorted(file.iterdir()) if file.is_dir() else [file]:
         with open_regular(part) as stream:
-            while block := stream.read(_BLOCK):
+            while block := stream.read(_BLOCK if end is None else min(_BLOCK, end - stream.tell())):
                 content.update(block)
     return content.hexdigest()
 
