@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,16 +12,18 @@ from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.options import Clone
-from cagefield.edits.patch import SplatPatch
+from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_splat_edits import (
     decode_page_splat_edits,
     encode_page_splat_edits,
 )
+from cagefield.patches.bending import light_edit
 from cagefield.patches.light import Ambience
 from cagefield.patches.patcher import Patcher
 from cagefield.patches.splats import splat_patch_of
 from cagefield.patches.voxelised import voxelised
+from cagefield.rendering import splat_splitting
 from cagefield.rendering.baked_splats import baked_splats
 from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
 from cagefield.rendering.moved_splats import moved_splats
@@ -70,6 +74,69 @@ def test_units_make_no_difference(scale):
     usual = room(True)
     # The box's lowest row lies on the cage's floor: rounding decides on which side, which leaves a thin line.
     assert db(there, seen(usual, patched(usual, Edit.delete(cage())))) > 35.0
+
+
+def test_fill_is_of_splats_of_its_colour_that_look_the_same_all_around():
+    """Whatever the nearest ones are: every other splat shimmers, and what is in shade is dark."""
+    field = room(True)
+    sh = np.zeros((len(field), 4, 3), np.float32)
+    sh[:, :1] = field.sh
+    sh[::2, 1:] = 0.8
+    field = dataclasses.replace(field, sh=sh)
+    patch = splat_patch_of(field, EditStack(), Edit.delete(cage()), LIGHT)
+    assert len(patch.sources) > 50
+    assert (np.abs(field.sh[patch.sources, 1:]).max(axis=(1, 2)) == 0.0).mean() > 0.95
+    assert (np.abs(np.log(patch.gains)) < 0.3).mean() > 0.95
+
+
+def strips() -> SplatField:
+    """A grey floor of splats that are long along x."""
+    y = np.arange(-0.8, 0.81, 0.05)
+    x = np.tile([-0.4, 0.4], len(y))
+    means = np.stack([x, np.repeat(y, 2), np.zeros(2 * len(y))], axis=1)
+    return SplatField(
+        means,
+        np.broadcast_to(np.log([0.3, 0.04, 0.005]), means.shape),
+        np.tile([1.0, 0.0, 0.0, 0.0], (len(means), 1)),
+        np.full(len(means), 0.95),
+        np.full((len(means), 1, 3), 0.2 / C0),
+        bounds=np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 0.1]]),
+    )
+
+
+def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(monkeypatch: pytest.MonkeyPatch):
+    field, none = strips(), np.zeros((0, 3))
+    shape, spacing = (41, 41, 5), np.array([0.05, 0.05, 0.05])
+    log = -np.clip(0.5 - (np.arange(41) - 20.0) / 6.0, 0.0, 1.0)  # from x = -0.15 to 0.15
+    values = np.broadcast_to(log[:, None, None], shape).astype(np.float32)
+    light = NewLight(np.array([-1.0, -1.0, -0.1]), spacing, values, np.ones(shape, np.float32))
+    patch = SplatPatch(
+        field,
+        Cage.box((0.0, 0.0, 0.0), (2.0, 2.0, 0.2)),
+        np.zeros((1, 1, 1), bool),
+        light,
+        None,
+        np.zeros(0, np.int64),
+        none,
+        np.zeros((0, 3, 3)),
+        none,
+    )
+    edit = light_edit(Edit.delete(cage()), patch)
+    camera = Camera.look_at((0.0, 0.001, 3.0), (0.0, 0.0, 0.0), width=96, height=96, fov_x=0.5)
+    origins, directions = camera.rays()
+    x = (origins - directions * (origins[:, 2:] / directions[:, 2:]))[:, 0].reshape(96, 96)
+    plain = SplatRenderer(field).render(camera, background="black")
+    wanted = plain.rgb * np.exp(np.interp(x, np.linspace(-1.0, 1.0, 41), log))[..., None]
+
+    def off() -> float:
+        splat_splitting.known_splits.clear()
+        shown = SplatRenderer(field).with_edits(EditStack([edit])).render(camera, background="black")
+        return db(shown.rgb, wanted)
+
+    split = off()
+    monkeypatch.setattr(splat_splitting, "SHADE", np.inf)
+    whole = off()
+    assert split > 38.0 and split > whole + 8.0
 
 
 def test_a_moved_box_takes_its_shadow_along():

@@ -3,8 +3,8 @@
 The splats around the edit are put on a voxel grid (`patches.voxelised`), where fill and light are worked out
 as for voxel fields (`patches.making`). What the light is multiplied by is looked up at the splats' means.
 What was filled has surfaces, ridges of density, on which new splats are laid a voxel apart: each is a copy of
-a splat beside the hole that lies on a surface, turned to the ridge's normal and made a voxel wide, with its
-colour multiplied so that it is that of the grid. What a cloned cage brings are copies of its own splats.
+a splat beside the hole that lies on a surface and is of that colour, turned to the ridge's normal and made a
+voxel wide, with its colour multiplied so that it is that of the grid. What a cloned cage brings are copies of its own splats.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ ENOUGH = 8
 FAR, OFF = 12.0, 1.0
 """Splats show how high the surface is, up to this far from a new one, and how far that may be off; voxels."""
 
-NEAREST = 12
-"""Splats of which one is copied."""
+PLAIN = 1.0
+"""How much a copied splat's dependence on the view counts, over what its colour is off (log)."""
 
 DARK = 0.02
 """Colours that are darker than this count as this where they divide."""
@@ -198,7 +198,7 @@ class _Splats:
         frames = rotation_matrices(self.splats.quaternions[kept].astype(np.float64))
         scales = np.exp(self.splats.log_scales[kept].astype(np.float64))
         colours = _colours(under, at)
-        nearest = self._alike(kept, points, colours)
+        nearest = self._alike(kept, colours)
         frames, scales = frames[nearest], scales[nearest]
         each, thin = np.arange(len(at)), np.argmin(scales, axis=1)
         across = frames[each, :, thin]
@@ -223,13 +223,16 @@ class _Splats:
         off = np.clip(spline(to) - now, -OFF, OFF)
         return np.asarray(at + off[:, None] * support.normal)
 
-    def _alike(self, kept: NDArray[np.int64], points: Array, colours: Array) -> NDArray[np.int64]:
-        """Which [A] of some splats to copy: near points [A,3], those whose colours are nearest to [A,3]."""
-        count = min(NEAREST, len(kept))
-        _, near = cKDTree(self.splats.means[kept]).query(points, k=[*range(1, count + 1)])
+    def _alike(self, kept: NDArray[np.int64], colours: Array) -> NDArray[np.int64]:
+        """Which [A] of some splats to copy: those of colours nearest to [A,3], and the same all around.
+
+        Where they are and how they lie makes no difference to copies.
+        """
         own, wanted = (np.log(np.maximum(rgb, DARK)) for rgb in (self.colours(kept), colours))
-        best = np.argmin(((own[near] - wanted[:, None]) ** 2).sum(axis=2), axis=1)
-        return np.asarray(near[np.arange(len(points)), best])
+        turning = np.sqrt((self.splats.sh[kept, 1:].astype(np.float64) ** 2).sum(axis=(1, 2)) / (4.0 * np.pi))
+        turning /= np.maximum(self.colours(kept).mean(axis=1), DARK)
+        near = cKDTree(np.c_[own, PLAIN * turning]).query(np.c_[wanted, np.zeros(len(wanted))])[1]
+        return np.asarray(near)
 
     def _beside(self, made: Made, inner: Cage, fresh: Mask, normal: Array) -> NDArray[np.int64]:
         """Splats beside the hole that lie flat on what it was filled with."""

@@ -1,4 +1,5 @@
-"""Splats split where one Gaussian cannot follow an edit: the map bends over it, or a cut goes through it.
+"""Splats split where one Gaussian cannot follow an edit: the map bends over it, a cut goes through it, or the
+edge of a shadow does.
 
 Notation: a splat is m + A z, z ~ N(0, 1) in three dimensions, A = Q diag(s). An edit takes it to
 F(m) + J A z, which is right as far as F is affine over it. Two things are not:
@@ -25,6 +26,9 @@ F(m) + J A z, which is right as far as F is affine over it. Two things are not:
   the optical depth T(u) = -log(1 - a exp(-u^2 / 2)), a the opacity. A child has the integral, mean and
   variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
   plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
+- Light. A patch (`edits.patch`) multiplies a splat's colours by one number. Where the log of that changes by
+  d > SHADE from m - 1.5 a_i to m + 1.5 a_i the splat becomes a row along a_i as where it bends, with
+  r = SHADE / d. It is not where a_i is shorter than half an edge of the grid that the light is worked out on.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits what those
 before it left.
@@ -45,6 +49,7 @@ from numpy.typing import NDArray
 
 from cagefield.cages import FACES, Cage
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.quaternions import quaternions_of, rotation_matrices
 from cagefield.rendering.moved_splats import MovedSplats, moved_splats
@@ -55,6 +60,10 @@ from cagefield.warps.forward import to_deformed
 
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
+
+SHADE, SHADED = 0.2, 1.5
+"""Largest change of the log of light over a splat that stays whole, between so many standard deviations on
+either side of its middle."""
 
 FAINT = 0.3
 """Splats of less opacity than this may bend more, as much as they are fainter."""
@@ -224,6 +233,10 @@ def _split_once(
     A = np.concatenate([_axes(field, rest), moved.jacobian[elsewhere] @ _axes(field, others)])
     if edit.adjustment == "discrete":
         children = _cut(edit, field, rows, points, A)
+        if isinstance(edit.patch, SplatPatch):
+            whole = np.flatnonzero(~np.isin(rows, children.parent))
+            lit = _shaded(edit, edit.patch, field, rows[whole], points[whole], A[whole])
+            children = _together([children, lit])
     else:
         children = _bent(edit, field, rows, points, A, proceed)
     return _parted(field, children, room) if len(children.parent) else None
@@ -341,8 +354,36 @@ def _cut(edit: Edit, field: SplatField, rows: NDArray[np.int64], points: Array, 
         _Children(parent, direction, *part_between(alpha, low, high))
         for low, high in ((np.full(len(t), -ENDS), t), (t, np.full(len(t), ENDS)))
     ]
-    joint = [np.concatenate([getattr(part, n) for part in parts]) for n in _Children.__dataclass_fields__]
-    return _Children(*joint)
+    return _together(parts)
+
+
+def _together(parts: list[_Children]) -> _Children:
+    return _Children(
+        *(np.concatenate([getattr(part, n) for part in parts]) for n in _Children.__dataclass_fields__)
+    )
+
+
+def _shaded(
+    edit: Edit, patch: SplatPatch, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array
+) -> _Children:
+    """Rows of children for the splats over which the light of a patch changes."""
+    inside = edit.inner.contains(points)
+    change = np.zeros((len(rows), 3))
+    steps = A.transpose(0, 2, 1)  # [M, axis, 3]
+    for light, here in ((patch.light, ~inside), (patch.part, inside)):
+        if light is not None:
+            ends = [
+                light.at((points[here, None] + way * steps[here]).reshape(-1, 3)) for way in (SHADED, -SHADED)
+            ]
+            change[here] = np.abs(ends[0] - ends[1]).reshape(-1, 3)
+            # What is smaller than the light's grid shows noise of that.
+            change[here] *= np.linalg.norm(steps[here], axis=2) > 0.5 * light.spacing.max()
+    axis, most = change.argmax(axis=1), change.max(axis=1)
+    opacity = field.opacities[rows].astype(np.float64)
+    split = np.flatnonzero((most * np.minimum(1.0, opacity / FAINT) > SHADE) & (opacity > UNSEEN))
+    r = np.maximum(SHADE / most[split], LEAST_WIDTH)
+    children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
+    return children.take(np.flatnonzero(children.opacity > UNSEEN))
 
 
 def _crossing(
