@@ -4,7 +4,8 @@ The splats around the edit are put on a voxel grid (`patches.voxelised`), where 
 as for voxel fields (`patches.making`). What the light is multiplied by is looked up at the splats' means.
 What was filled has surfaces, ridges of density, on which new splats are laid a voxel apart: each is a copy of
 a splat beside the hole that lies on a surface and is of that colour, turned to the ridge's normal and made a
-voxel wide, with its colour multiplied so that it is that of the grid. What a cloned cage brings are copies of its own splats.
+voxel wide, with its colour multiplied so that it is that of the grid. What a cloned cage brings are copies of
+its own splats.
 """
 
 from __future__ import annotations
