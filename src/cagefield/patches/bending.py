@@ -34,10 +34,10 @@ from cagefield.patches.planes import flattened
 from cagefield.patches.rebuilding import rebuilt
 from cagefield.patches.seen import Sight
 from cagefield.patches.shown import steadied
-from cagefield.patches.support import support_around
+from cagefield.patches.support import Support, support_around
 from cagefield.patches.surfels import Surfels, surfels_of
 from cagefield.patches.work import BEFORE, VIEWS
-from cagefield.typing import Array
+from cagefield.typing import Array, Mask
 from cagefield.warps.forward import to_deformed
 
 FINEST = 128
@@ -111,12 +111,9 @@ def bent_voxels(
     box = light_box(edit, float(field.voxel_size.max()), ambience.reach, ambience.falls)
     block = block or bent_block(field, below, edit, ambience)
     bent = bending_light(block, edit, ambience)
-    where = block.slot >= 0
-    log = bent.light.at(bent.block, block.positions(where))
-    log[np.abs(log) < UNSEEN] = 0.0
-    relit = steadied(block, where, log).relit(where, np.exp(log))
+    relit = in_light_of(block, bent)[0]
     if edit.fill == "surroundings":
-        relit = _filled(relit, edit, bent, below, sight)
+        relit = filled(relit, edit, bent, below, sight)[0]
     changed = relit.differs(block)
     if not changed.any():
         return None
@@ -124,25 +121,59 @@ def bent_voxels(
     return light_edit(edit, Patch(region, relit.layer()))
 
 
-def _filled(block: Block, edit: Edit, bent: Bent, below: EditStack, sight: Sight | None) -> Block:
-    """The block, in its new light, with what the part stood on going on where it was in deep shade.
+def in_light_of(block: Block, bent: Bent) -> tuple[Block, Lighting]:
+    """(the block in the light of what was bent, that light on its vertices)."""
+    where = block.slot >= 0
+    log = bent.light.at(bent.block, block.positions(where))
+    log[np.abs(log) < UNSEEN] = 0.0
+    return steadied(block, where, log).relit(where, np.exp(log)), Lighting(where, log)
 
-    What was photographed there is noise, which the new light would bring out.
+
+def filled(
+    block: Block, edit: Edit, bent: Bent, below: EditStack, sight: Sight | None
+) -> tuple[Block, Support | None]:
+    """(the block, in its new light, with what the part stood on going on where it was in deep shade, that).
+
+    What was photographed there is noise, which the new light would bring out. The support is None where none
+    goes on.
     """
     at = block.coordinates(bent.surface.points)
     dark = bent.log > DARK
     if not dark.any():
-        return block
+        return block, None
     # Not all that is bent: what is dark, and as much again around it.
     low, high = at[dark].min(axis=0), at[dark].max(axis=0)
     margin = max(AROUND, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
-    filled = _continued(small, edit, bent, at - first, dark, below, sight)
+    support = _support(small, edit, bent, at - first)
+    if support is None:
+        return block, None
+    continued = _continued(small, edit, bent, at - first, dark, support, below, sight)
+    if continued is None:
+        return block, None
     part = tuple(slice(a, a + n) for a, n in zip(small.low - block.low, small.shape, strict=True))
     density, slot = block.density.copy(), block.slot.copy()
-    density[part], slot[part] = filled.density, filled.slot
-    return replace(block, density=density, slot=slot, sh=filled.sh)
+    density[part], slot[part] = continued.density, continued.slot
+    whole = replace(block, density=density, slot=slot, sh=continued.sh)
+    return whole, replace(support, point=support.point + first, members=support.members + first)
+
+
+def _inside(block: Block, edit: Edit) -> Mask:
+    return edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
+
+
+def _support(block: Block, edit: Edit, bent: Bent, at: Array) -> Support | None:
+    """What the part stands on, or hangs over, of the surfaces [N] at block coordinates."""
+    inside = _inside(block, edit)
+    part = block.solid & inside
+    if not part.any():
+        return None
+    away = ndimage.distance_transform_edt(~inside)
+    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, cval=np.inf))
+    size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
+    near = (away > 0.0) & (away < max(RIM, 0.5 * size))
+    return support_around(part, bent.surface, at, near, max(bent.block.spacing))
 
 
 def _continued(
@@ -151,23 +182,17 @@ def _continued(
     bent: Bent,
     at: Array,
     dark: NDArray[np.bool_],
+    support: Support,
     below: EditStack,
     sight: Sight | None,
-) -> Block:
-    """The block with the support going on that surfaces [N] at block coordinates are of; some are dark."""
-    inside = edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
+) -> Block | None:
+    """The block with a support going on, by surfaces [N] at block coordinates, of which some are dark."""
+    inside = _inside(block, edit)
     part = block.solid & inside
-    if not part.any():
-        return block
-    away = ndimage.distance_transform_edt(~inside)
-    away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, cval=np.inf))
-    size = float(np.median(np.subtract(*edit.inner.aabb[::-1]))) / max(block.spacing)
-    near = (away > 0.0) & (away < max(RIM, 0.5 * size))
-    support = support_around(part, bent.surface, at, near, max(bent.block.spacing))
     unsure = Surfels(at[dark], bent.surface.normals[dark])
-    footprint = None if support is None else footprint_of(support, part, np.zeros((0, 3)), unsure)
+    footprint = footprint_of(support, part, np.zeros((0, 3)), unsure)
     if footprint is None:
-        return block
+        return None
     points = footprint.points(block)
     known = bent.light.at(bent.block, points) < DARK
     if sight is not None:

@@ -192,7 +192,7 @@ class Patcher:
                 self._around = around, bent_block(self._field, stack, edit, lit)
             found = bent_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
         else:
-            found = bent_splats(self._field, stack, edit, lit)
+            found = bent_splats(self._field, stack, edit, lit, self._sight)
         self._keep(key, found)
         return found
 

@@ -26,7 +26,7 @@ from cagefield.edits.patch import NewLight, SplatPatch
 from cagefield.edits.stack import EditStack
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import bending_light, light_box, light_edit
+from cagefield.patches.bending import bending_light, filled, in_light_of, light_box, light_edit
 from cagefield.patches.block import Block, block_of, interpolated, world_of
 from cagefield.patches.extent import patch_box
 from cagefield.patches.footprint import KNOTS
@@ -105,31 +105,37 @@ def splat_patch_of(
     made = made_of(
         grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
     )
-    return _Splats.of(field, splats, grid, moved).patch(field, edit, made)
+    known, new, fresh = _Splats.of(field, splats, grid, moved), _NONE, made.under.differs(made.emptied)
+    if isinstance(edit.fill, Clone) and not edit.keep_source:
+        new = known.cloned(made, edit.inner, edit.fill.source)
+    elif made.support is not None:
+        new = known.filled(made.under, fresh, made.work.region, edit.inner, made.support)
+    part = None if made.part_light is None else _new_light(made.before, made.part_light)
+    light = _new_light(made.under, made.light)
+    return known.patch(field, made.work.region, fresh & ~made.inside, light, part, new)
 
 
-def bent_splats(field: SplatField, below: EditStack, edit: Edit, ambience: Ambience) -> Edit:
+def bent_splats(
+    field: SplatField, below: EditStack, edit: Edit, ambience: Ambience, sight: Sight | None = None
+) -> Edit:
     """The edit that changes the light of splats under a continuous edit (`patches.bending`)."""
     field = with_pasted(field, below)
     box = light_box(edit, 0.0, ambience.reach, ambience.falls)
-    splats = where_they_are(field, _around(field, moved_splats(field, below), box))
+    moved = _around(field, moved_splats(field, below), box)
+    splats = where_they_are(field, moved)
     voxel = voxel_for(splats, box)
     box = light_box(edit, voxel, ambience.reach, ambience.falls)
-    block = block_of(voxelised(splats, box, voxel), EditStack(), box)
+    region, grid = Cage.box(box.mean(axis=0), box[1] - box[0]), voxelised(splats, box, voxel)
+    block = block_of(grid, EditStack(), box)
     bent = bending_light(block, edit, ambience)
-    none, points = np.zeros(0, np.int64), np.zeros((0, 3))
-    patch = SplatPatch(
-        field,
-        Cage.box(box.mean(axis=0), box[1] - box[0]),
-        np.zeros((1, 1, 1), bool),
-        bent.light.on_grid(bent.block),
-        None,
-        none,
-        points,
-        np.zeros((0, 3, 3)),
-        points,
-    )
-    return light_edit(edit, patch)
+    relit, light = in_light_of(block, bent)
+    known, new, gone = _Splats.of(field, splats, grid, moved), _NONE, np.zeros(block.shape, bool)
+    if edit.fill == "surroundings":
+        under, support = filled(relit, edit, bent, EditStack(), None if below.active else sight)
+        if support is not None:
+            gone = under.differs(relit)
+            new = known.filled(under, gone, region, edit.inner, support)
+    return light_edit(edit, known.patch(field, region, gone, _new_light(block, light), None, new))
 
 
 def _box_of(edit: Edit, box: Array) -> Array:
@@ -187,11 +193,10 @@ class _Splats:
             np.concatenate([np.ones((len(still), 3)), gains]),
         )
 
-    def filled(self, made: Made, inner: Cage, support: Support) -> _New:
-        """Splats on the surface of what was filled: the support's upper side."""
-        fresh, under = made.under.differs(made.emptied), made.under
+    def filled(self, under: Block, fresh: Mask, region: Cage, inner: Cage, support: Support) -> _New:
+        """Splats on the surface of what was filled, the support's upper side: `fresh` [X,Y,Z] of a block."""
         at, normals = _surface(under, fresh, support.normal)
-        kept = self._beside(made, inner, fresh, support.normal)
+        kept = self._beside(under, region, inner, fresh, support.normal)
         if not len(at) or not len(kept):
             return _NONE
         at = self._levelled(kept, under, support, at)
@@ -235,13 +240,15 @@ class _Splats:
         near = cKDTree(np.c_[own, PLAIN * turning]).query(np.c_[wanted, np.zeros(len(wanted))])[1]
         return np.asarray(near)
 
-    def _beside(self, made: Made, inner: Cage, fresh: Mask, normal: Array) -> NDArray[np.int64]:
+    def _beside(
+        self, under: Block, region: Cage, inner: Cage, fresh: Mask, normal: Array
+    ) -> NDArray[np.int64]:
         """Splats beside the hole that lie flat on what it was filled with."""
-        splats, region = self.splats, made.work.region
+        splats = self.splats
         means = splats.means.astype(np.float64)
         found = region.contains(means) & ~inner.contains(means) & (splats.opacities > OPAQUE)
         kept = np.flatnonzero(found)
-        g = np.round(self.grid.grid_coordinates(means[kept]) - made.under.low).astype(np.int64)
+        g = np.round(self.grid.grid_coordinates(means[kept]) - under.low).astype(np.int64)
         g = np.clip(g, 0, np.array(fresh.shape) - 1)
         kept = kept[~fresh[tuple(g.T)]]
         axes = rotation_matrices(splats.quaternions[kept].astype(np.float64))
@@ -265,21 +272,24 @@ class _Splats:
         """Colours [N,3] of splats, the mean over directions."""
         return np.maximum(0.5 + C0 * self.splats.sh[rows, 0].astype(np.float64), 0.0)
 
-    def patch(self, field: SplatField, edit: Edit, made: Made) -> SplatPatch:
-        """The patch of the field's edit."""
-        new = _NONE
-        if isinstance(edit.fill, Clone) and not edit.keep_source:
-            new = self.cloned(made, edit.inner, edit.fill.source)
-        elif made.support is not None:
-            new = self.filled(made, edit.inner, made.support)
+    def patch(
+        self,
+        field: SplatField,
+        region: Cage,
+        gone: Mask,
+        light: NewLight,
+        part: NewLight | None,
+        new: _New,
+    ) -> SplatPatch:
+        """The patch with new splats of the field's edit; its other arguments are the patch's."""
         rows, points, shapes, colours = new
         gains = self.gains[rows] * colours / np.maximum(self.colours(rows), DARK)
         return SplatPatch(
             field,
-            made.work.region,
-            made.under.differs(made.emptied) & ~made.inside,
-            _new_light(made.under, made.light),
-            None if made.part_light is None else _new_light(made.before, made.part_light),
+            region,
+            gone,
+            light,
+            part,
             self.rows[rows],
             points,
             shapes @ self.turns[rows],
