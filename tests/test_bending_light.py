@@ -179,6 +179,32 @@ def test_patchers_put_the_light_before_its_edit(kind: str):
     assert tuple(patcher.patched([edit])) == (edit,)
 
 
+def test_the_floor_goes_on_under_splats_that_are_lifted():
+    """Where the box stood the floor is black; no photo showed it."""
+    field = splat_room(True)
+    on_floor = np.abs(field.means[:, 2]) < 0.01
+    gap = np.where(on_floor, 0.0, 0.15)[:, None].astype(np.float32) * np.array([[0.0, 0.0, 1.0]], np.float32)
+    field = dataclasses.replace(field, means=field.means + gap)
+    inner, outer = Cage.box((0.1, 0.0, 0.45), (0.62, 0.62, 0.66)), Cage.box((0.1, 0.0, 0.85), (1.3, 1.3, 1.5))
+    away = np.linalg.norm(np.maximum(np.abs(field.means[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1)
+    under = on_floor & (away == 0.0)
+    for fill in ("none", "surroundings"):
+        edit = Edit(inner, outer).translate((0.0, 0.0, 0.4)).replace(fill=fill)
+        light = bent_splats(field, EditStack(), edit, LIGHT)
+        assert isinstance(light.patch, SplatPatch)
+        taken = light.patch.takes_away(field.means.astype(np.float64))
+        if fill == "none":
+            assert not taken.any() and not len(light.patch.sources)
+            continue
+        assert taken[under].mean() > 0.9 and not taken[~on_floor].any()
+        beside = np.linalg.norm(
+            np.maximum(np.abs(light.patch.points[:, :2] - [0.1, 0.0]) - 0.25, 0.0), axis=1
+        )
+        assert (beside == 0.0).sum() > 0.5 * under.sum() and np.abs(light.patch.points[:, 2]).max() < 0.04
+        colours = 0.5 + C0 * field.sh[light.patch.sources, 0] * light.patch.gains
+        assert colours.mean() > 0.35
+
+
 def test_splats_under_what_is_lifted_get_lighter():
     field = splat_room(True)
     on_floor = np.abs(field.means[:, 2]) < 0.01

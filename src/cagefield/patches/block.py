@@ -193,12 +193,12 @@ class Block:
         part = tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))
         return replace(self, low=self.low + first, density=self.density[part], slot=self.slot[part])
 
-    def differs(self, other: Block) -> Mask:
+    def differs(self, other: Block, noticed: float = NOTICED) -> Mask:
         """Vertices [X,Y,Z] where it has another density than a block of the same place, or other colours."""
         changed = self.density != other.density
         both = (self.slot >= 0) & (other.slot >= 0)
         apart = np.abs(self.sh[self.slot[both]] - other.sh[other.slot[both]]).max(axis=(1, 2))
-        changed[both] |= apart > NOTICED
+        changed[both] |= apart > noticed
         return np.asarray(changed | ((self.slot >= 0) != (other.slot >= 0)))
 
     def layer(self) -> VoxelField:

@@ -61,6 +61,9 @@ ENOUGH = 8
 FAR, OFF = 12.0, 1.0
 """Splats show how high the surface is, up to this far from a new one, and how far that may be off; voxels."""
 
+OTHER = 0.2
+"""Splats stay where a coefficient of what was filled differs by less than this from what was there."""
+
 PLAIN = 1.0
 """How much a copied splat's dependence on the view counts, over what its colour is off (log)."""
 
@@ -105,7 +108,7 @@ def splat_patch_of(
     made = made_of(
         grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
     )
-    known, new, fresh = _Splats.of(field, splats, grid, moved), _NONE, made.under.differs(made.emptied)
+    known, new, fresh = _Splats.of(field, splats, grid, moved), _NONE, made.under.differs(made.emptied, OTHER)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         new = known.cloned(made, edit.inner, edit.fill.source)
     elif made.support is not None:
@@ -133,7 +136,7 @@ def bent_splats(
     if edit.fill == "surroundings":
         under, support = filled(relit, edit, bent, EditStack(), None if below.active else sight)
         if support is not None:
-            gone = under.differs(relit)
+            gone = under.differs(relit, OTHER)
             new = known.filled(under, gone, region, edit.inner, support)
     return light_edit(edit, known.patch(field, region, gone, _new_light(block, light), None, new))
 

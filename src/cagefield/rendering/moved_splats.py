@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat import SplatField
-from cagefield.quaternions import rotation_matrices
 from cagefield.rendering.pasted_splats import at_rest, of_same_scene, pasted_rows
 from cagefield.sh import brightened
 from cagefield.typing import Array, Mask
@@ -178,12 +177,6 @@ class MovedSplats:
         points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
         outside = np.ones(len(points), bool) if edit.source is not None else ~edit.inner.contains(points)
         gone = patch.takes_away(points) & outside
-        # What reaches out of there is of something else, such as the edge of a plate.
-        going = np.flatnonzero(gone)
-        rows = np.concatenate([still, self.source[:here]])[going]
-        turns = np.concatenate([np.broadcast_to(np.eye(3), (len(still), 3, 3)), self.jacobian[:here]])[going]
-        along = (turns @ longest_axes(field, rows)[..., None])[..., 0]
-        gone[going] = patch.takes_away(points[going] + along) & patch.takes_away(points[going] - along)
         log = np.where(outside, patch.light.at(points), 0.0)
         lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
         gains[:here] *= np.exp(log[len(still) :])[:, None]
@@ -200,15 +193,6 @@ class MovedSplats:
         if of_same_scene(patch.field, field):
             parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
         return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def longest_axes(field: SplatField, rows: NDArray[np.int64]) -> Array:
-    """The longest axis [M,3] of some splats of a field, a standard deviation long."""
-    scales = field.log_scales[rows].astype(np.float64)
-    longest = np.argmax(scales, axis=1)
-    turns = rotation_matrices(field.quaternions[rows].astype(np.float64))
-    each = np.arange(len(rows))
-    return np.asarray(turns[each, :, longest] * np.exp(scales[each, longest])[:, None])
 
 
 @dataclass(frozen=True)

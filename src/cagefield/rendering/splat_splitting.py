@@ -27,8 +27,8 @@ F(m) + J A z, which is right as far as F is affine over it. Two things are not:
   variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
   plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
 - Light. A patch (`edits.patch`) multiplies a splat's colours by one number. Where the log of that changes by
-  d > SHADE from m - 1.5 a_i to m + 1.5 a_i the splat becomes a row along a_i as where it bends, with
-  r = SHADE / d. It is not where a_i is shorter than half an edge of the grid that the light is worked out on.
+  d > SHADE from m - a_i to m + a_i the splat becomes a row along a_i as where it bends, with r = SHADE / d.
+  It is not where a_i is shorter than half an edge of the grid that the light is worked out on.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits what those
 before it left.
@@ -61,9 +61,8 @@ from cagefield.warps.forward import to_deformed
 BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
 
-SHADE, SHADED = 0.2, 1.5
-"""Largest change of the log of light over a splat that stays whole, between so many standard deviations on
-either side of its middle."""
+SHADE = 0.15
+"""Largest change of the log of light over a splat that stays whole, a standard deviation each way."""
 
 FAINT = 0.3
 """Splats of less opacity than this may bend more, as much as they are fainter."""
@@ -372,9 +371,7 @@ def _shaded(
     steps = A.transpose(0, 2, 1)  # [M, axis, 3]
     for light, here in ((patch.light, ~inside), (patch.part, inside)):
         if light is not None:
-            ends = [
-                light.at((points[here, None] + way * steps[here]).reshape(-1, 3)) for way in (SHADED, -SHADED)
-            ]
+            ends = [light.at((points[here, None] + way * steps[here]).reshape(-1, 3)) for way in (1.0, -1.0)]
             change[here] = np.abs(ends[0] - ends[1]).reshape(-1, 3)
             # What is smaller than the light's grid shows noise of that.
             change[here] *= np.linalg.norm(steps[here], axis=2) > 0.5 * light.spacing.max()
