@@ -131,6 +131,13 @@ EDITS = {
             Edit(INNER, adjustment="discrete", keep_source=True).translate((-0.65, -0.9, 0)),
         ]
     ),
+    "copy through a bent cage": EditStack(
+        [
+            Edit(INNER, adjustment="discrete", keep_source=True)
+            .translate((-0.4, -0.9, 0.2))
+            .move_corner(7, (0.2, 0.1, 0.1))
+        ]
+    ),
     "turned copy": EditStack(
         [
             Edit(INNER, adjustment="discrete", keep_source=True)

@@ -104,10 +104,16 @@ def strips() -> SplatField:
     )
 
 
-def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("across", ["an end", "the middle"])
+def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
+    across: str, monkeypatch: pytest.MonkeyPatch
+):
     field, none = strips(), np.zeros((0, 3))
     shape, spacing = (41, 41, 5), np.array([0.05, 0.05, 0.05])
-    log = -np.clip(0.5 - (np.arange(41) - 20.0) / 6.0, 0.0, 1.0)  # from x = -0.15 to 0.15
+    x = np.linspace(-1.0, 1.0, 41)
+    log = (
+        -np.clip(0.5 - x / 0.3, 0.0, 1.0) if across == "an end" else -np.exp(-((np.abs(x) - 0.4) ** 2) / 0.02)
+    )
     values = np.broadcast_to(log[:, None, None], shape).astype(np.float32)
     light = NewLight(np.array([-1.0, -1.0, -0.1]), spacing, values, np.ones(shape, np.float32))
     patch = SplatPatch(
@@ -124,9 +130,9 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(monkeypatch: p
     edit = light_edit(Edit.delete(cage()), patch)
     camera = Camera.look_at((0.0, 0.001, 3.0), (0.0, 0.0, 0.0), width=96, height=96, fov_x=0.5)
     origins, directions = camera.rays()
-    x = (origins - directions * (origins[:, 2:] / directions[:, 2:]))[:, 0].reshape(96, 96)
+    where = (origins - directions * (origins[:, 2:] / directions[:, 2:]))[:, 0].reshape(96, 96)
     plain = SplatRenderer(field).render(camera, background="black")
-    wanted = plain.rgb * np.exp(np.interp(x, np.linspace(-1.0, 1.0, 41), log))[..., None]
+    wanted = plain.rgb * np.exp(np.interp(where, x, log))[..., None]
 
     def off() -> float:
         splat_splitting.known_splits.clear()

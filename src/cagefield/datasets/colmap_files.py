@@ -54,7 +54,7 @@ def check_whole(folder: Path) -> States:
                 _walk(_Window(stream), size, skip_record)
         except OSError as error:
             raise DatasetError(f"{file}: cannot be read ({error.strerror})") from None
-        except (_CutOffError, struct.error, ValueError):
+        except (_CutOffError, struct.error):
             raise DatasetError(
                 f"{file}: the file is cut off after {size} bytes; copy or export it again"
             ) from None

@@ -37,8 +37,8 @@ RING, UNSURE, DOUBTED = 6.0, 0.4, 0.1
 """Colours around a hole, so many columns wide, are the membrane's where light changed by so much (log), and
 fade into their own. From this share on they do not hold the membrane."""
 
-SKIRT, FOG = 1.0, 0.5
-"""Height over a support, voxels, and optical depth per voxel up to which what is over it is fog."""
+FOG_FROM, FOG = 1.0, 0.5
+"""Height over a support, voxels, from which on what is over it is fog, up to this optical depth per voxel."""
 
 VIEWS = 32
 """Directions from which colours are looked at."""
@@ -88,7 +88,7 @@ def rebuilt(block: Block, footprint: Footprint, removed: Mask, *, stays: bool = 
     values = np.where(below & deep, block.density, values)
     block = block.with_density(where, values[where], slots=True)
     if stays:
-        over = (around | hole) & (height > SKIRT) & (height <= HIGH + 2.0)
+        over = (around | hole) & (height > FOG_FROM) & (height <= HIGH + 2.0)
         over &= _beneath(footprint, np.argwhere(removed))[u, v]
         block = _unveiled(block, voxels[over], np.interp(height[over], heights, profile))
     return _coloured(block, footprint, voxels[new], (u[new], v[new]), voxels[around], known_columns)

@@ -30,7 +30,7 @@ from cagefield.rendering.pasted_splats import with_pasted
 from cagefield.typing import AnyArray, Array, Mask
 
 OTHER = 0.2
-"""Splats stay where a coefficient of what was filled differs by less than this from what was there."""
+"""Splats stay where what was filled has the density that was there, and coefficients that differ by less."""
 
 
 def splat_patch_of(
@@ -64,11 +64,8 @@ def splat_patch_of(
     made = made_of(
         grid, EditStack(), edit, ambience, settled=settled, sight=None if below.active else sight, after=after
     )
-    known, new, fresh = (
-        KnownSplats.of(field, splats, grid, moved),
-        NONE,
-        made.under.differs(made.emptied, OTHER),
-    )
+    known, new = KnownSplats.of(field, splats, grid, moved), NONE
+    fresh = made.under.differs(made.emptied, OTHER)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
         new = known.cloned(made, edit.inner, edit.fill.source)
     elif made.support is not None:
@@ -92,7 +89,8 @@ def bent_splats(
     block = block_of(grid, EditStack(), box)
     bent = bending_light(block, edit, ambience)
     relit, light = in_light_of(block, bent)
-    known, new, gone = KnownSplats.of(field, splats, grid, moved), NONE, np.zeros(block.shape, bool)
+    known = KnownSplats.of(field, splats, grid, moved)
+    new, gone = NONE, np.zeros(block.shape, bool)
     if edit.fill == "surroundings":
         under, support = filled(relit, edit, bent, EditStack(), None if below.active else sight)
         if support is not None:

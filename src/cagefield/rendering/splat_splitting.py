@@ -1,8 +1,8 @@
-"""Splats split where one Gaussian cannot follow an edit: the map bends over it, a cut goes through it, or the
-edge of a shadow does.
+"""Splats split where one Gaussian cannot follow an edit: the map bends over it, or a cut or the edge of
+a shadow goes through it.
 
 Notation: a splat is m + A z, z ~ N(0, 1) in three dimensions, A = Q diag(s). An edit takes it to
-F(m) + J A z, which is right as far as F is affine over it. Two things are not:
+F(m) + J A z, which is right as far as F is affine over it, and in one colour. Three things are not:
 
 - Bending. Along the axis a_i of A the second-order term of F at two standard deviations, against the length
   of what the first-order term makes of them, is
@@ -27,8 +27,9 @@ F(m) + J A z, which is right as far as F is affine over it. Two things are not:
   variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
   plane. Of faint splats T is a normal distribution, and children have its moments where it is cut off.
 - Light. A patch (`edits.patch`) multiplies a splat's colours by one number. Where the log of that changes by
-  d > SHADE from m - a_i to m + a_i the splat becomes a row along a_i as where it bends, with r = SHADE / d.
-  It is not where a_i is shorter than half an edge of the grid that the light is worked out on.
+  d > SHADE among m - a_i, m and m + a_i the splat becomes a row along a_i as where it bends, with
+  r = SHADE / d, faint ones where it changes by more. It does not where a_i is shorter than half an edge of
+  the light's grid.
 
 Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits what those
 before it left.
@@ -62,7 +63,7 @@ BEND = 0.08
 """Largest b of a splat that stays whole: a turn by 9 degrees from its middle to two standard deviations."""
 
 SHADE = 0.15
-"""Largest change of the log of light over a splat that stays whole, a standard deviation each way."""
+"""Largest d of a splat that stays whole."""
 
 FAINT = 0.3
 """Splats of less opacity than this may bend more, as much as they are fainter."""
@@ -80,7 +81,7 @@ ROUNDS = 3
 """Times that what was split is looked through again."""
 
 CUTS = 2
-"""Times that what lies across a cut is cut."""
+"""Times that what lies across a cut, or a shadow's edge, is split."""
 
 REACH = 2.0
 """Standard deviations at which a splat ends, for cuts: 2 % of it may hang over."""
@@ -289,11 +290,15 @@ def _bent(
     shear[:, [0, 1, 2], [0, 1, 2]] = 0.0
     bend = np.maximum(bend, shear.max(axis=2))
     bend[lost[:, :1] | lost[:, 1:4] | lost[:, 4:7]] = 0.0
-    axis = bend.argmax(axis=1)
-    worst = bend.max(axis=1)
+    return _rows(field, rows, bend, BEND)
+
+
+def _rows(field: SplatField, rows: NDArray[np.int64], change: Array, most: float) -> _Children:
+    """Rows of children for those splats [M] that change by more than `most` along an axis: change [M,3]."""
+    axis, worst = change.argmax(axis=1), change.max(axis=1)
     opacity = field.opacities[rows].astype(np.float64)
-    split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > BEND) & (opacity > UNSEEN))
-    r = np.maximum(BEND / worst[split], LEAST_WIDTH)
+    split = np.flatnonzero((worst * np.minimum(1.0, opacity / FAINT) > most) & (opacity > UNSEEN))
+    r = np.maximum(most / worst[split], LEAST_WIDTH)
     children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
     return children.take(np.flatnonzero(children.opacity > UNSEEN))
 
@@ -366,21 +371,17 @@ def _shaded(
     edit: Edit, patch: SplatPatch, field: SplatField, rows: NDArray[np.int64], points: Array, A: Array
 ) -> _Children:
     """Rows of children for the splats over which the light of a patch changes."""
-    inside = edit.inner.contains(points)
+    # The cage of a paste is in another scene.
+    inside = np.zeros(len(rows), bool) if edit.source is not None else edit.inner.contains(points)
     change = np.zeros((len(rows), 3))
     steps = A.transpose(0, 2, 1)  # [M, axis, 3]
     for light, here in ((patch.light, ~inside), (patch.part, inside)):
         if light is not None:
-            ends = [light.at((points[here, None] + way * steps[here]).reshape(-1, 3)) for way in (1.0, -1.0)]
-            change[here] = np.abs(ends[0] - ends[1]).reshape(-1, 3)
+            along = [points[here, None] + way * steps[here] for way in (-1.0, 0.0, 1.0)]
+            change[here] = np.ptp([light.at(at.reshape(-1, 3)).reshape(-1, 3) for at in along], axis=0)
             # What is smaller than the light's grid shows noise of that.
             change[here] *= np.linalg.norm(steps[here], axis=2) > 0.5 * light.spacing.max()
-    axis, most = change.argmax(axis=1), change.max(axis=1)
-    opacity = field.opacities[rows].astype(np.float64)
-    split = np.flatnonzero((most * np.minimum(1.0, opacity / FAINT) > SHADE) & (opacity > UNSEEN))
-    r = np.maximum(SHADE / most[split], LEAST_WIDTH)
-    children = _row(rows[split], np.eye(3)[axis[split]], r, opacity[split])
-    return children.take(np.flatnonzero(children.opacity > UNSEEN))
+    return _rows(field, rows, change, SHADE)
 
 
 def _crossing(

@@ -132,11 +132,13 @@ def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
 
 
 def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
-    """True where the box of one of the other rows meets that of `row`, or the box of what V shows."""
-    low, high = row[BOX : BOX + 3], row[BOX + 3 : BOX + 6]
-    if row[FIRST] == 0:
+    """True where the box of one of the other rows meets that of `row`, or of what V shows of the field."""
+    boxes = [(row[BOX : BOX + 3], row[BOX + 3 : BOX + 6])]
+    if row[FIRST] == 0 and row[PART] == 0:
         image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
         reach = np.abs(image[1:]).sum(axis=0)
-        low, high = np.minimum(low, image[0] - reach), np.maximum(high, image[0] + reach)
-    meets = (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low)
-    return bool(meets.all(axis=1).any())
+        boxes.append((image[0] - reach, image[0] + reach))
+    meets = [
+        (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low) for low, high in boxes
+    ]
+    return bool(np.any([each.all(axis=1) for each in meets]))

@@ -36,7 +36,8 @@ from cagefield.warps.packing import (
     UNDER,
 )
 
-STRAIGHT = 2
+STAYED, BENT, STRAIGHT = 0, 1, 2
+"""How a sample was moved: not at all, along a direction of its own, along the one that its ray has in V^c."""
 
 EditedRay = qd.types.struct(
     edit=qd.i32,
@@ -93,11 +94,11 @@ def edited_ray(origin: vec3, d: vec3, edits: EditArgs):
                 ray.under = qd.cast(edits.params[e, UNDER], qd.i32)
                 ray.outer = vec2(1e30, -1e30)
                 if edits.params[e, LAST] > 1.5:
-                    ray.outer, _at, _along = through(origin, d, edits.params, e, RECORDS + RECORD)
+                    ray.outer, _at = through(origin, d, edits.params, e, RECORDS + RECORD)
         if ray.edit >= 0:
             ray.inner = vec2(1e30, -1e30)
             if edits.params[e, FIRST] < 0.5:
-                ray.inner, at, _along = through(origin, d, edits.params, e, RECORDS)
+                ray.inner, at = through(origin, d, edits.params, e, RECORDS)
                 q, v = image(at, d, edits.params, e, RECORDS)
                 ray.canonical = q
                 ray.velocity = v
@@ -116,11 +117,11 @@ def is_straight(params: qd.template(), e: qd.i32):
 
 @qd.func
 def through(origin: vec3, d: vec3, params: qd.template(), e: qd.i32, at: qd.i32):
-    """([t_in, t_out] in a record's parallelepiped, xi of the ray's origin, d xi / dt)."""
+    """([t_in, t_out] in a record's parallelepiped, xi of the ray's origin)."""
     xi = times(params, e, at + MATRIX, origin - read3(params, e, at + CENTRE))
     velocity = times(params, e, at + MATRIX, d)
     one = vec3(1.0 + EDGE, 1.0 + EDGE, 1.0 + EDGE)
-    return slab(xi, safe_inverse(velocity), -one, one), xi, velocity
+    return slab(xi, safe_inverse(velocity), -one, one), xi
 
 
 @qd.func
@@ -132,11 +133,11 @@ def map_along(
     edits: EditArgs,
     flows: qd.template(),
 ):
-    """As `map_sample` for p = o + t d on the ray, and how p was moved: 0 not, 1, `STRAIGHT` in `inner`."""
+    """As `map_sample` for p = o + t d on the ray, and how p was moved (`STAYED`, `BENT`, `STRAIGHT`)."""
     q = p
     v = d
     place = 0
-    moved = 0
+    moved = STAYED
     if ray.edit >= 0:
         if t >= ray.inner.x and t <= ray.inner.y:
             q = ray.canonical + t * ray.velocity
@@ -154,11 +155,11 @@ def map_along(
                 )
                 q = p + u
                 v = d + along
-                moved = 1
+                moved = BENT
             else:
                 place = ray.under
     else:
         q, v, place = map_sample(p, d, edits, flows)
         if qd.abs(q - p).max() > 0.0:
-            moved = 1
+            moved = BENT
     return q, v, place, moved

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import quadrants as qd
 
 from cagefield.loops import Deal, dealt, turns
-from cagefield.rendering.kernels.edited_ray import STRAIGHT, EditedRay, edited_ray, map_along
+from cagefield.rendering.kernels.edited_ray import BENT, STAYED, STRAIGHT, EditedRay, edited_ray, map_along
 from cagefield.rendering.kernels.grid import (
     F32,
     GridArgs,
@@ -152,20 +152,20 @@ def march_tiles(
                 if empty == 1:
                     t += leap
                 else:
-                    moved = 0
+                    moved = STAYED
                     place = 0
                     view = d
                     if qd.static(edited):
                         if t >= edit_in and t <= edit_out:
                             p = camera.origin + t * d
                             canonical, view, place, moved = map_along(ray, t, p, d, edits, flows)
-                            if moved >= 1:
+                            if moved != STAYED:
                                 g = to_grid(canonical, grid, contracted)
                     # The last bricks reach beyond the grid, and an edit may map samples there.
                     if g.min() < 0.0 or (g - qd.cast(grid.resolution - 1, qd.f32)).max() > 0.0:
                         place = -1
                     if qd.static(edited):
-                        if moved >= 1 and place == 0 and not is_occupied(canonical_bricks, g):
+                        if moved != STAYED and place == 0 and not is_occupied(canonical_bricks, g):
                             place = -1
                     if place >= 0:
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
@@ -177,7 +177,7 @@ def march_tiles(
                         raw = gather_density(grid.density, slots, b)
                         if raw > 0.0:
                             if qd.static(edited):
-                                if march.preserve_opacity == 1 and moved >= 1:
+                                if march.preserve_opacity == 1 and moved != STAYED:
                                     raw *= view.norm()
                             keep = qd.exp(-raw * h)
                             w = T * (1.0 - keep)
@@ -187,7 +187,7 @@ def march_tiles(
                                 if qd.static(edited):
                                     if moved == STRAIGHT:
                                         seen = turned
-                                    elif moved == 1:
+                                    elif moved == BENT:
                                         seen = sh_basis(view / qd.max(view.norm(), 1e-20), K)
                                 c = gather_rgb(grid.sh, slots, b, seen, K)
                                 rgb += w * qd.max(qd.min(c, 1.0), 0.0)
@@ -200,7 +200,7 @@ def march_tiles(
                                     else:
                                         slope = slope * grid.scale
                                     if qd.static(edited):
-                                        if moved >= 1:
+                                        if moved != STAYED:
                                             slope = through_edits(slope, camera.origin + t * d, edits, flows)
                                     normal -= w * slope / qd.max(slope.norm(), 1e-12)
                     t += h

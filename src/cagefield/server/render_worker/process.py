@@ -16,6 +16,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -226,13 +227,14 @@ class Worker:
     def _hand_over(self, connection: Connection) -> Result:
         """Gives the process a copy of the scene that is edited; what it says to that."""
         assert self.write_opened is not None  # nothing is replaced where `files` are not known
-        with tempfile.TemporaryDirectory(prefix="cagefield-", ignore_cleanup_errors=True) as folder:
-            copy = Path(folder) / "scene"
+        with ExitStack() as kept:
             try:
+                folder = tempfile.TemporaryDirectory(prefix="cagefield-", ignore_cleanup_errors=True)
+                copy = Path(kept.enter_context(folder)) / "scene"
                 self.write_opened(copy)
-            except (CagefieldError, OSError) as error:
+            except (CagefieldError, OSError, MemoryError) as error:
                 _sent(connection, None)
-                why = str(error) if isinstance(error, CagefieldError) else line_of(error)
+                why = line_of(error) if isinstance(error, OSError) else str(error) or "too little memory"
                 return Failed(0, f"the scene that was opened cannot be kept for pictures: {why}")
             connection.send(str(copy))
             result: Result = connection.recv()
