@@ -19,7 +19,7 @@ from kill_command import EDITS
 from cagefield.datasets import colmap
 from cagefield.edits import EditStack, load_edits
 from cagefield.edits.files import save_edits
-from cagefield.errors import DatasetError, FieldError, SceneError
+from cagefield.errors import CagefieldError, DatasetError, FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
 from cagefield.formats.splat_files import open_splats, read_opened, write_splats
 from cagefield.scene import Scene
@@ -201,6 +201,16 @@ def test_an_editor_reads_what_the_one_before_it_saved(
     assert held == [True] and not file.exists()
     lock = SceneLock(tmp_path / "scene")
     lock.release()
+
+
+@pytest.mark.parametrize("what", ["camera_path.json", "edits.yaml"])
+def test_an_editor_that_does_not_start_leaves_no_lock(tmp_path: Path, what: str) -> None:
+    ball_scene().save(tmp_path / "scene")
+    (tmp_path / "scene" / what).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / "scene" / what)
+    with pytest.raises(CagefieldError, match=what):
+        launch.open_cached(tmp_path / "scene", None)
+    assert [file.name for file in tmp_path.iterdir()] == ["scene"]
 
 
 PATIENCE = 120.0

@@ -76,6 +76,17 @@ def open_cached(
         store.lock()
     finally:
         lock.release()
+    try:
+        return _greeted(scene, store, device, real_path(path) if source is None else source, files[0])
+    except BaseException:
+        store.close()
+        raise
+
+
+def _greeted(
+    scene: Scene, store: SceneStore, device: str, shown: Path, field: FileState
+) -> tuple[Coordinator, server_messages.Hello]:
+    """The editor of a scene that pages are told to be `shown`, with what a crash left."""
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing, source_problem)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()
@@ -84,8 +95,7 @@ def open_cached(
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
     elif store.damaged is not None:
         coordinator.greeting = store.damaged
-    name = real_path(path).name if source is None else source.name
-    return coordinator, hello_of(scene, name, str(real_path(path)), files[0])
+    return coordinator, hello_of(scene, shown.name, str(real_path(store.path)), field)
 
 
 def hello_of(scene: Scene, name: str, path: str = "", field: FileState = None) -> server_messages.Hello:
