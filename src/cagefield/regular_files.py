@@ -9,7 +9,7 @@ import errno
 import os
 import stat
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import BinaryIO, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -19,6 +19,9 @@ from cagefield.typing import AnyArray
 
 MOST_TEXT = 32 << 20
 """Bytes of a text that is read whole: JSON of some 20,000 cameras."""
+
+FileState: TypeAlias = tuple[int, int] | None
+"""When a file was written, ns, and its bytes; None where there is none."""
 
 _PART = 1 << 16
 """Bytes that are asked for at a time, if the file says less: a buffer for all of them is taken before."""
@@ -69,6 +72,15 @@ def read_text(path: str | os.PathLike[str], most: int = MOST_TEXT) -> str:
     Raises as `open_regular`, and UnicodeDecodeError.
     """
     return read_bytes(path, most).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def file_state(path: str | os.PathLike[str]) -> FileState:
+    """The state of a file now: another one once it is written again."""
+    try:
+        state = os.stat(path)
+    except OSError:
+        return None
+    return state.st_mtime_ns, state.st_size
 
 
 def read_array(path: str | os.PathLike[str], dtype: DTypeLike, count: int, offset: int = 0) -> AnyArray:

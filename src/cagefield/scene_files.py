@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from cagefield import json_text
 from cagefield.atomic_files import check_writable, recover_folder
@@ -14,7 +14,14 @@ from cagefield.errors import CagefieldError, SceneError
 from cagefield.fields.files import kind_of
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.regular_files import UnreadableError, check_regular, read_text, real_path
+from cagefield.regular_files import (
+    FileState,
+    UnreadableError,
+    check_regular,
+    file_state,
+    read_text,
+    real_path,
+)
 from cagefield.rendering.render_result import background_rgb
 
 FORMAT = "cagefield-scene"
@@ -23,9 +30,6 @@ VERSION = 1
 FIELD, EDITS, CAMERAS, MANIFEST = "field.safetensors", "edits.yaml", "cameras.json", "scene.json"
 ORIGINAL = "original.safetensors"
 FILES = (FIELD, ORIGINAL, EDITS, CAMERAS, MANIFEST)
-
-FileState: TypeAlias = tuple[int, int] | None
-"""When a file was written, ns, and its bytes; None where there is none."""
 
 
 def check_destination(path: Path | str, overwrite: bool) -> Path:
@@ -76,16 +80,8 @@ def field_states(folder: Path | str) -> tuple[FileState, FileState, FileState]:
 
     Others than they were: the scene was replaced.
     """
-    field, original, cameras = (_state(Path(folder) / name) for name in (FIELD, ORIGINAL, CAMERAS))
+    field, original, cameras = (file_state(Path(folder) / name) for name in (FIELD, ORIGINAL, CAMERAS))
     return field, original, cameras
-
-
-def _state(file: Path) -> FileState:
-    try:
-        state = file.stat()
-    except OSError:
-        return None
-    return state.st_mtime_ns, state.st_size
 
 
 def check_part(path: Path) -> None:

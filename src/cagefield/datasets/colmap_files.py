@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from cagefield.errors import DatasetError
-from cagefield.regular_files import check_regular, open_regular
+from cagefield.regular_files import check_regular, file_state, open_regular
 
 _POSE = 56  # rotation quaternion and translation, float64
 _PARAMETERS = (3, 4, 4, 5, 8, 8)  # of the camera models 0 to 5, those that can be read; see `colmap._camera`
@@ -74,14 +74,8 @@ def check_unchanged(folder: Path, states: States) -> None:
 
 def _states(folder: Path) -> States:
     """When each of the model's files was written, ns, and its bytes; of those that are there."""
-    found = {}
-    for name in (*_TEXTS, *_RECORDS):
-        try:
-            state = (folder / name).stat()
-        except OSError:
-            continue
-        found[name] = state.st_mtime_ns, state.st_size
-    return found
+    found = {name: file_state(folder / name) for name in (*_TEXTS, *_RECORDS)}
+    return {name: state for name, state in found.items() if state is not None}
 
 
 def _check_text(file: Path) -> None:

@@ -23,9 +23,9 @@ from cagefield.fields.splat import SplatField
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.keyframes import Keyframe
 from cagefield.leftovers import remove_leftovers, remove_unfinished
-from cagefield.regular_files import read_bytes, read_text, real_path
+from cagefield.regular_files import FileState, read_bytes, read_text, real_path
 from cagefield.scene import Scene
-from cagefield.scene_files import FIELD, FileState, field_states
+from cagefield.scene_files import FIELD, field_states
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache

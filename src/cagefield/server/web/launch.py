@@ -24,9 +24,9 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_field import VERSION as FIELD_VERSION
 from cagefield.formats.splat_sog import META
-from cagefield.regular_files import MOST_TEXT, check_regular, real_path
+from cagefield.regular_files import MOST_TEXT, FileState, check_regular, real_path
 from cagefield.scene import Scene
-from cagefield.scene_files import FileState, field_states, is_scene, recover
+from cagefield.scene_files import field_states, is_scene, recover
 from cagefield.server.editor.pasted_sources import source_problem
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
