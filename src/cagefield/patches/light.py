@@ -25,7 +25,9 @@ from scipy import optimize
 from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
-from cagefield.patches.seen import Sight
+from cagefield.patches.facing import Facing, TurnedPairs, facing_of, turned_pairs
+from cagefield.patches.robust import softened
+from cagefield.patches.seen import SeenPairs, Sight
 from cagefield.patches.sun import Sun, sun_of
 from cagefield.patches.surfels import Surfels, gridded
 from cagefield.typing import Array, Mask
@@ -39,9 +41,6 @@ the standard deviations of each and of their sum."""
 
 ALIKE = 1000.0
 """Pairs that count as one: neighbours, and other views, see the same texture."""
-
-HUBER = 3.0
-"""Standard deviations of noise from which on a change counts by its size, no longer by its square."""
 
 DARKEST = 0.08
 """Least openness that counts: colours that are darker still are noise."""
@@ -69,17 +68,18 @@ DEEP = 10.0
 class Ambience:
     """How a field's colours follow its openness: reaches [R] in world units, and their weights [R].
 
-    And its dominant light, where that is to go along.
+    And where what faces is brighter, and its dominant light, where that is to go along: that tells of both.
     """
 
     reaches: tuple[float, ...]
     weights: tuple[float, ...]
+    facing: Facing | None = None
     sun: Sun | None = None
 
     @property
     def shows(self) -> bool:
-        """False where colours follow neither openness nor a light."""
-        return self.sun is not None or sum(self.weights) > SHOWING
+        """False where colours follow neither openness nor where they face nor a light."""
+        return self.sun is not None or self.facing is not None or sum(self.weights) > SHOWING
 
     @property
     def reach(self) -> float:
@@ -96,6 +96,8 @@ class Ambience:
         log = np.zeros(len(at.points))
         if sum(self.weights) > SHOWING:
             log += self.log_openness(nearness(around, at, self.reaches))
+        if self.facing is not None:
+            log += self.facing.log_light(at.normals)
         if self.sun is not None:
             log += self.sun.log_light(gridded(around, FINE * self.sun.near), at.points, at.normals)
         return log
@@ -143,15 +145,33 @@ def ambience_of(field: VoxelField, sight: Sight) -> Ambience:
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
         told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / max(noise, 1e-3)
-        # Edges of textures are further off than noise, of either sign: Huber's loss, smoothed.
-        edge = HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (told / HUBER) ** 2) - 1.0) / ALIKE)
-        robust = np.sign(told) * edge
         corner = (weights.sum() - usual.sum()) / CORNER
-        return np.concatenate([robust, (weights - usual) / SPREAD, [corner]])
+        return np.concatenate([softened(told) / np.sqrt(ALIKE), (weights - usual) / SPREAD, [corner]])
 
     fit = optimize.least_squares(residuals, usual, bounds=(0.0, 1.0))
     share = min(1.0, (1.0 - DARKEST) / max(float(fit.x.sum()), 1e-9))
     return Ambience(reaches, tuple(float(w) * share for w in fit.x))
+
+
+def with_facing(ambience: Ambience, field: VoxelField, sight: Sight) -> Ambience:
+    """The ambience, and what where surfaces face makes of the rest, if it makes much."""
+    reaches = reaches_of(field)
+    if not reaches:
+        return ambience
+    pairs = turned_pairs(sight, reaches[1:4])
+    change = pairs.log_change - _told(ambience, sight, reaches, pairs)
+    return replace(ambience, facing=facing_of(pairs.first, pairs.second, change))
+
+
+def _told(
+    ambience: Ambience, sight: Sight, reaches: Sequence[float], pairs: SeenPairs | TurnedPairs
+) -> Array:
+    """The changes of log colour [N] of pairs that openness explains."""
+    if sum(ambience.weights) <= SHOWING:
+        return np.zeros(len(pairs.log_change))
+    around = [sight.surface.thinned(FINE * reaches[0])]
+    first, second = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
+    return ambience.log_openness(second) - ambience.log_openness(first)
 
 
 def with_sun(
@@ -164,14 +184,10 @@ def with_sun(
     reaches, pairs = reaches_of(field), sight.pairs
     if len(pairs.log_change) < ENOUGH or not reaches:
         return ambience
-    change = pairs.log_change
-    if sum(ambience.weights) > SHOWING:
-        around = [sight.surface.thinned(FINE * reaches[0])]
-        near, other = (nearness(around, at, reaches) for at in (pairs.first, pairs.second))
-        change = change - (ambience.log_openness(other) - ambience.log_openness(near))
+    change = pairs.log_change - _told(ambience, sight, reaches, pairs)
     distance = gridded([sight.surface], reaches[0])
     sun = sun_of(distance, pairs.first, pairs.second, change, reaches, direction)
-    return replace(ambience, sun=sun)
+    return ambience if sun is None else replace(ambience, facing=None, sun=sun)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import bent_block, bent_voxels
 from cagefield.patches.block import Block
 from cagefield.patches.joining import joined
-from cagefield.patches.light import Ambience, ambience_of, with_sun
+from cagefield.patches.light import Ambience, ambience_of, with_facing, with_sun
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
 from cagefield.patches.seen import Sight, sight_of
@@ -111,8 +111,8 @@ class Patcher:
 
     @cached_property
     def ambience(self) -> Ambience:
-        """How the field's colours follow its openness."""
-        return ambience_of(self._voxels, self._sight)
+        """How the field's colours follow its openness, and where its surfaces face."""
+        return with_facing(ambience_of(self._voxels, self._sight), self._voxels, self._sight)
 
     def _lit(self, edit: Edit) -> Ambience | None:
         """What goes along of the light of an edit; None where all stays."""

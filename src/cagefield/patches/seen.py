@@ -49,14 +49,15 @@ class SeenPairs:
 class Sight:
     """What some cameras of a field see of it.
 
-    pairs: neighbours on its surfaces; surface: what of these is seen at all, and bright [N] the log of its
-    mean colours. depths: of each camera the distance [H,W] along the pixels' rays at which they end, inf
-    where they do not.
+    pairs: neighbours on its surfaces; surface: what of these is seen at all, bright [N] the log of its mean
+    colours, and hue [N,3] its colours over their means. depths: of each camera the distance [H,W] along the
+    pixels' rays at which they end, inf where they do not.
     """
 
     pairs: SeenPairs
     surface: Surfels
     bright: Array
+    hue: Array
     cameras: tuple[Camera, ...]
     depths: tuple[Array, ...]
 
@@ -83,15 +84,18 @@ def sight_of(
     chance = np.random.default_rng(seed)
     picked = {int(n) for n in np.linspace(0, len(cameras) - 1, VIEWS)} if cameras else set()
     chosen = tuple(smaller(camera) for camera in [cameras[n] for n in sorted(picked)] or around(bounds))
-    pairs, surfaces, bright, depths = [], [], [], []
+    pairs, surfaces, bright, hue, depths = [], [], [], [], []
     for camera in chosen:
         picture = render(camera)
         surface, solid = _surface(picture, camera)
-        log = np.log(np.clip(picture.rgb.reshape(-1, 3), 0.02, 1.0).mean(axis=1))
+        colours = np.clip(picture.rgb.reshape(-1, 3), 0.02, 1.0)
+        mean = colours.mean(axis=1)
+        log = np.log(mean)
         pairs.append(_pairs(log, surface, solid, chance))
         known = solid.reshape(-1) & ((surface.normals**2).sum(axis=1) > 0.5)
         surfaces.append(surface.take(known))
         bright.append(log[known])
+        hue.append((colours / mean[:, None])[known])
         ends = (picture.opacity > ENDS) & np.isfinite(picture.depth)
         depths.append(np.where(ends, picture.depth, np.inf).astype(np.float64))
     first, second = (joined([getattr(pair, name) for pair in pairs]) for name in ("first", "second"))
@@ -100,7 +104,8 @@ def sight_of(
     shown = _some(len(surface.points), SURFACE, chance)
     rows = _some(len(seen.log_change), PAIRS, chance)
     seen = SeenPairs(first.take(rows), second.take(rows), seen.log_change[rows])
-    return Sight(seen, surface.take(shown), np.concatenate(bright)[shown], chosen, tuple(depths))
+    brightness, hues = (np.concatenate(each)[shown] for each in (bright, hue))
+    return Sight(seen, surface.take(shown), brightness, hues, chosen, tuple(depths))
 
 
 def _some(count: int, most: int, chance: np.random.Generator) -> NDArray[np.int64]:

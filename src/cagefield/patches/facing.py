@@ -1,0 +1,127 @@
+"""How bright surfaces are by where they face: what becomes of a part's light when it is turned.
+
+Light from far away makes a matt surface of unit normal n about as bright as
+
+    1 + a . n,
+
+the first two bands of its irradiance. a is fitted to neighbours of one hue that face different ways: the log
+of their brightness differs by openness, which is known, by texture, of either sign, and by where they face.
+
+Source: Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps" (2001).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from cagefield.patches.robust import loss, softened
+from cagefield.patches.seen import Sight
+from cagefield.patches.surfels import Surfels
+from cagefield.typing import AnyArray, Array
+
+SOME, PAIRS = 40_000, 20_000
+"""Surface elements that neighbours are looked for of, for each distance, and pairs, at most."""
+
+TURNED = 0.97
+"""Greatest cosine between the normals of a pair."""
+
+AROUND, ALONG, TIMES = 48, 0.5, 2
+"""Surface elements that a normal is the mean of, so many times over, and the least cosine between theirs and
+it: pictures' depths are rough, and a fit to rough normals finds too little."""
+
+HUE = 0.2
+"""Greatest difference of a pair's colours over their means: more is another material."""
+
+SPREAD = 0.3
+"""Standard deviation of each component of a, about 0."""
+
+ALIKE = 30.0
+"""Pairs that count as one."""
+
+LEAST, LEAST_GAIN = 0.2, 0.01
+"""Least brightness, so much of the mean; share of the loss that facing must explain."""
+
+ENOUGH = 500
+"""Pairs from which it is fitted, at least."""
+
+
+@dataclass(frozen=True)
+class Facing:
+    """Surfaces are brighter the more they face along `towards` [3], a."""
+
+    towards: tuple[float, float, float]
+
+    def log_light(self, normals: AnyArray) -> Array:
+        """The log of how bright surfaces of unit normals [N,3] are, [N]."""
+        return np.asarray(np.log(np.maximum(1.0 + normals @ np.array(self.towards), LEAST)))
+
+
+@dataclass(frozen=True)
+class TurnedPairs:
+    """Neighbours of one hue that face different ways; log_change [N]: of the second's brightness."""
+
+    first: Surfels
+    second: Surfels
+    log_change: Array
+
+
+def turned_pairs(sight: Sight, apart: Sequence[float], *, seed: int = 0) -> TurnedPairs:
+    """Pairs of what is seen of a field, about so far `apart`, world units."""
+    chance = np.random.default_rng(seed)
+    surface, count = sight.surface, len(sight.bright)
+    first, second = np.zeros(0, np.int64), np.zeros(0, np.int64)
+    for distance in apart:
+        rows = chance.choice(count, min(count, SOME), replace=False)
+        way = chance.normal(size=(len(rows), 3))
+        way *= chance.uniform(0.3, 1.0, (len(rows), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
+        found, there = surface.nearest(surface.points[rows] + distance * way, 1, 0.5 * distance)
+        near = np.isfinite(found[:, 0])
+        first, second = np.append(first, rows[near]), np.append(second, there[near, 0])
+    cosine = (surface.normals[first] * surface.normals[second]).sum(axis=1)
+    alike = np.abs(sight.hue[first] - sight.hue[second]).max(axis=1) < HUE
+    kept = np.flatnonzero((cosine < TURNED) & alike)
+    kept = chance.choice(kept, min(len(kept), PAIRS), replace=False)
+    first, second = first[kept], second[kept]
+    change = sight.bright[second] - sight.bright[first]
+    reach = min(apart)
+    return TurnedPairs(_evened(surface, first, reach), _evened(surface, second, reach), change)
+
+
+def _evened(surface: Surfels, rows: NDArray[np.int64], reach: float) -> Surfels:
+    """Some elements of a surface, their normals means of those around."""
+    points, normals = surface.points[rows], surface.normals[rows]
+    found, others = surface.nearest(points, AROUND, reach)
+    near = np.isfinite(found)
+    beside = surface.normals[np.where(near, others, 0)]
+    for _ in range(TIMES):
+        alike = near & (np.einsum("nki,ni->nk", beside, normals) > ALONG)
+        mean = np.einsum("nki,nk->ni", beside, alike.astype(np.float64))
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        normals = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), normals)
+    return Surfels(points, normals)
+
+
+def facing_of(first: Surfels, second: Surfels, change: Array) -> Facing | None:
+    """What explains changes [N] of log brightness between pairs [N] that face different ways, if much."""
+    if len(change) < ENOUGH:
+        return None
+    noise = max(1.4826 * float(np.median(np.abs(change - np.median(change)))), 1e-3)
+
+    def left(towards: AnyArray) -> Array:
+        facing = Facing((float(towards[0]), float(towards[1]), float(towards[2])))
+        told = facing.log_light(second.normals) - facing.log_light(first.normals)
+        return np.asarray((told - change) / noise)
+
+    fit = optimize.least_squares(
+        lambda towards: np.concatenate([softened(left(towards)) / np.sqrt(ALIKE), towards / SPREAD]),
+        np.zeros(3),
+    )
+    if loss(left(fit.x)) > (1.0 - LEAST_GAIN) * loss(left(np.zeros(3))):
+        return None
+    x, y, z = (float(value) for value in fit.x)
+    return Facing((x, y, z))

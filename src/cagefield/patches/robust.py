@@ -1,0 +1,23 @@
+"""Huber's loss, smoothed, of what a fit leaves over: edges of textures are further off than noise.
+
+Source: Charbonnier et al., "Deterministic edge-preserving regularization in computed imaging" (1997).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.typing import Array
+
+HUBER = 3.0
+"""Standard deviations of noise from which on what is left counts by its size, no longer by its square."""
+
+
+def softened(left: Array) -> Array:
+    """What is left over [N], in standard deviations, so that its squares are the loss."""
+    return np.asarray(np.sign(left) * HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (left / HUBER) ** 2) - 1.0)))
+
+
+def loss(left: Array) -> float:
+    """The mean loss of what is left over [N]."""
+    return float((softened(left) ** 2).mean())

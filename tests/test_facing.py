@@ -1,0 +1,112 @@
+"""Where surfaces face is found to matter, and a part that is turned is lit as it then faces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cagefield.cages import Cage
+from cagefield.cameras import Camera, turntable
+from cagefield.edits import Edit, EditStack
+from cagefield.fields.voxel import VoxelField
+from cagefield.patches.facing import Facing, facing_of
+from cagefield.patches.surfels import Surfels
+from cagefield.scene import Scene
+from cagefield.sh import C0
+
+FLOOR, RADIUS = -0.4, 0.3
+MIDDLE = np.array([0.0, 0.0, FLOOR + RADIUS])
+TOWARDS = np.array([0.45, -0.2, 0.2])
+
+
+def balls(towards: NDArray[np.float64], resolution: int = 64) -> VoxelField:
+    """A grey ball on a floor, lit by 1 + towards . n, without shadows."""
+    axis = np.linspace(-1.0, 1.0, resolution)
+    at = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    edge = axis[1] - axis[0]
+    floor = (at[..., 2] <= FLOOR) & (at[..., 2] > FLOOR - 3.0 * edge)
+    away = at - MIDDLE
+    length = np.linalg.norm(away, axis=-1)
+    ball = (length < RADIUS) & (at[..., 2] > FLOOR)
+    normal = np.where(ball[..., None], away / np.maximum(length, 1e-9)[..., None], (0.0, 0.0, 1.0))
+    texture = np.where(ball, 0.5, 0.5 + 0.05 * np.sin(9.0 * at[..., 0]) * np.sin(7.0 * at[..., 1]))
+    light = texture * (1.0 + normal @ towards)
+    solid = floor | ball
+    from_solid, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
+    vertices = np.flatnonzero(from_solid < 2.0)
+    grey = np.broadcast_to(light[tuple(nearest)].reshape(-1, 1)[vertices], (len(vertices), 3))
+    density = np.where(solid.reshape(-1)[vertices], 2.0 / edge, 0.0)
+    return VoxelField(
+        np.array([[-1.0] * 3, [1.0] * 3]),
+        (resolution,) * 3,
+        vertices,
+        density.astype(np.float32),
+        ((grey - 0.5) / C0).astype(np.float32)[:, None],
+    )
+
+
+def cameras() -> tuple[Camera, ...]:
+    """Around the floor, from above."""
+    return turntable((0.0, 0.0, -0.2), 3.0, 6, elevation=0.5, width=96, height=96, fov_x=0.5)
+
+
+@pytest.fixture(scope="module")
+def lit() -> Scene:
+    return Scene(balls(TOWARDS), cameras={"train": cameras()})
+
+
+def seen(shown: Scene) -> NDArray[np.float32]:
+    """Pictures of a scene from some of its cameras."""
+    return np.stack([shown.render(camera).rgb for camera in cameras()[::3]])
+
+
+def turned(relight: str, adjustment: str) -> EditStack:
+    """The ball turned about the vertical axis through its middle, which leaves it a ball."""
+    cage = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (0.7, 0.7, 0.62))
+    outer = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (1.3, 1.3, 0.9)) if adjustment == "continuous" else None
+    edit = Edit(cage, outer=outer, adjustment=adjustment, relight=relight, fill="none")  # type: ignore[arg-type]
+    return EditStack([edit.rotate((0.0, 0.0, 80.0 if outer is None else 40.0))])
+
+
+def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
+    """PSNR of two pictures."""
+    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
+
+
+@pytest.mark.parametrize("adjustment", ["discrete", "continuous"])
+def test_a_turned_ball_looks_as_it_did(lit: Scene, adjustment: str) -> None:
+    before = seen(lit)
+    kept, relit = (db(seen(lit.with_edits(turned(way, adjustment))), before) for way in ("none", "occlusion"))
+    assert relit > kept + 5.0, (kept, relit)
+
+
+def test_where_light_comes_from_is_found_in_pictures(lit: Scene) -> None:
+    facing = lit.patcher.ambience.facing
+    assert facing is not None
+    found = np.array(facing.towards)
+    assert found @ TOWARDS > np.cos(np.radians(25.0)) * np.linalg.norm(found) * np.linalg.norm(TOWARDS)
+    assert 0.5 < np.linalg.norm(found) / np.linalg.norm(TOWARDS) < 1.1
+
+
+def test_where_all_sides_are_alike_none_is_found() -> None:
+    dull = Scene(balls(np.zeros(3)), cameras={"train": cameras()})
+    facing = dull.patcher.ambience.facing
+    assert facing is None or np.linalg.norm(facing.towards) < 0.05
+
+
+def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> None:
+    chance = np.random.default_rng(2)
+    normals = chance.normal(size=(2, 4000, 3))
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    first, second = (Surfels(np.zeros((4000, 3)), each) for each in normals)
+    texture = chance.normal(0.0, 0.1, 4000) + np.where(
+        chance.random(4000) < 0.2, chance.normal(0.0, 1.0, 4000), 0.0
+    )
+    light = Facing((0.3, -0.1, 0.4))
+    change = light.log_light(second.normals) - light.log_light(first.normals)
+    found = facing_of(first, second, change + texture)
+    assert found is not None and np.abs(np.subtract(found.towards, light.towards)).max() < 0.05
+    assert facing_of(first, second, texture) is None
+    assert facing_of(first.take(np.arange(90)), second.take(np.arange(90)), change[:90]) is None
