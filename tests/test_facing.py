@@ -100,7 +100,8 @@ def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> No
     chance = np.random.default_rng(2)
     normals = chance.normal(size=(2, 4000, 3))
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-    first, second = (Surfels(np.zeros((4000, 3)), each) for each in normals)
+    points = chance.random((4000, 3))
+    first, second = (Surfels(points, each) for each in normals)
     texture = chance.normal(0.0, 0.1, 4000) + np.where(
         chance.random(4000) < 0.2, chance.normal(0.0, 1.0, 4000), 0.0
     )
@@ -109,4 +110,7 @@ def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> No
     found = facing_of(first, second, change + texture)
     assert found is not None and np.abs(np.subtract(found.towards, light.towards)).max() < 0.05
     assert facing_of(first, second, texture) is None
+    # What is so on one side alone is no light from far away.
+    half = points[:, 0] > 0.5
+    assert facing_of(first, second, np.where(half, 1.0, -1.0) * change + texture) is None
     assert facing_of(first.take(np.arange(90)), second.take(np.arange(90)), change[:90]) is None

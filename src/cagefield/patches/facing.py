@@ -44,7 +44,7 @@ ALIKE = 30.0
 """Pairs that count as one."""
 
 LEAST, LEAST_GAIN = 0.2, 0.01
-"""Least brightness, so much of the mean; share of the loss that facing must explain."""
+"""Least brightness, so much of the mean; share of the loss of other pairs that facing must explain."""
 
 ENOUGH = 500
 """Pairs from which it is fitted, at least."""
@@ -107,21 +107,41 @@ def _evened(surface: Surfels, rows: NDArray[np.int64], reach: float) -> Surfels:
 
 
 def facing_of(first: Surfels, second: Surfels, change: Array) -> Facing | None:
-    """What explains changes [N] of log brightness between pairs [N] that face different ways, if much."""
+    """What explains changes [N] of log brightness between pairs [N] that face different ways, if it does.
+
+    What one half of them says, in space, must hold in the other: else it is where things are that matters.
+    """
     if len(change) < ENOUGH:
         return None
     noise = max(1.4826 * float(np.median(np.abs(change - np.median(change)))), 1e-3)
-
-    def left(towards: AnyArray) -> Array:
-        facing = Facing((float(towards[0]), float(towards[1]), float(towards[2])))
-        told = facing.log_light(second.normals) - facing.log_light(first.normals)
-        return np.asarray((told - change) / noise)
-
-    fit = optimize.least_squares(
-        lambda towards: np.concatenate([softened(left(towards)) / np.sqrt(ALIKE), towards / SPREAD]),
-        np.zeros(3),
-    )
-    if loss(left(fit.x)) > (1.0 - LEAST_GAIN) * loss(left(np.zeros(3))):
+    gains = []
+    for along in first.points.T:
+        half = along > np.median(along)
+        for one in (half, ~half):
+            towards = _fitted(first.take(one), second.take(one), change[one], noise)
+            left, usual = (
+                loss(_left(each, first.take(~one), second.take(~one), change[~one], noise))
+                for each in (towards, np.zeros(3))
+            )
+            gains.append(1.0 - left / usual)
+    if np.mean(gains) < LEAST_GAIN:
         return None
-    x, y, z = (float(value) for value in fit.x)
+    x, y, z = (float(value) for value in _fitted(first, second, change, noise))
     return Facing((x, y, z))
+
+
+def _fitted(first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
+    """a [3] of pairs."""
+
+    def residuals(towards: Array) -> Array:
+        left = softened(_left(towards, first, second, change, noise))
+        return np.concatenate([left / np.sqrt(ALIKE), towards / SPREAD])
+
+    return np.asarray(optimize.least_squares(residuals, np.zeros(3)).x)
+
+
+def _left(towards: Array, first: Surfels, second: Surfels, change: Array, noise: float) -> Array:
+    """What a [3] leaves over of changes [N], standard deviations."""
+    facing = Facing((towards[0], towards[1], towards[2]))
+    told = facing.log_light(second.normals) - facing.log_light(first.normals)
+    return np.asarray((told - change) / noise)
