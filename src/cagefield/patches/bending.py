@@ -65,7 +65,8 @@ def light_box(edit: Edit, voxel: float, reach: float, falls: Array) -> Array:
 class Bent:
     """The light on a coarser block once a continuous edit has bent it.
 
-    log [N]: what the light on the surface elements is multiplied by; light: the same on the block's vertices.
+    light: what the light on the block's vertices is multiplied by; log [N]: the same of the surface elements,
+    without what a turn does.
     """
 
     block: Block
@@ -83,9 +84,11 @@ def bending_light(block: Block, edit: Edit, ambience: Ambience) -> Bent:
         return Bent(coarse, surface, np.zeros(0), Lighting(np.zeros(coarse.shape, bool), np.zeros(0)))
     moved = to_deformed(edit.exact_warp, surface.points, coarse=True)
     bent = surface.turned(moved.points, moved.jacobian)
+    turned = ambience.log_facing(bent) - ambience.log_facing(surface)
     log = ambience.log_light([bent], bent) - ambience.log_light([surface], surface)
-    log = np.where(np.abs(log) < UNSEEN, 0.0, log)
-    return Bent(coarse, surface, log, Lighting.of(coarse, surface, log, 2.0 * max(coarse.spacing)))
+    seen = np.where(np.abs(log) < UNSEEN, 0.0, log)
+    light = Lighting.of(coarse, surface, seen, 2.0 * max(coarse.spacing))
+    return Bent(coarse, surface, log - turned, light)
 
 
 def bent_block(field: VoxelField, below: EditStack, edit: Edit, ambience: Ambience) -> Block:
@@ -146,10 +149,11 @@ def filled(
     margin = max(AROUND, 0.5 * float((high - low).max()))
     first = np.maximum(np.floor(low - margin), 0.0).astype(np.int64)
     small = block.cropped(first, np.ceil(high + margin).astype(np.int64))
-    support = _support(small, edit, bent, at - first)
+    inside = edit.inner.contains(small.positions(np.ones(small.shape, bool))).reshape(small.shape)
+    support = _support(small, inside, edit, bent, at - first)
     if support is None:
         return block, None
-    continued = _continued(small, edit, bent, at - first, dark, support, below, sight)
+    continued = _continued(small, inside, bent, at - first, dark, support, below, sight)
     if continued is None:
         return block, None
     part = tuple(slice(a, a + n) for a, n in zip(small.low - block.low, small.shape, strict=True))
@@ -159,13 +163,8 @@ def filled(
     return whole, replace(support, point=support.point + first, members=support.members + first)
 
 
-def _inside(block: Block, edit: Edit) -> Mask:
-    return edit.inner.contains(block.positions(np.ones(block.shape, bool))).reshape(block.shape)
-
-
-def _support(block: Block, edit: Edit, bent: Bent, at: Array) -> Support | None:
-    """What the part stands on, or hangs over, of the surfaces [N] at block coordinates."""
-    inside = _inside(block, edit)
+def _support(block: Block, inside: Mask, edit: Edit, bent: Bent, at: Array) -> Support | None:
+    """What the part, `inside` [X,Y,Z], stands on, or hangs over, of the surfaces [N] at block coordinates."""
     part = block.solid & inside
     if not part.any():
         return None
@@ -178,7 +177,7 @@ def _support(block: Block, edit: Edit, bent: Bent, at: Array) -> Support | None:
 
 def _continued(
     block: Block,
-    edit: Edit,
+    inside: Mask,
     bent: Bent,
     at: Array,
     dark: NDArray[np.bool_],
@@ -187,7 +186,6 @@ def _continued(
     sight: Sight | None,
 ) -> Block | None:
     """The block with a support going on, by surfaces [N] at block coordinates, of which some are dark."""
-    inside = _inside(block, edit)
     part = block.solid & inside
     unsure = Surfels(at[dark], bent.surface.normals[dark])
     footprint = footprint_of(support, part, np.zeros((0, 3)), unsure)

@@ -96,11 +96,14 @@ class Ambience:
         log = np.zeros(len(at.points))
         if sum(self.weights) > SHOWING:
             log += self.log_openness(nearness(around, at, self.reaches))
-        if self.facing is not None:
-            log += self.facing.log_light(at.normals)
+        log += self.log_facing(at)
         if self.sun is not None:
             log += self.sun.log_light(gridded(around, FINE * self.sun.near), at.points, at.normals)
         return log
+
+    def log_facing(self, at: Surfels) -> Array:
+        """The share of that which is due to where they face."""
+        return np.zeros(len(at.points)) if self.facing is None else self.facing.log_light(at.normals)
 
     def log_openness(self, nearness: Array) -> Array:
         """log o [N], o at least DARKEST, of nearnesses [N,R]."""
