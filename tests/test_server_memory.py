@@ -1,9 +1,12 @@
-"""What the rendering process keeps, and what it gives back."""
+"""What the processes of an editor keep, and what they give back."""
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import sys
+import threading
+import time
 import weakref
 
 import numpy as np
@@ -17,6 +20,7 @@ from cagefield.server.render_worker import page_files, renderer_cache, unused_me
 from cagefield.server.render_worker.renderer_cache import KEPT_EDITS, RendererCache
 from cagefield.server.render_worker.tasks import PageEditsTask, Shown, values_of
 from cagefield.server.render_worker.unused_memory import UnusedMemory
+from cagefield.server.web.threads import all_started, in_thread
 from scenes import ball_scene
 
 INNER = Cage.box((0, 0, 0), 1.2)
@@ -91,3 +95,32 @@ def test_memory_between_blocks_in_use_is_given_back(monkeypatch: pytest.MonkeyPa
 
 def test_it_is_not_given_back_all_the_time() -> None:
     assert not UnusedMemory().give_back()
+
+
+def test_it_is_given_back_again_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = []
+    monkeypatch.setattr(unused_memory, "EVERY", 0.01)
+    monkeypatch.setattr(UnusedMemory, "give_back", lambda self: times.append(self))
+
+    async def a_while() -> None:
+        giving = asyncio.create_task(unused_memory.giving_back())
+        while len(times) < 3:
+            await asyncio.sleep(0.01)
+        giving.cancel()
+
+    asyncio.run(asyncio.wait_for(a_while(), 30.0))
+    assert len({id(each) for each in times}) == 1  # which knows when it last did
+
+
+def test_no_thread_begins_after_the_start() -> None:
+    """Each keeps memory of its own, and one more would be there for ever."""
+
+    async def much() -> int:
+        asyncio.get_running_loop().set_default_executor(all_started(3))
+        before = threading.active_count()
+        await asyncio.gather(*(in_thread(lambda: time.sleep(0.02)) for _ in range(20)))
+        return threading.active_count() - before
+
+    before = threading.active_count()
+    assert asyncio.run(much()) == 0
+    assert threading.active_count() == before  # they end with the loop

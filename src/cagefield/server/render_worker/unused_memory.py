@@ -6,6 +6,7 @@ sizes: after some minutes that was 175 MiB beside 420 MiB in use, and it grew fo
 
 from __future__ import annotations
 
+import asyncio
 import ctypes
 import sys
 import time
@@ -29,3 +30,11 @@ class UnusedMemory:
         self._trim(0)
         self._last = now
         return True
+
+
+async def giving_back() -> None:
+    """The same for as long as it is not cancelled, amid other work of an event loop."""
+    unused = UnusedMemory()
+    while True:
+        await asyncio.sleep(EVERY)
+        unused.give_back()

@@ -23,7 +23,9 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.dispatcher import TooManyError
 from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
+from cagefield.server.render_worker.unused_memory import giving_back
 from cagefield.server.web.security import Attempts, Guard
+from cagefield.server.web.threads import all_started
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
 
@@ -64,9 +66,12 @@ def application(
 
     @contextlib.asynccontextmanager
     async def life(_: Starlette) -> AsyncIterator[None]:
+        asyncio.get_running_loop().set_default_executor(all_started())
+        trimming = asyncio.create_task(giving_back())
         editor.start()
         yield
         editor.close()
+        trimming.cancel()
 
     async def socket(websocket: WebSocket) -> None:
         may_edit = websocket.scope["cagefield.role"] == "edit"
