@@ -77,6 +77,38 @@ def _png(width: int, height: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", content) + chunk(b"IEND", b"")
 
 
+def _tiff(strips: int, tag: tuple[int, int], big: bool = False) -> bytes:
+    """A grey picture of 64 x `strips` pixels, a strip for each line, with a further tag (type, count)."""
+    kind, count = tag
+    form, start = ("<HHQQ", b"II+\0\x08\0\0\0") if big else ("<HHLL", b"II*\0")
+    head, tags = (16, 20) if big else (8, 12)
+    pixels = head + (8 if big else 2) + 9 * tags + (8 if big else 4)
+    offsets = pixels + 64 * strips
+    entries = [
+        (256, 3, 1, 64), (257, 3, 1, strips), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1),
+        (273, 4, strips, offsets if strips > 1 else pixels), (278, 3, 1, 1),
+        (279, 4, strips, offsets + 4 * strips if strips > 1 else 64), (60_000, kind, count, head),
+    ]  # fmt: skip
+    content = start + struct.pack("<Q" if big else "<L", head) + struct.pack("<Q" if big else "<H", 9)
+    content += b"".join(struct.pack(form, *entry) for entry in entries) + bytes(8 if big else 4)
+    content += bytes(64 * strips)
+    content += struct.pack(f"<{strips}L", *(pixels + 64 * n for n in range(strips)))
+    return content + struct.pack(f"<{strips}L", *[64] * strips)
+
+
+@pytest.mark.parametrize("big", [False, True])
+def test_a_tiff_whose_tags_are_long_is_refused_before_they_are_read(tmp_path: Path, big: bool) -> None:
+    """Of each number pillow makes one of Python's: a picture of 6 MB took 75."""
+    file = tmp_path / "a.tif"
+    for good in (_tiff(1, (3, 1), big), _tiff(2000, (4, 20_000), big)):
+        file.write_bytes(good)
+        assert read_image(file).shape[1:] == (64, 3)
+    for bad, count in (((4, 70_000), 70_000), ((5, 9000), 72_000)):
+        file.write_bytes(_tiff(5000, bad, big) + bytes(1_000_000))
+        with pytest.raises(DatasetError, match=f"its tags hold {count + 10_006} numbers"):
+            read_image(file)
+
+
 @pytest.mark.filterwarnings("ignore:Image size")  # pillow's own
 def test_a_picture_of_too_many_pixels_is_refused_by_its_header(tmp_path: Path) -> None:
     file = tmp_path / "a.png"

@@ -19,6 +19,7 @@ from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.regular_files import check_regular
 from cagefield.rendering.render_result import to_uint8
+from cagefield.rendering.tiff_tags import check_tags
 from cagefield.rendering.video_encoder import encoder
 from cagefield.typing import UInt8
 
@@ -77,9 +78,11 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
     Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
     """
     check_regular(path, MOST_BYTES)
-    with _PictureFile(path) as file, Image.open(file) as image:
-        check_pixels(image, path.stat().st_size)
-        yield image
+    with _PictureFile(path) as file:
+        check_tags(file, path.stat().st_size)
+        with Image.open(file) as image:
+            check_pixels(image, path.stat().st_size)
+            yield image
 
 
 def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
