@@ -1,7 +1,9 @@
 """Readers whose honest seeds are large, so that what reading one takes is what its file holds.
 
-Those of `readers.py` where a file's size can drive memory; beside them small seeds hide in SLACK what a
-damaged file takes. Left out are files that are small whenever they are honest.
+Those of `readers.py` where a file's size can drive memory: beside small seeds SLACK hides what a damaged file
+takes. Left out is what is small whenever it is honest: configs, tokens, locks, certificates, the transform of
+a data parser, messages (1 MiB; the edits in one are read as those of a file), and videos, of which ffmpeg
+reads the frames and this process the beginning.
 """
 
 from __future__ import annotations
@@ -9,7 +11,6 @@ from __future__ import annotations
 from functools import partial
 
 from dataset_readers import colmap_readers, llff_reader, picture_readers, points_reader, transforms_reader
-from message_readers import LOADED, messages_reader
 from network_readers import network_readers, training_reader
 from poses_readers import work_readers
 from reader_seeds import Reader, many_edits
@@ -38,6 +39,5 @@ READERS: dict[str, Reader] = {
     "text ply": splat_readers(6000)["text ply"],
     **work_readers(4000, 180_000, 60_000, 100_000, 8000),
     **training_readers(80, 40_000, 512),
-    "messages": messages_reader(partial(many_edits, 100, 60), LOADED),
 }
 """The readers, by their names in `readers.py`."""

@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from reader_seeds import Reader, example_edits
 from scene_readers import make_scene_folder, opened_scene
 
-from cagefield.edits import EditStack, dump_edits
+from cagefield.edits import dump_edits
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from scenes import ball_scene
 
-_MESSAGES = range(33)
-
-LOADED = (23, 24)
-"""Numbers of those that load edits."""
+_MESSAGES = 33
 
 
-def _make_messages(edits: Callable[[], EditStack], folder: Path) -> None:
-    """Of every kind; those that load edits load these."""
+def _make_messages(folder: Path) -> None:
     make_scene_folder(folder)
     start = ball_scene().cameras["test"][0]
     camera = {"seq": 1, "c2w": start.c2w.reshape(-1).tolist(), "width": 64, "height": 48, "fov_y_deg": 40.0}
@@ -60,8 +54,8 @@ def _make_messages(edits: Callable[[], EditStack], folder: Path) -> None:
         {"type": "reorder", "edit": 1, "to": 1},
         {"type": "go_to", "entry": 0},
         {"type": "save_as", "path": "other"},
-        {"type": "load_edits", "text": dump_edits(edits(), format="json"), "append": False},
-        {"type": "load_edits", "text": dump_edits(edits()), "append": True},
+        {"type": "load_edits", "text": dump_edits(example_edits(), format="json"), "append": False},
+        {"type": "load_edits", "text": dump_edits(example_edits()), "append": True},
         {"type": "ask", "request": 1, "what": "edit_text", "edit": 1},
         {"type": "ask", "request": 2, "what": "path"},
         {"type": "set_path", "keys": [key, key], "loop": True},
@@ -123,12 +117,8 @@ def _read_messages(folder: Path) -> None:
         raise refused
 
 
-def messages_reader(
-    edits: Callable[[], EditStack] = example_edits, damaged: Iterable[int] = _MESSAGES
-) -> Reader:
-    """Of messages of every kind, of which some are damaged; those that load edits load these."""
-    kinds = {f"message{number:02}.json": "json" for number in damaged}
-    return Reader(partial(_make_messages, edits), _read_messages, kinds)
-
-
-MESSAGE_READERS: dict[str, Reader] = {"messages": messages_reader()}
+MESSAGE_READERS: dict[str, Reader] = {
+    "messages": Reader(
+        _make_messages, _read_messages, {f"message{number:02}.json": "json" for number in range(_MESSAGES)}
+    ),
+}
