@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 import zlib
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cagefield import devices, json_text
 from cagefield.camera_paths import load_camera_path
 from cagefield.datasets import load_dataset
+from cagefield.datasets.photos import read_photo
 from cagefield.edits import EditStack, parse_edits
 from cagefield.errors import CagefieldError, DatasetError, EditError, EditFileError, FieldError
 from cagefield.fields.files import write_tensors
@@ -107,6 +111,42 @@ def test_a_tiff_whose_tags_are_long_is_refused_before_they_are_read(tmp_path: Pa
         file.write_bytes(_tiff(5000, bad, big) + bytes(1_000_000))
         with pytest.raises(DatasetError, match=f"its tags hold {count + 10_006} numbers"):
             read_image(file)
+
+
+def _jpeg(width: int, height: int, **options: object) -> bytes:
+    """Noise, and something behind the end, as some cameras leave it."""
+    pixels = np.random.default_rng(0).integers(0, 256, (height, width, 3)).astype(np.uint8)
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "JPEG", **options)
+    return out.getvalue() + b"\xff\xd8\xff\xd9 more"
+
+
+@pytest.mark.parametrize("size", [(1, 1), (17, 9), (160, 121)])
+def test_jpegs_are_read_to_the_last_pixel(
+    tmp_path: Path, size: tuple[int, int], capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.jpg"
+    for quality, subsampling, restarts, progressive in product((5, 95), (0, 2), (0, 1), (False, True)):
+        options = {"subsampling": subsampling, "restart_marker_blocks": restarts, "progressive": progressive}
+        file.write_bytes(_jpeg(*size, quality=quality, **options))
+        with Image.open(file) as expected:
+            np.testing.assert_array_equal(read_image(file), np.asarray(expected))
+        assert read_photo(file).shape == (*size[::-1], 3)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("restarts", [0, 1])
+def test_a_jpeg_that_lacks_pixels_is_refused(tmp_path: Path, restarts: int) -> None:
+    """They were made up: 200 kB became 39 million pixels."""
+    content, file = bytearray(_jpeg(300, 200, restart_marker_blocks=restarts)), tmp_path / "a.jpg"
+    at = content.index(b"\xff\xc0") + 5
+    for side in (at, at + 2):
+        damaged = content.copy()
+        damaged[side : side + 2] = struct.pack(">H", 65_500)
+        file.write_bytes(damaged)
+        for read in (read_image, read_photo):
+            with pytest.raises(DatasetError, match="image file is truncated"):
+                read(file)
 
 
 @pytest.mark.filterwarnings("ignore:Image size")  # pillow's own
