@@ -97,7 +97,7 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
         with Image.open(file) as image:
             check_pixels(image, path.stat().st_size)
             if image.format in ("JPEG", "MPO"):
-                image.load = partial(_load_jpeg, image, file)  # type: ignore[method-assign]
+                image.load = partial(_load_jpeg, image, file)
             yield image
 
 
