@@ -129,7 +129,7 @@ def small_mlp(seed: int = 0, width: int = 16, octaves: int = 2) -> Mlp:
     )
 
 
-def small_field(seed: int = 0, **options: Any) -> NerfField:
+def small_field(seed: int = 0, width: int = 16, **options: Any) -> NerfField:
     """A NeRF of two random small networks around the origin, for cameras at distance 4."""
     options = {"near": 2.0, "far": 6.0, "samples": (12, 16), **options}
-    return NerfField(small_mlp(seed), small_mlp(seed + 1), [[-1.5] * 3, [1.5] * 3], **options)
+    return NerfField(small_mlp(seed, width), small_mlp(seed + 1, width), [[-1.5] * 3, [1.5] * 3], **options)

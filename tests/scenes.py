@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cagefield.benchmarking.workbench import Settings
-from cagefield.cameras import turntable
+from cagefield.cameras import Camera, turntable
 from cagefield.fields.voxel import VoxelField
 from cagefield.scene import Scene
 from cagefield.training.voxel_config import VoxelConfig
@@ -44,11 +44,12 @@ def ball_field(density: float = 40.0, resolution: int = 17, radius: float = 0.5)
 
 def ball_scene() -> Scene:
     """The red ball with 3 training and 2 test cameras of 24 x 16 pixels, no edits, white background."""
-    cameras = {
-        split: turntable((0, 0, 0), 3.0, n, elevation=elevation, width=24, height=16, fov_x=0.8)
-        for split, n, elevation in (("train", 3, 0.3), ("test", 2, 0.5))
-    }
-    return Scene(ball_field(), cameras=cameras)
+    return Scene(ball_field(), cameras={"train": ball_cameras(3), "test": ball_cameras(2, 0.5)})
+
+
+def ball_cameras(count: int, elevation: float = 0.3) -> tuple[Camera, ...]:
+    """Cameras of 24 x 16 pixels on a circle around the ball."""
+    return turntable((0, 0, 0), 3.0, count, elevation=elevation, width=24, height=16, fov_x=0.8)
 
 
 def files_of(path: Path) -> dict[str, bytes]:

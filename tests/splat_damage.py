@@ -31,16 +31,28 @@ SLACK = 1 << 18
 def sample_files(field: SplatField, folder: Path) -> dict[str, bytes]:
     """A file of each format, by its ending; of a checkpoint where PyTorch is there."""
     contents = {}
-    for ending in WRITABLE:
-        write_splats(field, folder / f"a{ending}")
-        contents[ending] = (folder / f"a{ending}").read_bytes()
-    write_spz(folder / "b.spz", FieldTable(field), version=4)
-    contents["-4.spz"] = (folder / "b.spz").read_bytes()
-    contents[".ksplat"] = ksplat_of(field)
-    contents["-text.ply"] = text_ply_of(contents[".ply"])
-    with contextlib.suppress(ImportError):
-        contents[".ckpt"] = checkpoint_of(field)
+    for ending in (*WRITABLE, "-4.spz", ".ksplat", "-text.ply", ".ckpt"):
+        with contextlib.suppress(ImportError):
+            contents[ending] = sample_file(field, folder, ending)
     return contents
+
+
+def sample_file(field: SplatField, folder: Path, ending: str) -> bytes:
+    """A file of the format that an ending of `sample_files` stands for, written in a folder."""
+    if ending == ".ksplat":
+        return ksplat_of(field)
+    if ending == ".ckpt":
+        return checkpoint_of(field)
+    if ending == "-text.ply":
+        return text_ply_of(sample_file(field, folder, ".ply"))
+    file = folder / f"sample{ending}"
+    if ending == "-4.spz":
+        write_spz(file, FieldTable(field), version=4)
+    else:
+        write_splats(field, file)
+    content = file.read_bytes()
+    file.unlink()
+    return content
 
 
 def ksplat_of(field: SplatField) -> bytes:

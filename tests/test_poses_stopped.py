@@ -8,6 +8,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import tracemalloc
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -319,6 +320,40 @@ def test_work_of_nobody_knows_what_is_left_alone(tmp_path: Path, content: bytes)
     with pytest.raises(DatasetError, match=r"data\.work is in the way, its made_of.json is damaged; move it"):
         prepare_work(work, {"files": 1})
     assert (work / "made_of.json").read_bytes() == content
+
+
+def test_work_of_other_photos_takes_as_much_as_that_of_these(tmp_path: Path) -> None:
+    """Of many photos; all of their names and numbers were built, to see that they are."""
+    work = tmp_path / "data.work"
+    files = [[f'{n} "\\ é.png', n, n] for n in range(100_000)]
+    prepare_work(work, {"version": 1, "files": files})
+    (work / "database.db").touch()
+    same = _most_memory(lambda: prepare_work(work, {"version": 1, "files": files}))
+    assert (work / "database.db").exists()
+    content = (work / "made_of.json").read_bytes()
+    middle = content.index(b"], [", len(content) // 2)
+    for damaged in (
+        content[:-1], content[:middle], content[:middle] + content[middle + 1 :],
+        content[: middle + 1] + content[middle + 3 :], content[:middle] + b"x" + content[middle:],
+    ):  # fmt: skip
+        (work / "made_of.json").write_bytes(damaged)
+        with pytest.raises(DatasetError, match=r"its made_of.json is damaged"):
+            prepare_work(work, {"version": 1, "files": files})
+    (work / "made_of.json").write_bytes(content)
+    files[50_000][2] += 1
+    other = _most_memory(lambda: prepare_work(work, {"version": 1, "files": files}))
+    assert not (work / "database.db").exists()
+    assert other < 1.5 * same
+
+
+def _most_memory(work: Callable[[], object]) -> int:
+    """Bytes that it takes at most."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_model_that_is_cut_off_replaces_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,9 @@ WAIT = 60.0
 SLACK = 16 << 20
 """Bytes beside twice the honest file's: seeds are small, allocators take whole pages and arenas."""
 
+LARGE_SLACK = 0
+"""The same where the honest files are large (`large_readers.py`)."""
+
 
 @dataclass
 class Outcome:
@@ -45,6 +48,8 @@ class Outcome:
     """Of all of them."""
     faults: list[str] = field(default_factory=list)
     """A line for each input that crashed, hung, or took too much memory."""
+    slack: int = SLACK
+    """Bytes that reading one may take beside twice the honest file's."""
 
     def add(self, other: Outcome) -> None:
         """Another one's counts on top."""
@@ -56,17 +61,24 @@ class Outcome:
 
 
 def attack(
-    names: Iterable[str], first: int, last: int, seed: str = "", kept: Path | None = None
+    names: Iterable[str],
+    first: int,
+    last: int,
+    seed: str = "",
+    kept: Path | None = None,
+    *,
+    large: bool = False,
 ) -> dict[str, Outcome]:
     """Reads the inputs `first` to `last` of some readers, in one process for as long as it lives.
 
-    Inputs with faults are kept in a folder, if one is given.
+    Inputs with faults are kept in a folder, if one is given. With `large` the readers are those of
+    `large_readers.py`, whose honest files are large, and judged by LARGE_SLACK.
     """
-    found = {name: Outcome() for name in names}
+    found = {name: Outcome(slack=LARGE_SLACK if large else SLACK) for name in names}
     left = [(name, first) for name in found]
     while left:
         with tempfile.TemporaryDirectory(prefix="cagefield-attack-") as folder:
-            left = _batch(Path(folder), left, last, seed, found, kept)
+            left = _batch(Path(folder), left, last, (seed, large), found, kept)
     return found
 
 
@@ -74,17 +86,30 @@ def _batch(
     folder: Path,
     work: list[tuple[str, int]],
     last: int,
-    seed: str,
+    how: tuple[str, bool],
     found: dict[str, Outcome],
     kept: Path | None,
 ) -> list[tuple[str, int]]:
-    """One process: to the end, or to the input that ended it; what is left is returned."""
+    """One process: to the end, or to the input that ended it; what is left is returned.
+
+    `how`: the seed of the damages, and whether the readers are the large ones.
+    """
+    seed, large = how
+    # Python's own allocator keeps arenas that others' small objects are in, of which nothing is seen then.
+    environment = os.environ | ({"PYTHONMALLOC": "malloc"} if large else {})
     arguments = [part for name, first in work for part in (name, str(first), str(last))]
-    command = [sys.executable, str(Path(__file__).with_name("attacked_reader.py")), str(folder), seed]
+    module = "large_readers" if large else "readers"
+    command = [sys.executable, str(Path(__file__).with_name("attacked_reader.py")), str(folder), seed, module]
     log = folder / "stderr"
     with (
         log.open("wb") as errors,
-        subprocess.Popen([*command, *arguments], stdout=subprocess.PIPE, stderr=errors, text=True) as process,
+        subprocess.Popen(
+            [*command, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            env=environment,
+        ) as process,
     ):
         lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         threading.Thread(target=_passed_on, args=(process, lines), daemon=True).start()
@@ -153,7 +178,7 @@ def _count(found: Outcome, reader: str, said: dict[str, object], file: Path, kep
         found.read += 1
     elif what != "memory":
         found.crashed += 1
-    too_much = what == "memory" or memory > 2 * found.honest + SLACK
+    too_much = what == "memory" or memory > 2 * found.honest + found.slack
     found.over_memory += too_much
     if slow or too_much or what not in ("refused", "read"):
         what = "hung" if slow else what

@@ -1,8 +1,8 @@
 """The process that is attacked: reads one damaged input after the other and says what came of each.
 
-python attacked_reader.py FOLDER SEED READER FIRST LAST [READER FIRST LAST ...]: makes a reader's honest
-seed in FOLDER/NUMBER, and for every number from FIRST to LAST damages it, reads it, and prints one line of
-JSON. The input that is read lies in that folder.
+python attacked_reader.py FOLDER SEED MODULE READER FIRST LAST [READER FIRST LAST ...]: makes a reader's
+honest seed in FOLDER/NUMBER, and for every number from FIRST to LAST damages it, reads it, and prints one
+line of JSON. The input that is read lies in that folder. MODULE has the READERS.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import gc
+import importlib
 import json
 import random
 import resource
@@ -27,19 +28,17 @@ LONGEST = 1000
 """Characters of a refusal."""
 
 
-def main(folder: Path, seed: str, work: list[str]) -> None:
+def main(folder: Path, seed: str, module: str, work: list[str]) -> None:
     """See the module."""
     here = Path(__file__).resolve().parent
     sys.path[:0] = [str(here), str(here.parent)]
     warnings.simplefilter("ignore")
-    import readers
+    known = importlib.import_module(module).READERS
 
     for number, at in enumerate(range(0, len(work), 3)):
         place = folder / str(number)
         place.mkdir()
-        attacked(
-            readers.READERS[work[at]], work[at], place, range(int(work[at + 1]), int(work[at + 2])), seed
-        )
+        attacked(known[work[at]], work[at], place, range(int(work[at + 1]), int(work[at + 2])), seed)
 
 
 def attacked(reader: Any, name: str, folder: Path, numbers: range, seed: str) -> None:
@@ -119,4 +118,4 @@ def _now(field: str) -> int:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
+    main(Path(sys.argv[1]), sys.argv[2], sys.argv[3], sys.argv[4:])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,20 @@ from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.datasets.point_files import read_points
 from cagefield.rendering.images import read_image
-from posed_photos import room_capture
-from scenes import ball_scene
+from posed_photos import room_capture, save_llff
+from scenes import ball_cameras
 
 
-def _make_transforms(folder: Path) -> None:
+def _make_photo(file: Path) -> None:
+    Image.fromarray(np.full((16, 24, 3), 90, np.uint8)).save(file)
+
+
+def _make_transforms(count: int, folder: Path) -> None:
     folder.joinpath("capture", "images").mkdir(parents=True)
     frames = []
-    for index, camera in enumerate(ball_scene().cameras["train"]):
+    for index, camera in enumerate(ball_cameras(count)):
         name = f"images/{index}.png"
-        Image.fromarray(np.full((16, 24, 3), 90, np.uint8)).save(folder / "capture" / name)
+        _make_photo(folder / "capture" / name)
         frames.append({"file_path": name, "transform_matrix": camera.c2w.tolist()})
     lens = {
         "w": 24,
@@ -40,7 +45,7 @@ def _make_transforms(folder: Path) -> None:
     (folder / "capture" / "transforms.json").write_text(json.dumps(lens | {"frames": frames}))
 
 
-def _make_colmap(text: bool) -> Callable[[Path], None]:
+def _make_colmap(text: bool, count: int, points: int, seen: int) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         import pycolmap
 
@@ -54,14 +59,14 @@ def _make_colmap(text: bool) -> Callable[[Path], None]:
         )
         model.add_camera_with_trivial_rig(camera)
         (folder / "capture" / "images").mkdir(parents=True)
-        for index, seen in enumerate(ball_scene().cameras["train"]):
-            rotation = (seen.c2w[:3, :3] * (1.0, -1.0, -1.0)).T
-            rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), -rotation @ seen.c2w[:3, 3])
+        for index, pose in enumerate(camera.c2w for camera in ball_cameras(count)):
+            rotation = (pose[:3, :3] * (1.0, -1.0, -1.0)).T
+            rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation), -rotation @ pose[:3, 3])
             image = pycolmap.Image(name=f"{index}.png", camera_id=1, image_id=index + 1)
-            image.points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([12.0, 8.0]))])
+            image.points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([12.0, 8.0]))] * seen)
             model.add_image_with_trivial_frame(image, rigid)
-            Image.fromarray(np.full((16, 24, 3), 90, np.uint8)).save(folder / "capture/images" / image.name)
-        for point in np.random.default_rng(0).uniform(-0.5, 0.5, (20, 3)):
+            _make_photo(folder / "capture/images" / image.name)
+        for point in np.random.default_rng(0).uniform(-0.5, 0.5, (points, 3)):
             track = pycolmap.Track()
             model.add_point3D(point, track, np.zeros(3, np.uint8))
         (folder / "capture" / "sparse" / "0").mkdir(parents=True)
@@ -74,13 +79,18 @@ def _read_capture(folder: Path) -> None:
     load_dataset(folder / "capture")
 
 
-def _make_llff(folder: Path) -> None:
-    room_capture(folder / "capture")
+def _make_llff(count: int, folder: Path) -> None:
+    """Of the room where nine photos are enough, else of grey ones."""
+    if count == 9:
+        room_capture(folder / "capture")
+        return
+    photo = np.full((16, 24, 3), 90, np.uint8)
+    save_llff(folder / "capture", ball_cameras(count), [photo] * count, (1.0, 9.0))
 
 
-def _make_picture(ending: str) -> Callable[[Path], None]:
+def _make_picture(ending: str, size: tuple[int, int]) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
-        pixels = np.random.default_rng(0).integers(0, 256, (12, 16, 4)).astype(np.uint8)
+        pixels = np.random.default_rng(0).integers(0, 256, (*size, 4)).astype(np.uint8)
         image = Image.fromarray(pixels if ending in (".png", ".webp", ".tif") else pixels[..., :3])
         image.save(folder / f"a{ending}")
 
@@ -95,39 +105,62 @@ def _read_picture(ending: str) -> Read:
     return read
 
 
-def _make_points(folder: Path) -> None:
-    rows = "".join(f"{n * 0.1} {n * 0.2} {n} {n % 255} 2 3\n" for n in range(50))
+def _make_points(count: int, folder: Path) -> None:
+    rows = "".join(f"{n * 0.1} {n * 0.2} {n} {n % 255} 2 3\n" for n in range(count))
     names = "".join(f"property float {name}\n" for name in "xyz")
     names += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
-    head = f"ply\nformat ascii 1.0\nelement vertex 50\n{names}end_header\n"
+    head = f"ply\nformat ascii 1.0\nelement vertex {count}\n{names}end_header\n"
     (folder / "points.ply").write_text(head + rows)
 
 
+def _colmap_reader(text: bool, count: int, points: int, seen: int) -> Reader:
+    parts = ("cameras", "images", "points3D", "rigs", "frames")
+    ending, kind = (".txt", "text") if text else (".bin", "bytes")
+    damaged = {f"capture/sparse/0/{name}{ending}": kind for name in parts}
+    return Reader(_make_colmap(text, count, points, seen), _read_capture, damaged)
+
+
+def transforms_reader(count: int = 3) -> Reader:
+    """Of a capture of `count` photos."""
+    return Reader(partial(_make_transforms, count), _read_capture, {"capture/transforms.json": "json"})
+
+
+def colmap_readers(count: int = 3, points: int = 20, seen: int = 1) -> dict[str, Reader]:
+    """Of models of `count` photos, of `points`, and of so many places that each photo has seen."""
+    return {
+        "COLMAP, binary": _colmap_reader(False, count, points, seen),
+        "COLMAP, text": _colmap_reader(True, count, points, seen),
+    }
+
+
+def llff_reader(count: int = 9) -> Reader:
+    """Of poses of `count` photos."""
+    return Reader(partial(_make_llff, count), _read_capture, {"capture/poses_bounds.npy": "npy"})
+
+
+def picture_readers(size: tuple[int, int] = (12, 16)) -> dict[str, Reader]:
+    """Of pictures [H,W]."""
+    return {
+        ending[1:]: Reader(
+            _make_picture(ending, size),
+            _read_picture(ending),
+            {f"a{ending}": "png" if ending == ".png" else "bytes"},
+        )
+        for ending in (".png", ".jpg", ".webp", ".tif", ".bmp")
+    }
+
+
+def points_reader(count: int = 50) -> Reader:
+    """Of a text of points."""
+    return Reader(
+        partial(_make_points, count), lambda folder: read_points(folder / "points.ply"), {"points.ply": "ply"}
+    )
+
+
 DATASET_READERS: dict[str, Reader] = {
-    "transforms.json": Reader(_make_transforms, _read_capture, {"capture/transforms.json": "json"}),
-    "COLMAP, binary": Reader(
-        _make_colmap(False),
-        _read_capture,
-        {
-            f"capture/sparse/0/{name}.bin": "bytes"
-            for name in ("cameras", "images", "points3D", "rigs", "frames")
-        },
-    ),
-    "COLMAP, text": Reader(
-        _make_colmap(True),
-        _read_capture,
-        {
-            f"capture/sparse/0/{name}.txt": "text"
-            for name in ("cameras", "images", "points3D", "rigs", "frames")
-        },
-    ),
-    "LLFF": Reader(_make_llff, _read_capture, {"capture/poses_bounds.npy": "npy"}),
-    "points.ply": Reader(
-        _make_points, lambda folder: read_points(folder / "points.ply"), {"points.ply": "ply"}
-    ),
-    "png": Reader(_make_picture(".png"), _read_picture(".png"), {"a.png": "png"}),
-    **{
-        ending[1:]: Reader(_make_picture(ending), _read_picture(ending), {f"a{ending}": "bytes"})
-        for ending in (".jpg", ".webp", ".tif", ".bmp")
-    },
+    "transforms.json": transforms_reader(),
+    **colmap_readers(),
+    "LLFF": llff_reader(),
+    "points.ply": points_reader(),
+    **picture_readers(),
 }

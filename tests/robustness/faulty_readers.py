@@ -12,20 +12,23 @@ TAKEN = 60 << 20
 """Bytes: over what reading a small file may take."""
 
 
-class Reader:
-    """Reads the honest seed, four times, and then damaged ones as `fault` does it."""
+HONEST = 20 << 20
+"""Bytes that a large honest file takes."""
 
-    def __init__(self, fault: Callable[[], None]) -> None:
+
+class Reader:
+    """Reads the honest seed, four times, as `honest` does it, and then damaged ones as `fault` does it."""
+
+    def __init__(self, fault: Callable[[], None], honest: Callable[[], None] = lambda: None) -> None:
         self.damaged = {"a": "bytes"}
-        self._fault, self._calls = fault, 0
+        self._fault, self._honest, self._calls = fault, honest, 0
 
     def make(self, folder: Path) -> None:
         (folder / "a").write_bytes(b"honest" * 20)
 
     def read(self, folder: Path) -> None:
         self._calls += 1
-        if self._calls > 4:
-            self._fault()
+        (self._fault if self._calls > 4 else self._honest)()
 
 
 def _crash() -> None:
@@ -55,6 +58,10 @@ def _crumble() -> None:
     _kept.append(parts[-1])
 
 
+def _taken(size: float) -> Callable[[], None]:
+    return lambda: bytearray(int(size)) and None
+
+
 READERS: dict[str, Reader] = {
     "crash": Reader(_crash),
     "death": Reader(lambda: os._exit(3)),
@@ -62,4 +69,7 @@ READERS: dict[str, Reader] = {
     "refused": Reader(_refuse),
     "crumbs": Reader(_crumble),
     "burn": Reader(_burn),
+    "less than twice": Reader(_taken(1.9 * HONEST), _taken(HONEST)),
+    "more than twice": Reader(_taken(2.1 * HONEST), _taken(HONEST)),
+    "thrice": Reader(_taken(3 * HONEST), _taken(HONEST)),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from nerf_networks import krrish94_state, yenchenlin_state
 
 
-def _torch_file(content: dict[str, Any], old: bool) -> Callable[[Path], None]:
+def _torch_file(content: Callable[[], dict[str, Any]], old: bool) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         import torch
 
@@ -23,7 +24,7 @@ def _torch_file(content: dict[str, Any], old: bool) -> Callable[[Path], None]:
                 return {name: tensors(part) for name, part in value.items()}
             return torch.from_numpy(np.array(value)) if isinstance(value, np.ndarray) else value
 
-        torch.save(tensors(content), folder / "a.tar", _use_new_zipfile_serialization=not old)
+        torch.save(tensors(content()), folder / "a.tar", _use_new_zipfile_serialization=not old)
 
     return make
 
@@ -34,8 +35,19 @@ def _read_networks(folder: Path) -> None:
     read(folder / "a.tar")
 
 
-_YENCHENLIN = {"global_step": 5, "network_fn_state_dict": yenchenlin_state(0, width=8, depth=4)}
-_KRRISH94 = {"iter": 9, "model_coarse_state_dict": krrish94_state(0), "loss": 0.1, "psnr": 21.0}
+def _yenchenlin(width: int, depth: int) -> dict[str, Any]:
+    return {"global_step": 5, "network_fn_state_dict": yenchenlin_state(0, width=width, depth=depth)}
+
+
+def _krrish94(width: int) -> dict[str, Any]:
+    return {
+        "iter": 9,
+        "model_coarse_state_dict": krrish94_state(0, width=width),
+        "loss": 0.1,
+        "psnr": 21.0,
+    }
+
+
 _CONFIG = """expname = x
 dataset_type = blender
 datadir = ./data
@@ -61,16 +73,34 @@ def _import_networks(folder: Path) -> None:
     import_nerf(read(folder / "a.tar"), Settings(), None, None)
 
 
-def _make_training(folder: Path) -> None:
-    write_checkpoint(folder / "a.training", "x", {"step": 3}, {"noise": np.arange(600.0).reshape(20, 30)})
+def _make_training(rows: int, folder: Path) -> None:
+    noise = np.arange(30.0 * rows).reshape(rows, 30)
+    write_checkpoint(folder / "a.training", "x", {"step": 3}, {"noise": noise})
+
+
+def network_readers(width: int = 8, depth: int = 4, own: int = 16) -> dict[str, Reader]:
+    """Of networks of yenchenlin's of a width and depth, and of krrish94's of a width `own`."""
+    theirs, ours = partial(_yenchenlin, width, depth), partial(_krrish94, own)
+    return {
+        "nerf .tar, new": Reader(_torch_file(theirs, False), _read_networks, {"a.tar": "zip"}),
+        "nerf .tar, old": Reader(_torch_file(theirs, True), _read_networks, {"a.tar": "bytes"}),
+        "nerf .tar, imported": Reader(_torch_file(theirs, False), _import_networks, {"a.tar": "zip"}),
+        "nerf .ckpt, new": Reader(_torch_file(ours, False), _read_networks, {"a.tar": "zip"}),
+        "nerf .ckpt, old": Reader(_torch_file(ours, True), _read_networks, {"a.tar": "bytes"}),
+    }
+
+
+def training_reader(rows: int = 20) -> Reader:
+    """Of a training's arrays, of 30 numbers a row."""
+    return Reader(
+        partial(_make_training, rows),
+        lambda folder: read_checkpoint(folder / "a.training", "x"),
+        {"a.training": "zip"},
+    )
 
 
 NETWORK_READERS: dict[str, Reader] = {
-    "nerf .tar, new": Reader(_torch_file(_YENCHENLIN, False), _read_networks, {"a.tar": "zip"}),
-    "nerf .tar, old": Reader(_torch_file(_YENCHENLIN, True), _read_networks, {"a.tar": "bytes"}),
-    "nerf .tar, imported": Reader(_torch_file(_YENCHENLIN, False), _import_networks, {"a.tar": "zip"}),
-    "nerf .ckpt, new": Reader(_torch_file(_KRRISH94, False), _read_networks, {"a.tar": "zip"}),
-    "nerf .ckpt, old": Reader(_torch_file(_KRRISH94, True), _read_networks, {"a.tar": "bytes"}),
+    **network_readers(),
     "nerf config": Reader(
         written("args.txt", lambda file: file.write_text(_CONFIG)),
         lambda folder: read_config(folder / "args.txt"),
@@ -81,7 +111,5 @@ NETWORK_READERS: dict[str, Reader] = {
         lambda folder: read_config(folder / "config.yml"),
         {"config.yml": "yaml"},
     ),
-    "training": Reader(
-        _make_training, lambda folder: read_checkpoint(folder / "a.training", "x"), {"a.training": "zip"}
-    ),
+    "training": training_reader(),
 }

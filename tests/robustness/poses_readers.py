@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,12 @@ from cagefield.errors import CagefieldError
 from cagefield.rendering.video_encoder import encoder, is_ours
 from posed_photos import photos_alone
 
-RECORD = {"version": 1, "files": [["a.png", 12, 34]]}
-
 
 def _no_progress(done: float, note: str) -> None:
     """Nobody is told."""
 
 
-def _make_photos(folder: Path) -> None:
+def _make_photos(count: int, folder: Path) -> None:
     from PIL import Image
 
     photos = photos_alone(folder / "photos")
@@ -33,6 +32,8 @@ def _make_photos(folder: Path) -> None:
         with Image.open(file) as image:
             small = image.resize((16, 12))
         small.save(file)
+    for n in range(4, count):
+        shutil.copy(photos / "00.png", photos / f"{n:02}.png")
     (folder / "work").mkdir()
     poses_work.work_photos(photos, folder / "work", 3, _no_progress)
 
@@ -48,14 +49,21 @@ def _read_photos(folder: Path) -> None:
     structure_from_motion.camera_guesses(known[0])
 
 
-def _make_record(folder: Path) -> None:
-    poses_work.prepare_work(folder / "work", RECORD)
+def _record_reader(files: int) -> Reader:
+    """Of what so many photos are known by."""
+    record = {"version": 1, "files": [["a.png", 12, 34 + n] for n in range(files)]}
+
+    def prepare(folder: Path) -> None:
+        poses_work.prepare_work(folder / "work", record)
+
+    return Reader(prepare, prepare, {"work/made_of.json": "json"})
 
 
-def _make_poses(folder: Path) -> None:
+def _make_poses(left_out: int, folder: Path) -> None:
     photos = photos_alone(folder / "photos")
     (folder / "data").mkdir()
-    made = {"made_of": poses_work.record_of(photos, 80), "photos": 4, "left_out": {"a": "blurred"}}
+    blurred = {f"a{n}": "blurred" for n in range(left_out)}
+    made = {"made_of": poses_work.record_of(photos, 80), "photos": 4, "left_out": blurred}
     (folder / "data" / "poses.json").write_text(json.dumps(made))
 
 
@@ -64,14 +72,13 @@ def _read_poses(folder: Path) -> None:
         raise CagefieldError("it is of other photos, or damaged")
 
 
-def _make_points(folder: Path) -> None:
+def _make_points(count: int, folder: Path) -> None:
     from cagefield.datasets.views import SparsePoints
 
     chance = np.random.default_rng(0)
-    seen = tuple(frozenset((f"photo {n % 3}", f"photo {n % 5}")) for n in range(60))
-    found = SparsePoints(
-        chance.normal(size=(60, 3)), chance.integers(0, 256, (60, 3)).astype(np.uint8), seen, np.ones(60)
-    )
+    seen = tuple(frozenset((f"photo {n % 3}", f"photo {n % 5}")) for n in range(count))
+    rgb = chance.integers(0, 256, (count, 3)).astype(np.uint8)
+    found = SparsePoints(chance.normal(size=(count, 3)), rgb, seen, np.ones(count))
     points._write(folder / "points-1.npz", found)
 
 
@@ -89,19 +96,19 @@ def _cameras_and_photos() -> tuple[list[Any], list[Photo]]:
     return [camera], [Photo(f"{n:06}.png", 0) for n in range(3)]
 
 
-def _make_database(folder: Path) -> None:
-    """Three photos of ten features each, all matched."""
+def _make_database(count: int, folder: Path) -> None:
+    """Three photos of `count` features each, all matched."""
     import pycolmap
 
     from cagefield.datasets import features
 
     features.create_database(folder / "database.db", *_cameras_and_photos())
-    chance, pairs = np.random.default_rng(0), np.stack([np.arange(10, dtype=np.uint32)] * 2, axis=1)
+    chance, pairs = np.random.default_rng(0), np.stack([np.arange(count, dtype=np.uint32)] * 2, axis=1)
     with features.opened(folder / "database.db") as database:
         for n in range(1, 4):
-            database.write_keypoints(n, chance.uniform(0, 16, (10, 4)).astype(np.float32))
+            database.write_keypoints(n, chance.uniform(0, 16, (count, 4)).astype(np.float32))
             kinds = pycolmap.FeatureExtractorType.SIFT
-            found = pycolmap.FeatureDescriptors(kinds, chance.integers(0, 256, (10, 128)).astype(np.uint8))
+            found = pycolmap.FeatureDescriptors(kinds, chance.integers(0, 256, (count, 128)).astype(np.uint8))
             database.write_descriptors(n, found)
         for first, second in ((1, 2), (1, 3), (2, 3)):
             database.write_matches(first, second, pairs)
@@ -142,16 +149,25 @@ def _read_replaced_video(folder: Path) -> None:
         raise CagefieldError("it is none of ours, and stays")
 
 
+def work_readers(
+    photos: int = 4, files: int = 1, left_out: int = 1, points: int = 60, features: int = 10
+) -> dict[str, Reader]:
+    """Of what is kept of so many photos, of files of them, of photos left out, of points, and of features."""
+    return {
+        "poses, photos.json": Reader(
+            partial(_make_photos, photos), _read_photos, {"work/photos.json": "json"}
+        ),
+        "poses, made_of.json": _record_reader(files),
+        "poses.json": Reader(partial(_make_poses, left_out), _read_poses, {"data/poses.json": "json"}),
+        "poses, points .npz": Reader(partial(_make_points, points), _read_points, {"points-1.npz": "zip"}),
+        "poses, database.db": Reader(
+            partial(_make_database, features), _read_database, {"database.db": "bytes"}
+        ),
+    }
+
+
 POSES_READERS: dict[str, Reader] = {
-    "poses, photos.json": Reader(_make_photos, _read_photos, {"work/photos.json": "json"}),
-    "poses, made_of.json": Reader(
-        _make_record,
-        lambda folder: poses_work.prepare_work(folder / "work", RECORD),
-        {"work/made_of.json": "json"},
-    ),
-    "poses.json": Reader(_make_poses, _read_poses, {"data/poses.json": "json"}),
-    "poses, points .npz": Reader(_make_points, _read_points, {"points-1.npz": "zip"}),
-    "poses, database.db": Reader(_make_database, _read_database, {"database.db": "bytes"}),
+    **work_readers(),
     "video, frames of": Reader(_make_video, _read_video, {"v.mp4": "bytes"}),
     "video, replaced": Reader(_make_video, _read_replaced_video, {"v.mp4": "bytes"}),
 }

@@ -11,7 +11,7 @@ from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import MoveCorner, Rotate, Scale, Translate
 from cagefield.keyframes import Keyframe
-from scenes import ball_scene
+from scenes import ball_cameras
 
 Read = Callable[[Path], Any]
 
@@ -49,8 +49,15 @@ def example_edits() -> EditStack:
     return EditStack([moved, other, gone])
 
 
-def example_keys() -> tuple[Keyframe, ...]:
-    cameras = ball_scene().cameras["train"]
+def many_edits(count: int, operations: int) -> EditStack:
+    """`count` edits of so many operations each."""
+    _, other, _ = example_edits()
+    steps = tuple(Translate((0.001 * n, 0.0, 0.1)) for n in range(operations))
+    return EditStack([other.replace(operations=steps, name=f"edit {n}") for n in range(count)])
+
+
+def example_keys(count: int = 3) -> tuple[Keyframe, ...]:
+    cameras = ball_cameras(count)
     return tuple(
         Keyframe(tuple(camera.c2w.reshape(-1).tolist()), 40.0, 0.3, {1: 0.5, 2: 1.0}) for camera in cameras
     )

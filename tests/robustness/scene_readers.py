@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from reader_seeds import Read, Reader, example_edits, example_keys, written
+from reader_seeds import Reader, example_edits, example_keys, written
 
 from cagefield import Scene
 from cagefield.camera_paths import load_camera_path
-from cagefield.edits import dump_edits, load_edits
+from cagefield.edits import EditStack, dump_edits, load_edits
 from cagefield.errors import CagefieldError
 from cagefield.fields.nerf_file import load_nerf, save_nerf
 from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from nerf_networks import small_field
-from scenes import ball_scene
+from scenes import ball_cameras, ball_field, ball_scene
 from splat_scenes import ball_of_splats
 
 
-def make_scene_folder(folder: Path) -> None:
-    ball_scene().with_edits(example_edits()).save(folder / "scene")
+def make_scene_folder(
+    folder: Path, resolution: int = 17, cameras: int = 3, edits: Callable[[], EditStack] = example_edits
+) -> None:
+    """A scene of the ball; it has `cameras` to train from."""
+    seen = ball_scene().cameras | {"train": ball_cameras(cameras)}
+    Scene(ball_field(resolution=resolution), cameras=seen).with_edits(edits()).save(folder / "scene")
     (folder / "scene" / "camera_path.json").write_text(dump_path(example_keys(), loop=True))
 
 
@@ -36,17 +42,25 @@ def _read_scene(folder: Path) -> None:
     dump_edits(session.document.stack)
 
 
-def _read_edits(name: str) -> Read:
+def edits_reader(
+    format: str, edits: Callable[[], EditStack] = example_edits, dumped: tuple[str, ...] = ("yaml", "json")
+) -> Reader:
+    """Of a file of edits, which are written again in the formats `dumped`."""
+    name = f"e.{format}"
+
     def read(folder: Path) -> None:
         stack = load_edits(folder / name)
-        for format in ("yaml", "json"):
-            dump_edits(stack, format=format)
+        for other in dumped:
+            dump_edits(stack, format=other)
 
-    return read
+    def make(folder: Path) -> None:
+        (folder / name).write_text(dump_edits(edits(), format=format))
+
+    return Reader(make, read, {name: format})
 
 
-def _make_autosave(folder: Path) -> None:
-    make_scene_folder(folder)
+def _make_autosave(edits: Callable[[], EditStack], folder: Path) -> None:
+    make_scene_folder(folder, edits=edits)
     scene = Scene.open(folder / "scene")
     store = SceneStore(scene, folder / "scene")
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing)
@@ -81,8 +95,8 @@ def _read_autosave(folder: Path) -> None:
         dump_edits(session.document.stack)
 
 
-def _make_path(folder: Path) -> None:
-    (folder / "path.json").write_text(dump_path(example_keys(), loop=False, fps=4.0))
+def _make_path(keys: int, fps: float, folder: Path) -> None:
+    (folder / "path.json").write_text(dump_path(example_keys(keys), loop=False, fps=fps))
     transform = {"transform": np.eye(4)[:3].tolist(), "scale": 0.5}
     (folder / "dataparser_transforms.json").write_text(json.dumps(transform))
 
@@ -91,19 +105,47 @@ def _read_path(folder: Path) -> None:
     load_camera_path(folder / "path.json", dataparser_transforms=folder / "dataparser_transforms.json")
 
 
-SCENE_READERS: dict[str, Reader] = {
-    "edits.yaml": Reader(
-        written("e.yaml", lambda file: file.write_text(dump_edits(example_edits()))),
-        _read_edits("e.yaml"),
-        {"e.yaml": "yaml"},
-    ),
-    "edits.json": Reader(
-        written("e.json", lambda file: file.write_text(dump_edits(example_edits(), format="json"))),
-        _read_edits("e.json"),
-        {"e.json": "json"},
-    ),
-    "scene folder": Reader(
-        make_scene_folder,
+def field_readers(resolution: int = 17, splats: int = 600, width: int = 16) -> dict[str, Reader]:
+    """Of fields: voxels [resolution]^3, so many splats, and networks of a width."""
+    return {
+        "voxel field": Reader(
+            partial(make_scene_folder, resolution=resolution),
+            _read_scene,
+            {"scene/field.safetensors": "safetensors"},
+        ),
+        "splat field": Reader(
+            lambda folder: Scene(ball_of_splats(splats), cameras=ball_scene().cameras).save(folder / "scene"),
+            _read_scene,
+            {"scene/field.safetensors": "safetensors"},
+        ),
+        "nerf field": Reader(
+            written("n.safetensors", lambda file: save_nerf(small_field(width=width), file)),
+            lambda folder: load_nerf(folder / "n.safetensors"),
+            {"n.safetensors": "safetensors"},
+        ),
+    }
+
+
+def autosave_reader(edits: Callable[[], EditStack] = example_edits) -> Reader:
+    """Of an autosave of three edits or more."""
+    return Reader(
+        partial(_make_autosave, edits), _read_autosave, {"scene/../.scene.cagefield-autosave.json": "json"}
+    )
+
+
+def path_readers(keys: int = 3, fps: float = 4.0) -> dict[str, Reader]:
+    """Of camera paths of so many keyframes, and so many cameras a second."""
+    make = partial(_make_path, keys, fps)
+    return {
+        "camera path": Reader(make, _read_path, {"path.json": "json", "dataparser_transforms.json": "json"}),
+        "keyframes": Reader(make, lambda folder: load_keys(folder / "path.json"), {"path.json": "json"}),
+    }
+
+
+def scene_reader(cameras: int = 3, edits: Callable[[], EditStack] = example_edits) -> Reader:
+    """Of a scene but for its field."""
+    return Reader(
+        partial(make_scene_folder, cameras=cameras, edits=edits),
         _read_scene,
         {
             "scene/scene.json": "json",
@@ -111,22 +153,17 @@ SCENE_READERS: dict[str, Reader] = {
             "scene/edits.yaml": "yaml",
             "scene/camera_path.json": "json",
         },
+    )
+
+
+SCENE_READERS: dict[str, Reader] = {
+    "edits.yaml": edits_reader("yaml"),
+    "edits.json": edits_reader("json"),
+    "scene folder": scene_reader(),
+    **field_readers(),
+    "autosave": autosave_reader(),
+    **path_readers(),
+    "dataparser_transforms": Reader(
+        partial(_make_path, 3, 4.0), _read_path, {"dataparser_transforms.json": "json"}
     ),
-    "voxel field": Reader(make_scene_folder, _read_scene, {"scene/field.safetensors": "safetensors"}),
-    "splat field": Reader(
-        lambda folder: Scene(ball_of_splats(), cameras=ball_scene().cameras).save(folder / "scene"),
-        _read_scene,
-        {"scene/field.safetensors": "safetensors"},
-    ),
-    "nerf field": Reader(
-        written("n.safetensors", lambda file: save_nerf(small_field(), file)),
-        lambda folder: load_nerf(folder / "n.safetensors"),
-        {"n.safetensors": "safetensors"},
-    ),
-    "autosave": Reader(_make_autosave, _read_autosave, {"scene/../.scene.cagefield-autosave.json": "json"}),
-    "camera path": Reader(
-        _make_path, _read_path, {"path.json": "json", "dataparser_transforms.json": "json"}
-    ),
-    "dataparser_transforms": Reader(_make_path, _read_path, {"dataparser_transforms.json": "json"}),
-    "keyframes": Reader(_make_path, lambda folder: load_keys(folder / "path.json"), {"path.json": "json"}),
 }

@@ -16,6 +16,7 @@ import pytest
 from attack import Outcome, attack
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from large_readers import READERS as LARGE_READERS
 from readers import NEED_OPENSSL, NEED_TORCH, READERS
 
 from cagefield import json_text, yaml_text
@@ -83,6 +84,18 @@ def test_archives_of_trainings_are_not_unpacked_beyond_their_size() -> None:
         assert attack(["training, nerf"], number, number + 1)["training, nerf"].faults == []
 
 
+@pytest.mark.parametrize("name", ["splat field", "training", "bmp", "poses.json"])
+def test_large_files_take_twice_as_much_at_most(name: str) -> None:
+    """The benchmark does it for all that are large, and some hundred inputs: `files.py --large`."""
+    found = attack([name], 0, 4, "tests", large=True)[name]
+    assert (found.faults, found.tried) == ([], 4)
+    assert found.honest > 8 << 20
+
+
+def test_large_readers_are_known() -> None:
+    assert set(LARGE_READERS) < set(READERS)
+
+
 @pytest.mark.parametrize("name", FOUND)
 def test_what_was_found_stays_cured(tmp_path: Path, name: str) -> None:
     reader = READERS[name]
@@ -111,11 +124,7 @@ def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     """
     import attack as attacking
 
-    here = Path(__file__).parent
-    (tmp_path / "readers.py").write_text((here / "faulty_readers.py").read_text())
-    for name in ("attacked_reader", "mutators", "plain_mutators", "hostile_values"):
-        (tmp_path / f"{name}.py").write_text((here / f"{name}.py").read_text())
-    monkeypatch.setattr(attacking, "__file__", str(tmp_path / "attack.py"))
+    _use_faulty_readers(tmp_path, "readers", monkeypatch)
     monkeypatch.setattr(attacking, "HANG", 0.5)
     found = attack(["crash", "death", "memory", "refused", "crumbs", "burn"], 0, 2)
     assert {name: (one.tried, one.crashed, one.over_memory, one.hung) for name, one in found.items()} == {
@@ -128,6 +137,32 @@ def test_faults_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     }
     assert found["refused"].refused == 2
     assert all(len(one.faults) == sum((one.crashed, one.over_memory, one.hung)) for one in found.values())
+
+
+def test_twice_the_honest_memory_is_judged_without_slack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of large files; beside small ones 2 MiB more than twice as much are no fault."""
+    names = ["less than twice", "more than twice", "thrice"]
+    _use_faulty_readers(tmp_path, "large_readers", monkeypatch)
+    found = attack(names, 0, 2, large=True)
+    assert [found[name].over_memory for name in names] == [0, 2, 2]
+    assert [len(found[name].faults) for name in names] == [0, 2, 2]
+    assert all(20.0 <= found[name].honest / (1 << 20) < 20.5 for name in names)
+    _use_faulty_readers(tmp_path, "readers", monkeypatch)
+    found = attack(names, 0, 2)
+    assert [found[name].over_memory for name in names] == [0, 0, 2]
+
+
+def _use_faulty_readers(folder: Path, module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on `attack` has `faulty_readers.py` in the place of that module."""
+    import attack as attacking
+
+    here = Path(__file__).parent
+    (folder / f"{module}.py").write_text((here / "faulty_readers.py").read_text())
+    for name in ("attacked_reader", "mutators", "plain_mutators", "hostile_values"):
+        (folder / f"{name}.py").write_text((here / f"{name}.py").read_text())
+    monkeypatch.setattr(attacking, "__file__", str(folder / "attack.py"))
 
 
 # ---- structure ----

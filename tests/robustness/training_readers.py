@@ -6,14 +6,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from reader_seeds import Reader
 
 STATE = "x.training"
 
 
 @cache
-def _run(kind: str, photos: Path) -> Any:
-    """A training of three tiny photos that has made two steps."""
+def _run(kind: str, size: int, photos: Path) -> Any:
+    """A training of three tiny photos that has made two steps.
+
+    `size` is a grid's resolution, a number of splats, or the width of networks.
+    """
     from cagefield import devices
     from cagefield.datasets import load_dataset
 
@@ -23,42 +27,49 @@ def _run(kind: str, photos: Path) -> Any:
         from cagefield.training.voxel_config import VoxelConfig
         from cagefield.training.voxel_run import VoxelRun
 
-        run: Any = VoxelRun(dataset, VoxelConfig(steps=4, resolution=16))
+        run: Any = VoxelRun(dataset, VoxelConfig(steps=4, resolution=size))
     elif kind == "splat":
         from cagefield.training.splat_config import SplatConfig
         from cagefield.training.splat_run import SplatRun
 
-        run = SplatRun(dataset, SplatConfig(steps=4, splats=100))
+        run = SplatRun(dataset, SplatConfig(steps=4, splats=size))
+        if size > len(run.state):
+            run.state.take(np.resize(np.arange(len(run.state)), size))
     else:
         from cagefield.training.nerf_config import NerfConfig
         from cagefield.training.nerf_run import NerfRun
 
-        run = NerfRun(dataset, NerfConfig(steps=4, width=8, depth=2, samples=(4, 4), batch_rays=16))
+        run = NerfRun(dataset, NerfConfig(steps=4, width=size, depth=2, samples=(4, 4), batch_rays=16))
     for _ in range(2):
         run.advance()
     return run
 
 
-def _training(kind: str, damaged: str) -> Reader:
+def _training(kind: str, size: int) -> Reader:
     def make(folder: Path) -> None:
         from cagefield.datasets.procedural import make_scene
 
         make_scene("chair", folder / "photos", views=3, size=12, test_views=1, depth="none")
-        _run(kind, folder / "photos").store(folder / STATE)
+        _run(kind, size, folder / "photos").store(folder / STATE)
 
     def read(folder: Path) -> None:
-        run = _run(kind, folder / "photos")
+        run = _run(kind, size, folder / "photos")
         run.restore(folder / STATE)
         run.progress()
         if run.done < 1.0:
             run.advance()
         run.store(folder / "again.training")
 
-    return Reader(make, read, {STATE: damaged})
+    return Reader(make, read, {STATE: "zip"})
 
 
-TRAINING_READERS: dict[str, Reader] = {
-    "training, voxels": _training("voxel", "zip"),
-    "training, splats": _training("splat", "zip"),
-    "training, nerf": _training("nerf", "zip"),
-}
+def training_readers(resolution: int = 16, splats: int = 100, width: int = 8) -> dict[str, Reader]:
+    """Of trainings of fields of some size."""
+    return {
+        "training, voxels": _training("voxel", resolution),
+        "training, splats": _training("splat", splats),
+        "training, nerf": _training("nerf", width),
+    }
+
+
+TRAINING_READERS = training_readers()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
@@ -27,6 +28,12 @@ from cagefield.leftovers import hidden_name, remove_leftovers
 from cagefield.regular_files import read_bytes
 
 _VERSION = 1
+
+_PLAIN = rb"[ !#-\[\]-~]*"
+_PHOTO = re.compile(
+    rb'\["' + _PLAIN + rb'(?:\\(?:["\\/bfnrt]|u[0-9a-f]{4})' + _PLAIN + rb')*", \d+, -?\d+\], (?=\[")'
+)
+"""A photo of a record, as `json.dumps` writes it, before another one."""
 
 _LONGEST = 1 << 20
 """Pixels of a photo's side: none is longer. Its square is above all focal lengths."""
@@ -60,8 +67,9 @@ def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
 
 
 def _is_record(content: bytes) -> bool:
+    """Whether it is JSON as a record is; of many photos the last one's name and numbers are built."""
     try:
-        return isinstance(json_text.loads(content), dict)
+        return isinstance(json_text.loads(_PHOTO.sub(b"", content)), dict)
     except ValueError:
         return False
 

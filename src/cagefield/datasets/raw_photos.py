@@ -16,8 +16,7 @@ from scipy.ndimage import laplace
 
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
-from cagefield.regular_files import check_regular
-from cagefield.rendering.images import MOST_BYTES, check_pixels
+from cagefield.rendering.images import opened_picture
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
 
@@ -72,9 +71,7 @@ def upright(source: Path, name: str, folder: Path) -> RawPhoto:
     Raises DatasetError where it cannot be read.
     """
     try:
-        check_regular(source, MOST_BYTES)
-        with Image.open(source) as image:
-            check_pixels(image)
+        with opened_picture(source) as image:
             image.load()
             exif = image.getexif()
             focal_35 = exif.get_ifd(_EXIF_IFD).get(_FOCAL_35) or 0

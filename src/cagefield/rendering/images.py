@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,9 @@ from PIL import Image
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.regular_files import check_regular
+from cagefield.rendering.jpeg_scan import end_of_pixels
 from cagefield.rendering.render_result import to_uint8
+from cagefield.rendering.tiff_tags import check_tags
 from cagefield.rendering.video_encoder import encoder
 from cagefield.typing import UInt8
 
@@ -32,6 +35,9 @@ _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
 _TILE = 1 << 16
+
+_ZEROS = bytes(64)
+"""What libjpeg looks ahead at the end of the pixels, and more."""
 
 DAMAGED = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
@@ -55,7 +61,12 @@ def check_pixels(image: Image.Image, size: int | None = None) -> None:
 
 
 class _PictureFile(io.BufferedReader):
-    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes."""
+    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes.
+
+    With `pixels_end` it ends there, and zeros are in the place of the mark at the end.
+    """
+
+    pixels_end: int | None = None
 
     def __init__(self, path: Path) -> None:
         super().__init__(io.FileIO(path))
@@ -64,7 +75,11 @@ class _PictureFile(io.BufferedReader):
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > io.DEFAULT_BUFFER_SIZE:
             size = min(size, max(0, self._size - self.tell()))
-        return super().read(size)
+        begin, content = self.tell(), super().read(size)
+        if self.pixels_end is None or begin + len(content) <= self.pixels_end:
+            return content
+        self.seek(self.pixels_end + 1)
+        return content[: self.pixels_end - begin] + _ZEROS if begin <= self.pixels_end else b""
 
     def __repr__(self) -> str:
         return repr(str(self.name))
@@ -77,9 +92,23 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
     Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
     """
     check_regular(path, MOST_BYTES)
-    with _PictureFile(path) as file, Image.open(file) as image:
-        check_pixels(image, path.stat().st_size)
-        yield image
+    with _PictureFile(path) as file:
+        check_tags(file, path.stat().st_size)
+        with Image.open(file) as image:
+            check_pixels(image, path.stat().st_size)
+            if image.format in ("JPEG", "MPO"):
+                image.load = partial(_load_jpeg, image, file)
+            yield image
+
+
+def _load_jpeg(image: Image.Image, file: _PictureFile) -> Any:
+    """Its `load`, which refuses a file that lacks pixels, where libjpeg would make them up."""
+    del image.load  # the class has its own
+    place = file.tell()
+    file.seek(0)
+    file.pixels_end = end_of_pixels(file)
+    file.seek(place)
+    return image.load()
 
 
 def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
