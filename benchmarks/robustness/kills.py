@@ -96,7 +96,7 @@ def main() -> None:
 def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -> int:
     """Kills a command at all its calls, whose number is returned, and at random."""
     command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
-    if slow and options.forked and not options.writes:
+    if slow and options.forked:
         kills.import_for(name)
     with tempfile.TemporaryDirectory() as folder:
         calls, seconds = kills.calls_of(name, Path(folder), writes=options.writes)
