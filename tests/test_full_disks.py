@@ -271,3 +271,23 @@ def test_a_field_that_is_missed_when_its_file_is_closed(
         ball_field().save(file)
     monkeypatch.undo()
     assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
+
+
+def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photos = make_scene("chair", tmp_path / "chair", views=4, size=24, test_views=1)
+    curve, scene = tmp_path / "curve.csv", tmp_path / "new"
+    arguments = ("bench", "training", photos, "-o", curve, "--steps", "3", "--resolution", "16")
+    printed(capsys, *arguments, "--scene-out", scene)
+    before = files_of(tmp_path)
+    save = Scene.save
+
+    def full(scene: Scene, path: Path, overwrite: bool = False) -> None:
+        with files_up_to(10_000):
+            save(scene, path, overwrite)
+
+    monkeypatch.setattr(Scene, "save", full)
+    line = given_up(capsys, *arguments, "--scene-out", scene, "--overwrite")
+    assert "File too large" in line and str(scene) in line
+    assert files_of(tmp_path) == before
