@@ -69,7 +69,7 @@ class DiskCommand:
 
 _SPLAT_ENDINGS = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
 _TRAIN = "train {s}/photos -o {out} --steps 3 --resolution 16"
-_BAKING = "--resolution 12 --compare 0"
+_BAKING = "--resolution 16 --compare 0"
 _EDITS = (
     "bench edits -o {out} --scenes chair --edits lean_back --views 3 --size 16 --test-views 1 "
     "--steps 3 --resolution 16 --exact-size 16 --exact-views 1"
