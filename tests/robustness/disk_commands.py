@@ -55,6 +55,8 @@ class DiskCommand:
     """Room that the command takes meanwhile, over that of its result."""
     work: str = ""
     """A folder on the disk, `{work}` in the words, that keeps what is whole for the next run."""
+    first: str = ""
+    """A text that is a result of its own, written and told of before the rest is known: it may be new."""
 
     def arguments(self, source: Path, disk: Path, again: bool) -> list[str]:
         """The command line; `again` where its result is there."""
@@ -116,7 +118,9 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
         "bench speed {s}/voxels -o {out} --size 24 --cameras 1 --rounds 1", "speed.json"
     ),
     "bench grids": DiskCommand("bench grids -o {out} --methods trilinear", "grids.png"),
-    "bench edits": DiskCommand(f"{_EDITS} --methods trilinear --compared-size 16", "edits.md"),
+    "bench edits": DiskCommand(
+        f"{_EDITS} --methods trilinear --compared-size 16", "edits.md", first="edits.md"
+    ),
     "bench edits, its work": DiskCommand(
         f"{_EDITS} --no-methods --workdir {{work}}", "edits.md", work="work"
     ),

@@ -139,6 +139,8 @@ def fill(
         if problem and code == 2:
             found.line += 1
             found.faults.append(f"{where}: {problem}")
+        if (after.get(command.first) or b"").endswith(b"\n"):
+            before[command.first] = after[command.first]
         fresh = (key for key in after if key not in before)
         added = [key for key in fresh if not _is_told(key, command, place, lines)]
         found.compare(where, before, after, added)
