@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cagefield import Scene, datasets
+from cagefield.atomic_files import check_writable, replaced_file
 from cagefield.benchmarking.tables import write_texts
 from cagefield.datasets.procedural import make_scene
 from cagefield.formats.splat_files import write_splats
@@ -226,3 +231,63 @@ def test_files_that_belong_together_are_written_together(tmp_path: Path) -> None
         write_texts({figures: "3", table: "4" * 2_000})
     assert caught.value.filename == str(table)
     assert files_of(tmp_path) == {"a.json": b"1", "a.md": b"2"}
+
+
+def _missing(call: Callable[[int], None]) -> Callable[[int], None]:
+    """The same call, which says of files, once it has been done, that there was no room."""
+
+    def late(handle: int) -> None:
+        is_file = stat.S_ISREG(os.fstat(handle).st_mode)
+        call(handle)
+        if is_file:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    return late
+
+
+def test_room_that_is_missed_when_a_file_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As file systems of networks say it: nothing hidden stays."""
+    file = tmp_path / "a.txt"
+    file.write_bytes(b"old")
+    monkeypatch.setattr(os, "close", _missing(os.close))
+    with pytest.raises(OSError, match="No space left") as caught:
+        check_writable(file)
+    assert caught.value.filename == str(file)
+    with pytest.raises(OSError, match="No space left") as caught, replaced_file(file):
+        pytest.fail("began")
+    assert caught.value.filename == str(file)
+    monkeypatch.undo()
+    assert files_of(tmp_path) == {"a.txt": b"old"}
+
+
+def test_a_field_that_is_missed_when_its_file_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What writes it does not ask: the old one stays all the same."""
+    file = tmp_path / "field.safetensors"
+    file.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", _missing(os.fsync))
+    with pytest.raises(OSError, match="No space left") as caught:
+        ball_field().save(file)
+    monkeypatch.undo()
+    assert caught.value.filename == str(file) and files_of(tmp_path) == {file.name: b"old"}
+
+
+def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photos = make_scene("chair", tmp_path / "chair", views=4, size=24, test_views=1)
+    curve, scene = tmp_path / "curve.csv", tmp_path / "new"
+    arguments = ("bench", "training", photos, "-o", curve, "--steps", "3", "--resolution", "16")
+    printed(capsys, *arguments, "--scene-out", scene)
+    before = files_of(tmp_path)
+    save = Scene.save
+
+    def full(scene: Scene, path: Path, overwrite: bool = False) -> None:
+        with files_up_to(10_000):
+            save(scene, path, overwrite)
+
+    monkeypatch.setattr(Scene, "save", full)
+    line = given_up(capsys, *arguments, "--scene-out", scene, "--overwrite")
+    assert "File too large" in line and str(scene) in line
+    assert files_of(tmp_path) == before

@@ -92,7 +92,7 @@ def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
     target = tmp_path / "ball"
     folder = left(target, "old", str(os.getpid()) if host == "this" else ended)
     if host == "another":
-        monkeypatch.setattr(leftovers, "_host", lambda: "0a0a0a")
+        monkeypatch.setattr(leftovers, "host", lambda: "0a0a0a")
     assert recover_folder(target, lambda f: True) is None
     target.mkdir()
     remove_leftovers(target)

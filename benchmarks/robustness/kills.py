@@ -1,15 +1,16 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
 python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
-    [--step 1] [--but N] [--forked] [--writes] [--only NAME ...] [--out FILE.md]
+    [--step 1] [--but N] [--minutes M] [--forked] [--writes] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
 wanted, and at random moments; with --writes in the middle of every write, half of whose bytes are then in
 the file. Editors (`cagefield view`) are killed while a page sends changes, saves and renders a video, or
 pictures; what the page was told is compared with what the next editor has. About an hour of one processor.
 
---but N leaves out what a run with --step N has tried. --forked forks the slow commands too, of a process that
-has imported what they need: two to eight times as many kills in the same time.
+--but N leaves out what a run with --step N has tried; --minutes M ends the kills of each command after that
+time, whose calls come in random order. --forked forks the slow commands too, of a process that has imported
+what they need: two to eight times as many kills in the same time.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,6 +64,7 @@ def main() -> None:
     parser.add_argument("--servers", type=int, default=10)
     parser.add_argument("--step", type=int, default=1, help="kills at every such call only")
     parser.add_argument("--but", type=int, default=0, help="not at every such call: they have been tried")
+    parser.add_argument("--minutes", type=float, default=None, help="for each command's calls, at most")
     parser.add_argument("--forked", action="store_true", help="slow commands are forked, not started anew")
     parser.add_argument(
         "--writes", action="store_true", help="kills in the middle of writes, of files' content"
@@ -96,7 +99,7 @@ def main() -> None:
 def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -> int:
     """Kills a command at all its calls, whose number is returned, and at random."""
     command, slow = kills.ALL[name], name in kills.SLOW_COMMANDS
-    if slow and options.forked and not options.writes:
+    if slow and options.forked:
         kills.import_for(name)
     with tempfile.TemporaryDirectory() as folder:
         calls, seconds = kills.calls_of(name, Path(folder), writes=options.writes)
@@ -104,7 +107,10 @@ def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -
     points = [at for at in range(1, calls + 1, options.step) if at not in tried]
     points *= 1 if slow else options.rounds
     random.Random(name).shuffle(points)
+    begun = time.monotonic()
     for at in points:
+        if options.minutes is not None and time.monotonic() - begun > 60.0 * options.minutes:
+            break
         with tempfile.TemporaryDirectory() as folder:
             kills.kill(command, name, Path(folder), at, found, writes=options.writes)
     for after in kills.moments(options.slow if slow else options.random, seconds, len(name)):

@@ -33,9 +33,11 @@ def check_writable(path: Path, *, inside: bool = False) -> None:
     with _naming(path, folder):
         handle = os.open(probe, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
         try:
-            os.write(handle, b"?")
+            try:
+                os.write(handle, b"?")
+            finally:
+                os.close(handle)  # some file systems say only now that there is no room
         finally:
-            os.close(handle)
             os.unlink(probe)
 
 
@@ -49,9 +51,9 @@ def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
     if parents:
         path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(hidden_name(path, "part"))
-    with _naming(path, path.parent):
-        os.close(os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
     try:
+        with _naming(path, path.parent):
+            os.close(os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
         with _naming(path, temporary):
             yield temporary
             umask = os.umask(0)

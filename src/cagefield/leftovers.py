@@ -28,7 +28,7 @@ UNTOUCHED = 300.0
 def hidden_name(target: Path, role: str) -> str:
     """A new name for what becomes `target`, or was it: role "part" (a file), "new" or "old" (folders)."""
     suffix = target.suffix if role == "part" and len(target.suffix) < 16 else ""
-    return f".{_cut(target.name)}.{role}-{_host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
+    return f".{_cut(target.name)}.{role}-{host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
 
 
 def is_hidden(path: Path) -> bool:
@@ -39,7 +39,7 @@ def is_hidden(path: Path) -> bool:
 def is_abandoned(path: Path) -> bool:
     """Whether a hidden name is of a program on this machine that has ended."""
     found = _MARK.fullmatch(path.name)
-    return found is not None and found[3] == _host() and not _lives(int(found[4]))
+    return found is not None and found[3] == host() and not is_alive(int(found[4]))
 
 
 def put_aside(target: Path) -> list[Path]:
@@ -115,11 +115,13 @@ def _cut(name: str) -> str:
     return f"{whole[: _LONGEST - len(digest) - 1].decode(errors='ignore')}~{digest}"
 
 
-def _host() -> str:
+def host() -> str:
+    """A short name of this machine in names of files."""
     return hashlib.blake2b(socket.gethostname().encode(), digest_size=3).hexdigest()
 
 
-def _lives(process: int) -> bool:
+def is_alive(process: int) -> bool:
+    """Whether a process of that number goes on, whosever it is."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

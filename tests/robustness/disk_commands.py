@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
+
+from torch_files import write_checkpoints
 
 from cagefield import Scene
 from cagefield.datasets.procedural import make_scene
@@ -23,13 +26,15 @@ EDITS = """edits:
 def sources(folder: Path) -> None:
     """What commands read, on a disk with room: scenes of voxels and of splats, splats, photos and edits.
 
-    And photos without poses.
+    And photos without poses, and other programs' checkpoints.
     """
     ball_scene().save(folder / "voxels")
     Scene(ball_of_splats(4000), cameras=ball_scene().cameras).save(folder / "splats")
     write_splats(ball_of_splats(4000), folder / "x.ply")
     make_scene("chair", folder / "photos", views=4, size=16, test_views=1)
     photos_alone(folder / "photos_alone")
+    if importlib.util.find_spec("torch") is not None:
+        write_checkpoints(folder, splats=4000)
     (folder / "e.yaml").write_text(EDITS)
 
 
@@ -48,11 +53,17 @@ class DiskCommand:
     """Pictures that fit stay, without an old result: they can be looked at."""
     on_the_way: float = 1.0
     """Room that the command takes meanwhile, over that of its result."""
+    work: str = ""
+    """A folder on the disk, `{work}` in the words, that keeps what is whole for the next run."""
+    first: str = ""
+    """A text that is a result of its own, written and told of before the rest is known: it may be new."""
 
     def arguments(self, source: Path, disk: Path, again: bool) -> list[str]:
         """The command line; `again` where its result is there."""
         words = [
-            word.replace("{s}", str(source)).replace("{out}", str(disk / self.out))
+            word.replace("{s}", str(source))
+            .replace("{out}", str(disk / self.out))
+            .replace("{work}", str(disk / self.work))
             for word in self.words.split()
         ]
         return [*words, "--overwrite"] if again else words
@@ -60,6 +71,13 @@ class DiskCommand:
 
 _SPLAT_ENDINGS = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
 _TRAIN = "train {s}/photos -o {out} --steps 3 --resolution 16"
+_BAKING = "--resolution 16 --compare 0"
+_EDITS = (
+    "bench edits -o {out} --scenes chair --edits lean_back --views 3 --size 16 --test-views 1 "
+    "--steps 3 --resolution 16 --exact-size 16 --exact-views 1"
+)
+_CAPTURES = "bench captures room-chair -o {out} --room-views 8 --room-size 48 --steps 2 --splats 100"
+_TRAINING = "bench training {s}/photos -o {out} --steps 3 --resolution 16"
 
 DISK_COMMANDS: dict[str, DiskCommand] = {
     "render, one picture": DiskCommand("render {s}/voxels -o {out} --views 0 --size 200", "r.png"),
@@ -70,10 +88,14 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
     "edit -o": DiskCommand("edit {s}/voxels {s}/e.yaml -o {out}", "new"),
     "edit -o, splats": DiskCommand("edit {s}/splats {s}/e.yaml -o {out}", "new"),
     "edit --overwrite": DiskCommand("edit {out} {s}/e.yaml", "scene", on_disk="voxels"),
+    "edit --append": DiskCommand("edit {out} {s}/e.yaml --append", "scene", on_disk="voxels"),
     "train, voxels": DiskCommand(_TRAIN + " --field voxel", "new"),
     "train, splats": DiskCommand("train {s}/photos -o {out} --steps 3 --field splat", "new"),
     "train, nerf": DiskCommand(_TRAIN + " --field nerf", "new"),
     "import": DiskCommand("import {s}/x.ply -o {out}", "new"),
+    "import .tar": DiskCommand(f"import {{s}}/a.tar -o {{out}} {_BAKING}", "new"),
+    "import .ckpt, nerf": DiskCommand(f"import {{s}}/a.ckpt -o {{out}} {_BAKING}", "new"),
+    "import .ckpt, splats": DiskCommand("import {s}/s.ckpt -o {out}", "new"),
     "bake": DiskCommand("bake {s}/splats -o {out} --resolution 24 --compare 0", "new"),
     **{f"export {end}": DiskCommand("export {s}/splats -o {out}", f"x{end}") for end in _SPLAT_ENDINGS},
     "export, a page": DiskCommand("export {s}/splats -o {out}", "x.html"),
@@ -96,5 +118,15 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
         "bench speed {s}/voxels -o {out} --size 24 --cameras 1 --rounds 1", "speed.json"
     ),
     "bench grids": DiskCommand("bench grids -o {out} --methods trilinear", "grids.png"),
+    "bench edits": DiskCommand(
+        f"{_EDITS} --methods trilinear --compared-size 16", "edits.md", first="edits.md"
+    ),
+    "bench edits, its work": DiskCommand(
+        f"{_EDITS} --no-methods --workdir {{work}}", "edits.md", work="work"
+    ),
+    "bench captures": DiskCommand(_CAPTURES, "captures.md"),
+    "bench captures, its work": DiskCommand(f"{_CAPTURES} --workdir {{work}}", "captures.md", work="work"),
+    "bench training": DiskCommand(_TRAINING, "curve.csv"),
+    "bench training, its scene": DiskCommand(f"{_TRAINING} --scene-out {{work}}", "curve.csv", work="new"),
 }
 """What writes files, by what it writes."""

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from disk_commands import DiskCommand
+from shortages import SHORTAGES, SIZE, Shortage, mount
 
 from cagefield.cli import main
 
-PAGE = 4096
-"""Bytes that a small file takes on such a disk."""
+BYTES = SHORTAGES["bytes"]
 
 
 @dataclass
@@ -50,31 +50,15 @@ class Filled:
 
 
 @contextlib.contextmanager
-def disk(folder: Path, size: int = 1 << 30) -> Iterator[Path]:
+def disk(folder: Path, size: int = SIZE) -> Iterator[Path]:
     """A file system of so many bytes. Raises PermissionError where it may not be mounted."""
     folder.mkdir()
-    done = subprocess.run(_mount(folder, size), capture_output=True, text=True)
-    if done.returncode != 0:
-        raise PermissionError(f"no small file system: {done.stderr.strip()}")
+    mount(folder, size)
     try:
         yield folder
     finally:
         subprocess.run(["umount", "-l", str(folder)], check=True, capture_output=True)
         folder.rmdir()
-
-
-def resize(folder: Path, size: int) -> None:
-    """Leaves a mounted disk so many bytes, at least what it holds."""
-    subprocess.run(_mount(folder, size, "remount,"), check=True, capture_output=True)
-
-
-def _mount(folder: Path, size: int, how: str = "") -> list[str]:
-    return ["mount", "-t", "tmpfs", "-o", f"{how}size={max(PAGE, size)}", "tmpfs", str(folder)]
-
-
-def used(folder: Path) -> int:
-    """Bytes that a disk holds."""
-    return shutil.disk_usage(folder).used
 
 
 def contents(folder: Path) -> dict[str, bytes | None]:
@@ -96,13 +80,15 @@ def ran(arguments: list[str]) -> tuple[int, list[str]]:
     return code, errors.getvalue().splitlines()
 
 
-def room_for(command: DiskCommand, source: Path) -> int:
-    """Bytes that a command's result takes."""
+def room_for(command: DiskCommand, source: Path, short: Shortage = BYTES) -> int:
+    """What a command's result takes of what disks are short of."""
     with tempfile.TemporaryDirectory() as folder, disk(Path(folder) / "disk") as place:
-        code, lines = ran(_prepared(command, source, place, again=False))
+        arguments = _prepared(command, source, place, again=False)
+        short.begin(place)
+        code, lines = ran(arguments)
         if code != 0:
             raise RuntimeError(f"{command.words}: {lines[-1:]}")
-        return used(place)
+        return short.taken(place)
 
 
 def _prepared(command: DiskCommand, source: Path, place: Path, again: bool) -> list[str]:
@@ -115,43 +101,64 @@ def _prepared(command: DiskCommand, source: Path, place: Path, again: bool) -> l
         code, lines = ran(command.arguments(source, place, False))
         if code != 0:
             raise RuntimeError(f"{command.words}: {lines[-1:]}")
+        if command.work:  # what it would find there is not made again
+            shutil.rmtree(place / command.work)
     return command.arguments(source, place, again)
 
 
-def fill(name: str, command: DiskCommand, source: Path, left: int, again: bool, found: Filled) -> bool:
-    """One run of a command that finds `left` bytes free; counts what is wrong. False where there was room."""
+def fill(
+    name: str,
+    command: DiskCommand,
+    source: Path,
+    left: int,
+    again: bool,
+    found: Filled,
+    short: Shortage = BYTES,
+) -> bool:
+    """One run of a command that finds `left` free; counts what is wrong. False where that was enough."""
     with tempfile.TemporaryDirectory() as folder, disk(Path(folder) / "disk") as place:
         arguments = _prepared(command, source, place, again)
-        resize(place, used(place) + left)
+        short.limit(place, left)
         before = contents(place)
         code, lines = ran(arguments)
+        refused = short.refused()
+        short.lift(place)
         after = contents(place)
         found.runs += 1
+        where = f"{name}{', over an old one' if again else ''}, {left} {short.words}"
         if code == 0:
             found.fitted += 1
+            if refused:
+                found.code += 1
+                found.faults.append(f"{where}: ended well, {refused} calls were refused, {lines[-3:]}")
             return False
-        where = f"{name}{', over an old one' if again else ''}, {left} bytes free"
         if code != 2:
             found.code += 1
             found.faults.append(f"{where}: exit code {code}, {lines[-1:]}")
-        problem = _line_problem(lines, place / command.out)
+        problem = _line_problem(lines, [place / each for each in (command.out, command.work) if each])
         if problem and code == 2:
             found.line += 1
             found.faults.append(f"{where}: {problem}")
+        if (after.get(command.first) or b"").endswith(b"\n"):
+            before[command.first] = after[command.first]
         fresh = (key for key in after if key not in before)
         added = [key for key in fresh if not _is_told(key, command, place, lines)]
         found.compare(where, before, after, added)
+        if command.work and ran(arguments)[0] != 0:
+            found.left += 1
+            found.faults.append(f"{where}: the next run fails with what was left in {command.work}")
         return True
 
 
-def _line_problem(lines: list[str], out: Path) -> str | None:
-    """What is wrong with what was said: one line at the end, that names the place."""
+def _line_problem(lines: list[str], places: list[Path]) -> str | None:
+    """What is wrong with what was said: one line at the end, that names one of the places."""
     said = [line for line in lines if line.startswith("cagefield: ") and "cagefield: warning" not in line]
     if len(said) != 1 or lines[-1] != said[0] or any("Traceback" in line for line in lines):
         return f"said {lines[-3:]}"
-    if str(out.with_suffix("")) not in said[0]:  # or what goes beside it
+    named = [out for out in places if str(out.with_suffix("")) in said[0]]  # or what goes beside it
+    if not named:
         return f"names no place: {said[0]}"
-    return None if "/." not in said[0].replace(str(out), "") else f"names a hidden file: {said[0]}"
+    return None if "/." not in said[0].replace(str(named[0]), "") else f"names a hidden file: {said[0]}"
 
 
 def _is_told(name: str, command: DiskCommand, place: Path, lines: list[str]) -> bool:
@@ -160,10 +167,5 @@ def _is_told(name: str, command: DiskCommand, place: Path, lines: list[str]) -> 
     told = told[: told.index(place)]
     if any(str(each) in line for each in told for line in lines if each != place / command.out):
         return True
-    return command.keeps and name.split("/")[0] == command.out and "/." not in f"/{name}"
-
-
-def levels(need: int, count: int) -> list[int]:
-    """So many amounts of free room, from none to a page less than what is needed."""
-    most = max(0, need - PAGE) // PAGE
-    return sorted({round(most * number / max(1, count - 1)) * PAGE for number in range(count)} | {0, PAGE})
+    kept = (command.out if command.keeps else None, command.work or None)
+    return name.split("/")[0] in kept and "/." not in f"/{name}"

@@ -25,6 +25,7 @@ from kill_checks import (
 )
 from kill_command import Check, Command, Make, cli, put_scene, put_splats, renamed
 from kill_points import Say
+from torch_files import write_checkpoints
 
 from cagefield import Scene
 from cagefield.formats.splat_files import write_splats
@@ -124,22 +125,8 @@ def _torch_file(name: str) -> Make:
 
 @cache
 def _checkpoints() -> tempfile.TemporaryDirectory[str]:
-    """nerf-pytorch's two layouts, and splatfacto's."""
-    import numpy as np
-    import torch
-
-    from nerf_networks import krrish94_state, yenchenlin_state
-    from splat_damage import checkpoint_of
-
-    def tensors(state: dict[str, np.ndarray]) -> dict[str, torch.Tensor]:
-        return {name: torch.from_numpy(value) for name, value in state.items()}
-
     folder = tempfile.TemporaryDirectory(prefix="cagefield-checkpoints-")
-    place = Path(folder.name)
-    network = tensors(yenchenlin_state(0, width=8, depth=4))
-    torch.save({"global_step": 5, "network_fn_state_dict": network}, place / "a.tar")
-    torch.save({"iter": 9, "model_coarse_state_dict": tensors(krrish94_state(0))}, place / "a.ckpt")
-    (place / "s.ckpt").write_bytes(checkpoint_of(ball_of_splats(50)))
+    write_checkpoints(Path(folder.name))
     return folder
 
 

@@ -39,7 +39,7 @@ _EVENTS = (
 )
 _PR_SET_CHILD_SUBREAPER = 36
 """Of Linux's <sys/prctl.h>."""
-PATIENCE = 120.0
+PATIENCE = 600.0
 """Seconds after which work that does not end is killed."""
 STAYS = 5.0
 """Seconds after which no process of a killed one may be there."""

@@ -5,13 +5,17 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import disks
 import pytest
+import write_limits
 from disk_commands import DISK_COMMANDS, DiskCommand, sources
-from disks import PAGE, Filled, disk, levels, room_for
+from disks import BYTES, Filled, disk, room_for
+from shortages import PAGE, SHORTAGES
 
 
 @pytest.fixture(scope="module")
@@ -33,10 +37,34 @@ def test_a_command_on_a_full_disk(source: Path, name: str) -> None:
     command, found = DISK_COMMANDS[name], Filled()
     need = room_for(command, source)
     for again in (True,) if command.on_disk else (False, True):
-        for left in levels(need, 3):
+        for left in BYTES.levels(need, 3):
             disks.fill(name, command, source, left, again, found)
     assert found.faults == []
     assert found.runs - found.fitted >= 3  # what stays as it is takes no room
+
+
+@pytest.mark.parametrize("name", ["edit --overwrite", "edit -o", "edit --append", "export --embed"])
+def test_a_command_on_a_disk_without_names(source: Path, name: str) -> None:
+    command, found, short = DISK_COMMANDS[name], Filled(), SHORTAGES["names"]
+    need = room_for(command, source, short)
+    for again in (True,) if command.on_disk else (False, True):
+        for left in short.levels(need, 3):
+            disks.fill(name, command, source, left, again, found, short)
+    assert found.faults == []
+    assert found.runs - found.fitted >= 3
+
+
+@pytest.mark.skipif(write_limits.why_not() is not None, reason=str(write_limits.why_not()))
+@pytest.mark.parametrize("short", ["quota", "names of a quota", "closing"])
+def test_a_command_whose_writes_are_refused(source: Path, short: str) -> None:
+    """In processes of their own: a library that counts what is written is loaded before the C library."""
+    script = Path(__file__).resolve().parents[2] / "benchmarks" / "robustness" / "full_disks.py"
+    words = ["--short", short, "--levels", "3", "--only", "edit -o", "edit --overwrite"]
+    done = subprocess.run([sys.executable, str(script), *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    rows = [line.strip("| ").split(" | ") for line in done.stdout.splitlines()]
+    assert [row[0] for row in rows] == ["edit -o", "edit --overwrite"], done.stdout
+    assert all(int(row[2]) > 2 and row[4:] == ["0"] * 4 for row in rows), done.stdout
 
 
 def test_poses_on_a_full_disk(source: Path) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,10 +74,18 @@ def write_text(path: Path, text: str) -> None:
 
 def write_texts(texts: Mapping[Path, str]) -> None:
     """Writes text files, all of them or none."""
+    with drafted_texts(texts):
+        pass
+
+
+@contextmanager
+def drafted_texts(texts: Mapping[Path, str]) -> Iterator[None]:
+    """Writes text files that take their places at the end, all of them or none, after what is done within."""
     with ExitStack() as stack:
         for path, text in texts.items():
             temporary = stack.enter_context(replaced_file(path))
             temporary.write_text(text, encoding="utf-8")
+        yield
 
 
 def _row(cells: tuple[str, ...]) -> str:

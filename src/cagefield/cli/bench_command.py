@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cagefield.regular_files import real_path
+from cagefield.temporary_folders import TemporaryFolder
 
 if TYPE_CHECKING:
     pass
@@ -50,5 +50,5 @@ def work_folder(path: Path | None) -> Iterator[Path]:
     if path is not None:
         yield real_path(path)
         return
-    with tempfile.TemporaryDirectory(prefix="cagefield-bench-") as folder:
-        yield Path(folder)
+    with TemporaryFolder("bench") as folder:
+        yield folder

@@ -102,7 +102,7 @@ class BenchTraining:
         """Trains, evaluates on the way, shows the table, writes the files."""
         from cagefield import devices
         from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_texts
+        from cagefield.benchmarking.tables import drafted_texts
         from cagefield.benchmarking.training import Point, measure
         from cagefield.scene import Scene
         from cagefield.scene_files import check_destination
@@ -135,10 +135,11 @@ class BenchTraining:
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench training', self)}`")
         result = curve.table(dataset.name, notes)
         result.show()
-        write_texts({self.out: curve.csv(), self.out.with_suffix(".md"): result.markdown()})
+        with drafted_texts({self.out: curve.csv(), self.out.with_suffix(".md"): result.markdown()}):
+            if self.scene_out is not None:
+                Scene.trained(curve.result, dataset).save(self.scene_out, self.overwrite)
         print(f"curve written to {self.out} and {self.out.with_suffix('.md')}")
         if self.scene_out is not None:
-            Scene.trained(curve.result, dataset).save(self.scene_out, self.overwrite)
             print(f"scene written to {self.scene_out}")
 
 

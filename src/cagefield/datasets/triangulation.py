@@ -11,7 +11,6 @@ epipolar plane) small, both ways round.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +28,7 @@ from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.matching import match
 from cagefield.datasets.photos import read_photo
 from cagefield.datasets.views import SparsePoints, View
+from cagefield.temporary_folders import TemporaryFolder
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -72,8 +72,7 @@ def triangulate(
     pycolmap = features.engine()
     if len(views) < 2:
         return None
-    with tempfile.TemporaryDirectory(prefix="cagefield-points-") as name:
-        folder = Path(name)
+    with TemporaryFolder("points") as folder:
         (folder / "images").mkdir()
         (folder / "masks").mkdir()
         shrunk = []

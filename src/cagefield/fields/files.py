@@ -88,11 +88,14 @@ def write_tensors(path: str | Path, tensors: Mapping[str, Any], header: dict[str
     from safetensors.numpy import save_file
 
     arrays = {name: np.ascontiguousarray(values) for name, values in tensors.items()}
-    with replaced_file(Path(path), parents=False) as draft:
+    # Some file systems miss room only when a file is closed, and safetensors does not ask then: a handle that
+    # is open meanwhile is told.
+    with replaced_file(Path(path), parents=False) as draft, draft.open("r+b") as known:
         try:
             save_file(arrays, draft, header)
         except SafetensorError as error:
             raise _system_error(error) from None
+        os.fsync(known.fileno())
 
 
 def _system_error(error: Exception) -> OSError:

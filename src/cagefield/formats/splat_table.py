@@ -6,7 +6,6 @@ harmonics [n, (degree+1)^2, 3], x right, y down, z forwards (see `splat_axes`).
 
 from __future__ import annotations
 
-import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from cagefield.errors import FieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.morton import morton_codes
+from cagefield.temporary_folders import TemporaryFolder
 from cagefield.typing import AnyArray, Float32
 
 BATCH = 1 << 18
@@ -209,8 +209,8 @@ def spooled(
     source: SplatSource, batches: Iterable[SplatBatch], sh_degree: int, on_progress: OnProgress
 ) -> Iterator[Spool]:
     """What a source's batches became in a temporary file, which is removed at the end."""
-    with tempfile.TemporaryDirectory(prefix="cagefield-splats-") as folder:
-        spool = Spool(Path(folder), sh_degree, source.antialiased, source.discs)
+    with TemporaryFolder("splats") as folder:
+        spool = Spool(folder, sh_degree, source.antialiased, source.discs)
         try:
             for batch in batches:
                 spool.append(batch)

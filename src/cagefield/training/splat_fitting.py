@@ -8,10 +8,8 @@ lies empty before the surface.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +21,7 @@ from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import write_png
 from cagefield.rendering.render_result import Background, RenderResult
+from cagefield.temporary_folders import TemporaryFolder
 from cagefield.training.plane_sweep import CLEAR
 from cagefield.training.splat import SplatTrainResult, train_splat
 from cagefield.training.splat_config import SplatConfig
@@ -122,12 +121,12 @@ def fit_splats(
     """
     behind: Background = "black" if unbounded else None
     every = [*cameras, *held_out]
-    with tempfile.TemporaryDirectory(prefix="cagefield-fit-") as folder:
+    with TemporaryFolder("fit") as folder:
         chance = np.random.default_rng(config.seed)
         parts, empty, views = list[Surface](), list[Float32](), list[View]()
         wanted = int(SEED_SHARE * most_splats(cameras, config)) if cameras else 0
         for number, picture in enumerate(_pictures(renderer, every, behind, on_stage)):
-            file = Path(folder) / f"{number:05d}.png"
+            file = folder / f"{number:05d}.png"
             write_png(file, picture.rgba8() if behind is None else picture.rgb8())
             views.append(View(file.stem, every[number], file))
             if number < len(cameras):
@@ -137,7 +136,7 @@ def fit_splats(
         surface = _some(Surface.joined(parts), wanted, chance)
         dataset = Dataset(
             name="rendered",
-            path=Path(folder),
+            path=folder,
             train=tuple(views[: len(cameras)]),
             test=tuple(views[len(cameras) :]),
             val=(),

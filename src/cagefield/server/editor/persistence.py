@@ -32,6 +32,7 @@ from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
+from cagefield.temporary_folders import remove_abandoned
 
 CAMERA_PATH = "camera_path.json"
 _EDITS = "edits.yaml"
@@ -133,11 +134,13 @@ class SceneStore:
     def lock(self) -> None:
         """Keeps other programs from editing the scene, and removes what ended ones left half-written.
 
-        Their videos beside it, too. Raises SceneError where another one does edit it.
+        Their videos beside it and their temporary folders, too. Raises SceneError where another one does
+        edit it.
         """
         self._lock = SceneLock(self.path)
         remove_leftovers(self.path, inside=True)
         remove_unfinished(self.path.parent)
+        remove_abandoned()
 
     def close(self) -> None:
         """Lets other programs edit the scene."""

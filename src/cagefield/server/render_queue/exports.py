@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import shutil
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.protocol.common import SplatForm
 from cagefield.server.render_worker.own_process import in_own_process
 from cagefield.server.render_worker.tasks import EditValues, values_of
+from cagefield.temporary_folders import TemporaryFolder
 
 KEPT = 4
 """Finished files that are kept for their download; older ones are removed."""
@@ -42,7 +42,7 @@ class Exports:
     ) -> None:
         """`tell` is called with the exports' progress, for all pages."""
         self._session, self._store, self._tell = session, store, tell
-        self._folder: Path | None = None
+        self._folder: TemporaryFolder | None = None
         self._exports: dict[int, _Export] = {}
 
     def begin(self, number: int, page: int, form: SplatForm) -> None:
@@ -55,7 +55,7 @@ class Exports:
                 "the scene holds voxels; `cagefield export SCENE -o x.spz` fits splats to them"
             )
         if self._folder is None:
-            self._folder = Path(tempfile.mkdtemp(prefix="cagefield-export-"))
+            self._folder = TemporaryFolder("export")
         export = _Export(number, page, f"{self._name}.{form}")
         self._exports[number] = export
         self._tell(_message(export, "running"))
@@ -89,11 +89,11 @@ class Exports:
             if export.task is not None:
                 export.task.cancel()
         if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.close()
 
     def _path(self, export: _Export) -> Path:
         assert self._folder is not None  # made when the first export begins
-        return self._folder / str(export.number) / export.name
+        return self._folder.path / str(export.number) / export.name
 
     async def _write(self, export: _Export) -> None:
         document = self._session.document

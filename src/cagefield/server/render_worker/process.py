@@ -13,7 +13,6 @@ import ctypes
 import dataclasses
 import multiprocessing
 import signal
-import tempfile
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -25,6 +24,7 @@ from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
 from cagefield.server.render_worker.lifeline import end_with_parent
 from cagefield.server.render_worker.tasks import Failed, Ready, Replaced, Result, Task
 from cagefield.server.render_worker.unused_memory import UnusedMemory
+from cagefield.temporary_folders import TemporaryFolder
 
 if TYPE_CHECKING:
     from cagefield.scene import Scene
@@ -229,8 +229,7 @@ class Worker:
         assert self.write_opened is not None  # nothing is replaced where `files` are not known
         with ExitStack() as kept:
             try:
-                folder = tempfile.TemporaryDirectory(prefix="cagefield-", ignore_cleanup_errors=True)
-                copy = Path(kept.enter_context(folder)) / "scene"
+                copy = kept.enter_context(TemporaryFolder("copy")) / "scene"
                 self.write_opened(copy)
             except (CagefieldError, OSError, MemoryError) as error:
                 _sent(connection, None)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import re
-import shutil
-import tempfile
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
@@ -15,6 +13,7 @@ from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_worker.own_process import in_own_process
 from cagefield.server.web.opening import scene_of_file
+from cagefield.temporary_folders import TemporaryFolder
 
 MOST_UPLOAD = 4 << 30
 """Largest file in bytes that a page may send: 17 million splats with harmonics of degree 3 as a PLY."""
@@ -64,14 +63,12 @@ class OpenEditor:
             raise CagefieldError("another file is being opened; wait until it is there")
         async with self._is_opening:
             file_name = _file_name(name)
-            folder = Path(tempfile.mkdtemp(prefix="cagefield-open-"))
-            try:
-                await _receive(folder / file_name, content, size)
-                scene = await in_own_process(scene_of_file, folder / file_name)
-            except CagefieldError as error:
-                raise type(error)(str(error).replace(f"{folder}{os.sep}", "")) from None
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
+            with TemporaryFolder("open") as folder:
+                try:
+                    await _receive(folder / file_name, content, size)
+                    scene = await in_own_process(scene_of_file, folder / file_name)
+                except CagefieldError as error:
+                    raise type(error)(str(error).replace(f"{folder}{os.sep}", "")) from None
             await self._enter(
                 await asyncio.to_thread(self._reopen, scene, self.coordinator.store.root / file_name)
             )
