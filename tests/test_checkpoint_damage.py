@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,14 @@ def test_numbers_without_names_are_no_checkpoint(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", scalars="[1, 2]", config="mine")
     with pytest.raises(CagefieldError, match=r"its numbers have no names.*start anew"):
         read_checkpoint(tmp_path / "x.npz", "mine")
+
+
+def test_texts_whose_letters_are_none_are_refused(tmp_path: Path) -> None:
+    for order in "<>":
+        letters = np.array([ord("["), sys.maxunicode + 1], f"{order}u4").view(f"{order}U2")[0:1].reshape(())
+        np.savez(tmp_path / "x.npz", scalars=letters, config="mine")
+        with pytest.raises(CagefieldError, match=r"letters are none.*start anew"):
+            read_checkpoint(tmp_path / "x.npz", "mine")
 
 
 def test_the_sums_of_other_networks_are_refused(photos: Dataset, tmp_path: Path) -> None:

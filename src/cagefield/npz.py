@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import zipfile
 from pathlib import Path
 from typing import IO, Any
@@ -56,8 +57,7 @@ def read_array(path: Path) -> NDArray[Any]:
             if (lacking := lacking_memory(needed)) is not None:
                 raise ValueError(lacking)
             file.seek(0)
-            array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
-            return array
+            return _values(file)
     except OSError:
         raise
     except Exception as error:  # odd headers raise what numpy's parsers happen to
@@ -70,7 +70,17 @@ def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any]:
         if needed != entry.file_size - stream.tell():
             raise ValueError(f"{entry.filename} says that it is an array of {needed} bytes")
     with archive.open(entry) as stream:
-        array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+        return _values(stream)
+
+
+def _values(stream: IO[bytes]) -> NDArray[Any]:
+    """The array of a stream; texts of it are texts."""
+    array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    if array.dtype.kind == "U" and array.size and array.dtype.itemsize:
+        codes = np.ascontiguousarray(array).reshape(-1).view(np.uint32)
+        codes = codes if array.dtype.isnative else codes.byteswap()
+        if codes.max() > sys.maxunicode:  # numpy makes a SystemError of it, once somebody looks
+            raise ValueError("it has a text whose letters are none")
     return array
 
 

@@ -57,7 +57,7 @@ FOUND = {
     "nerf config.yml": (765,),
     "COLMAP, binary": (91, 606),
     "COLMAP, text": (342, 890),
-    "training": (838,),
+    "training": (838, 8937, 9348),
     "tif": (489,),
     "sog": (295,),
     "glb": (284,),
