@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -114,3 +116,22 @@ def test_pairs_tell_of_light_amid_textures_and_little_or_nothing_of_none() -> No
     half = points[:, 0] > 0.5
     assert facing_of(first, second, np.where(half, 1.0, -1.0) * change + texture) is None
     assert facing_of(first.take(np.arange(90)), second.take(np.arange(90)), change[:90]) is None
+
+
+def test_what_is_all_dark_or_all_on_one_plane_says_nothing() -> None:
+    chance = np.random.default_rng(3)
+    normals = chance.normal(size=(2, 2000, 3))
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    flat = np.ones((2000, 3))
+    for points in (chance.random((2000, 3)), flat):
+        first, second = (Surfels(points, each) for each in normals)
+        assert facing_of(first, second, np.zeros(2000)) is None
+    assert facing_of(first, second, chance.normal(size=2000)) is None
+
+
+def test_a_black_scene_can_be_edited() -> None:
+    lit = balls(np.zeros(3), 32)
+    black = dataclasses.replace(lit, sh=np.full_like(lit.sh, -0.5 / C0))
+    scene = Scene(black, cameras={"train": cameras()})
+    assert scene.patcher.ambience.facing is None
+    assert seen(scene.with_edits(turned("occlusion", "discrete"))).shape == seen(scene).shape

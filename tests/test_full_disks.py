@@ -291,3 +291,10 @@ def test_a_curve_stays_where_the_scene_that_goes_with_it_does_not_fit(
     line = given_up(capsys, *arguments, "--scene-out", scene, "--overwrite")
     assert "File too large" in line and str(scene) in line
     assert files_of(tmp_path) == before
+
+
+def test_a_place_that_is_none_is_named_and_not_what_is_hidden_there(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OSError) as told, replaced_file(tmp_path / "file" / "x.png", parents=False):
+        raise AssertionError
+    assert "part-" not in str(told.value) and "x.png" in str(told.value)

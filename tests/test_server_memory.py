@@ -124,3 +124,20 @@ def test_no_thread_begins_after_the_start() -> None:
     before = threading.active_count()
     assert asyncio.run(much()) == 0
     assert threading.active_count() == before  # they end with the loop
+
+
+def test_where_the_system_has_no_more_threads_those_that_there_are_work(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    start, begun = threading.Thread.start, []
+
+    def limited(thread: threading.Thread) -> None:
+        if sum(each.is_alive() for each in begun) == 3:
+            raise RuntimeError("can't start new thread")
+        begun.append(thread)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", limited)
+    with all_started(5) as executor:
+        assert sum(each.is_alive() for each in begun) == 2
+        assert [executor.submit(pow, 2, each).result(30.0) for each in range(4)] == [1, 2, 4, 8]

@@ -8,7 +8,7 @@ import shutil
 import stat
 import warnings
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from cagefield.exchange import exchanged
@@ -61,7 +61,8 @@ def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
             temporary.chmod(0o666 & ~umask)
             temporary.replace(path)
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # nor could it be made there, which is told
+            temporary.unlink(missing_ok=True)
 
 
 @contextmanager

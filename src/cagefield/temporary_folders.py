@@ -22,15 +22,22 @@ try:
 except ImportError:  # no such locks here
     fcntl = None  # type: ignore[assignment]
 
-_MARK = re.compile(r"cagefield-(copy|export|open|splats|fit|points|bench)-([0-9a-f]{6})-(\d+)-\w+")
+_ROLES = ("copy", "export", "open", "splats", "fit", "points", "bench")
+
+_MARK = re.compile(rf"cagefield-({'|'.join(_ROLES)})-([0-9a-f]{{6}})-(\d+)-\w+")
 
 
 class TemporaryFolder:
     """An empty folder that is this user's alone, until `close`, or the process's end and the next program."""
 
-    def __init__(self, role: str) -> None:
-        """`role` is one of those in `_MARK`. Raises OSError where there can be no such folder."""
-        remove_abandoned()
+    def __init__(self, role: str, *, tidy: bool = True) -> None:
+        """`role` is one of `_ROLES`. Unless `tidy`, others' folders are left, of which each may be gigabytes.
+
+        Raises OSError where there can be no such folder.
+        """
+        assert role in _ROLES, role
+        if tidy:
+            remove_abandoned()
         self.path = Path(tempfile.mkdtemp(prefix=f"cagefield-{role}-{host()}-{os.getpid()}-"))
         self._lock = _locked(self.path)
 

@@ -31,7 +31,11 @@ _VERSION = 1
 
 _PLAIN = rb"[ !#-\[\]-~]*"
 _PHOTO = re.compile(
-    rb'\["' + _PLAIN + rb'(?:\\(?:["\\/bfnrt]|u[0-9a-f]{4})' + _PLAIN + rb')*", \d+, -?\d+\], (?=\[")'
+    rb'\["'
+    + _PLAIN
+    + rb'(?:\\(?:["\\/bfnrt]|u[0-9a-f]{4})'
+    + _PLAIN
+    + rb')*", (?:0|[1-9]\d*), (?:0|-?[1-9]\d*)\], (?=\[")'
 )
 """A photo of a record, as `json.dumps` writes it, before another one."""
 

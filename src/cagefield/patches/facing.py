@@ -38,16 +38,16 @@ HUE = 0.2
 """Greatest difference of a pair's colours over their means: more is another material."""
 
 SPREAD = 0.3
-"""Standard deviation of each component of a, about 0."""
+"""Standard deviation of each component of a, about 0: at 1 the side that faces away would be black."""
 
 ALIKE = 30.0
-"""Pairs that count as one."""
+"""Pairs that count as one: neighbours, and other views, see the same texture."""
 
 LEAST, LEAST_GAIN = 0.2, 0.01
 """Least brightness, so much of the mean; share of the loss of other pairs that facing must explain."""
 
-ENOUGH = 500
-"""Pairs from which it is fitted, at least."""
+ENOUGH, SIDE = 500, 0.1
+"""Pairs from which it is fitted, at least; share of them on one side of a middle that makes it a half."""
 
 
 @dataclass(frozen=True)
@@ -114,17 +114,17 @@ def facing_of(first: Surfels, second: Surfels, change: Array) -> Facing | None:
     if len(change) < ENOUGH:
         return None
     noise = max(1.4826 * float(np.median(np.abs(change - np.median(change)))), 1e-3)
-    gains = []
+    gains: list[float] = []
     for along in first.points.T:
         half = along > np.median(along)
-        for one in (half, ~half):
+        for one in (half, ~half) if SIDE < half.mean() < 1.0 - SIDE else ():
             towards = _fitted(first.take(one), second.take(one), change[one], noise)
             left, usual = (
                 loss(_left(each, first.take(~one), second.take(~one), change[~one], noise))
                 for each in (towards, np.zeros(3))
             )
-            gains.append(1.0 - left / usual)
-    if np.mean(gains) < LEAST_GAIN:
+            gains.append(1.0 - left / usual if usual > 0.0 else 0.0)
+    if not gains or np.mean(gains) < LEAST_GAIN:
         return None
     x, y, z = (float(value) for value in _fitted(first, second, change, noise))
     return Facing((x, y, z))

@@ -224,6 +224,7 @@ class Work:
         cast = Lighting.of(under, lit, log, self.apart)
         before = [self.others, self.gone]
         log = ambience.log_light([rest, whole], moved) - ambience.log_light(before, part)
+        log = np.where(np.abs(log) < UNSEEN, 0.0, log)
         on_part = Lighting.of(self.before, part, log, self.apart)
         where = on_part.where & self.inside
         return cast, Lighting(where, on_part.log_ratio[self.inside[on_part.where]])

@@ -98,7 +98,10 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
             check_pixels(image, path.stat().st_size)
             if image.format in ("JPEG", "MPO"):
                 image.load = partial(_load_jpeg, image, file)
-            yield image
+            try:
+                yield image
+            finally:
+                image.__dict__.pop("load", None)  # it holds the picture
 
 
 def _load_jpeg(image: Image.Image, file: _PictureFile) -> Any:

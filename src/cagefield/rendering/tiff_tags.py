@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from typing import BinaryIO
 
-_ALWAYS, _DENSEST = 1 << 16, 64
+_ALWAYS, _DENSEST = 1 << 18, 64
 """Numbers that any file may have, and bytes of the file for each of them where it has more.
 
 A picture in strips or tiles has two of each, and their pixels; pillow takes 40 bytes for a number.

@@ -55,7 +55,7 @@ class Exports:
                 "the scene holds voxels; `cagefield export SCENE -o x.spz` fits splats to them"
             )
         if self._folder is None:
-            self._folder = TemporaryFolder("export")
+            self._folder = TemporaryFolder("export", tidy=False)
         export = _Export(number, page, f"{self._name}.{form}")
         self._exports[number] = export
         self._tell(_message(export, "running"))

@@ -6,6 +6,7 @@ import asyncio
 import multiprocessing
 import signal
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -21,11 +22,12 @@ async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=_serve, args=(there, work, args), daemon=True, name="cagefield-file")
+    waiting = ThreadPoolExecutor(1)  # minutes, often: not one of those that others wait for
     try:
         await asyncio.to_thread(process.start)
         there.close()
         try:
-            result = await asyncio.to_thread(here.recv)
+            result = await asyncio.get_running_loop().run_in_executor(waiting, here.recv)
         except EOFError:
             raise CagefieldError("the process that did this ended (out of memory?)") from None
         if isinstance(result, Exception):
@@ -34,6 +36,7 @@ async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
     finally:
         if process.pid is not None:
             process.terminate()
+        waiting.shutdown(wait=False)
 
 
 @warnings_in_one_line()

@@ -68,10 +68,12 @@ def application(
     async def life(_: Starlette) -> AsyncIterator[None]:
         asyncio.get_running_loop().set_default_executor(all_started())
         trimming = asyncio.create_task(giving_back())
-        editor.start()
-        yield
-        editor.close()
-        trimming.cancel()
+        try:
+            editor.start()
+            yield
+            editor.close()
+        finally:
+            trimming.cancel()
 
     async def socket(websocket: WebSocket) -> None:
         may_edit = websocket.scope["cagefield.role"] == "edit"

@@ -11,14 +11,20 @@ from typing import TypeVar
 T = TypeVar("T")
 
 THREADS = 8
-"""Threads that work at a time; more work waits."""
+"""Threads that work at a time; more work waits: on disks, mostly, which are no faster with more of them."""
 
 
 def all_started(count: int = THREADS) -> ThreadPoolExecutor:
     """Threads that have all begun, so that none more is there after hours, nor the memory that each keeps."""
     executor, met = ThreadPoolExecutor(count, thread_name_prefix="work"), threading.Barrier(count)
-    for begun in [executor.submit(met.wait) for _ in range(count)]:
-        begun.result()
+    try:
+        waiting = [executor.submit(met.wait) for _ in range(count)]
+    except RuntimeError:  # the system allows no more
+        met.abort()
+        executor.shutdown()
+        return all_started(count // 2) if count > 1 else ThreadPoolExecutor(1)
+    for each in waiting:
+        each.result()
     return executor
 
 

@@ -63,7 +63,7 @@ class OpenEditor:
             raise CagefieldError("another file is being opened; wait until it is there")
         async with self._is_opening:
             file_name = _file_name(name)
-            with TemporaryFolder("open") as folder:
+            with TemporaryFolder("open", tidy=False) as folder:
                 try:
                     await _receive(folder / file_name, content, size)
                     scene = await in_own_process(scene_of_file, folder / file_name)
