@@ -39,6 +39,11 @@ _PHOTO = re.compile(
 )
 """A photo of a record, as `json.dumps` writes it, before another one."""
 
+_PHOTOS = b'"files": ['
+
+_LONGEST_REST = 1 << 16
+"""Bytes of a record beside its photos but the last, at most."""
+
 _LONGEST = 1 << 20
 """Pixels of a photo's side: none is longer. Its square is above all focal lengths."""
 
@@ -71,9 +76,16 @@ def prepare_work(work: Path, record: Mapping[str, Any]) -> None:
 
 
 def _is_record(content: bytes) -> bool:
-    """Whether it is JSON as a record is; of many photos the last one's name and numbers are built."""
+    """Whether it is JSON as a record is: its photos are passed by one after another, and never built."""
+    begin = content.find(_PHOTOS) + len(_PHOTOS)
+    end = begin
+    if begin >= len(_PHOTOS):
+        while (photo := _PHOTO.match(content, end)) is not None:
+            end = photo.end()
+    if len(content) - end + begin > _LONGEST_REST:
+        return False
     try:
-        return isinstance(json_text.loads(_PHOTO.sub(b"", content)), dict)
+        return isinstance(json_text.loads(content[:begin] + content[end:]), dict)
     except ValueError:
         return False
 
