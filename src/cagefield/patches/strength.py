@@ -11,6 +11,8 @@ o the openness with the part, o' without it; a and b are the texture's, and so i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cagefield.patches.light import Ambience
@@ -51,6 +53,8 @@ def strength_of(work: Work, ambience: Ambience, support: Support, *, seed: int =
     if len(on) > SOME:
         on = np.random.default_rng(seed).choice(on, SOME, replace=False)
     seen, bright, along = seen.take(on), bright[on], along[on]
+    # The support faces one way, whatever its rough normals say.
+    ambience = replace(ambience, facing=None)
     alone = ambience.log_light([work.others], seen)
     shade = alone - ambience.log_light([work.others, work.gone], seen)
     kept = (shade < DEEPEST) & ~work.edit.inner.contains(seen.points)
