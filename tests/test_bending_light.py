@@ -21,6 +21,7 @@ from cagefield.patches.patcher import Patcher
 from cagefield.patches.splats import bent_splats
 from cagefield.rendering.renderer import Renderer
 from cagefield.sh import C0
+from solid_fields import db, solid_field
 from splat_rooms import LIGHT, REACH, STRENGTH
 from splat_rooms import room as splat_room
 
@@ -46,17 +47,7 @@ def room(lift: float, resolution: int = VERTICES) -> VoxelField:
     from_box, from_floor = (ndimage.distance_transform_edt(~solid) * edge for solid in (box, floor))
     other = np.where(floor, from_box, from_floor)
     rgb *= (1.0 - STRENGTH * np.clip(1.0 - other / REACH, 0.0, 1.0))[..., None]
-    away, nearest = ndimage.distance_transform_edt(~(floor | box), return_indices=True)
-    rgb = rgb[tuple(nearest)]
-    vertices = np.flatnonzero(away < 2.0)
-    density = np.where((floor | box).reshape(-1)[vertices], 2.0 / edge, 0.0)
-    return VoxelField(
-        np.array([[-1.0] * 3, [1.0] * 3]),
-        (resolution,) * 3,
-        vertices,
-        density.astype(np.float32),
-        ((rgb.reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
-    )
+    return solid_field(floor | box, rgb)
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -68,11 +59,6 @@ def seen(field: VoxelField, edits: EditStack) -> NDArray[np.float32]:
     """Pictures of a field under edits."""
     renderer = Renderer(field).with_edits(edits)
     return np.stack([renderer.render(camera, background="white").rgb for camera in cameras()])
-
-
-def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """PSNR of two pictures."""
-    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
 def test_what_is_lifted_takes_its_shade_off_the_ground():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
@@ -15,7 +14,7 @@ from cagefield.errors import EditError, EditFileError
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.sun import half_sphere
 from cagefield.scene import Scene
-from cagefield.sh import C0
+from solid_fields import db, solid_field
 
 FLOOR, TOP, HALF = -0.4, 0.1, 0.2
 SUN = np.array([0.6, 0.3, 0.74]) / np.linalg.norm([0.6, 0.3, 0.74])
@@ -48,17 +47,7 @@ def room(at: tuple[float, float] | None, *, sun: float = SHARE, resolution: int 
         sides = np.sign(np.take_along_axis(out, face[..., None], -1)[..., 0])
         light[box] = (1.0 - sun + sun * np.maximum(sides * SUN[face], 0.0))[box]
     rgb = rgb * light[..., None]
-    solid = floor | box
-    away_from, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
-    vertices = np.flatnonzero(away_from < 2.0)
-    density = np.where(solid.reshape(-1)[vertices], 2.0 / edge, 0.0)
-    return VoxelField(
-        np.array([[-1.0] * 3, [1.0] * 3]),
-        (resolution,) * 3,
-        vertices,
-        density.astype(np.float32),
-        ((rgb[tuple(nearest)].reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
-    )
+    return solid_field(floor | box, rgb)
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -73,11 +62,6 @@ def scene(field: VoxelField) -> Scene:
 def seen(shown: Scene) -> NDArray[np.float32]:
     """Pictures of a scene from some of its cameras."""
     return np.stack([shown.render(camera).rgb for camera in cameras()[::3]])
-
-
-def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """PSNR of two pictures."""
-    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
 def moved(relight: str | CastShadow) -> EditStack:

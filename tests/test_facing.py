@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.cameras import Camera, turntable
@@ -17,6 +16,7 @@ from cagefield.patches.facing import Facing, facing_of
 from cagefield.patches.surfels import Surfels
 from cagefield.scene import Scene
 from cagefield.sh import C0
+from solid_fields import db, solid_field
 
 FLOOR, RADIUS = -0.4, 0.3
 MIDDLE = np.array([0.0, 0.0, FLOOR + RADIUS])
@@ -35,18 +35,7 @@ def balls(towards: NDArray[np.float64], resolution: int = 64) -> VoxelField:
     normal = np.where(ball[..., None], away / np.maximum(length, 1e-9)[..., None], (0.0, 0.0, 1.0))
     texture = np.where(ball, 0.5, 0.5 + 0.05 * np.sin(9.0 * at[..., 0]) * np.sin(7.0 * at[..., 1]))
     light = texture * (1.0 + normal @ towards)
-    solid = floor | ball
-    from_solid, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
-    vertices = np.flatnonzero(from_solid < 2.0)
-    grey = np.broadcast_to(light[tuple(nearest)].reshape(-1, 1)[vertices], (len(vertices), 3))
-    density = np.where(solid.reshape(-1)[vertices], 2.0 / edge, 0.0)
-    return VoxelField(
-        np.array([[-1.0] * 3, [1.0] * 3]),
-        (resolution,) * 3,
-        vertices,
-        density.astype(np.float32),
-        ((grey - 0.5) / C0).astype(np.float32)[:, None],
-    )
+    return solid_field(floor | ball, np.repeat(light[..., None], 3, axis=-1))
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -70,11 +59,6 @@ def turned(relight: str, adjustment: str) -> EditStack:
     outer = Cage.box((0.0, 0.0, MIDDLE[2] + 0.02), (1.3, 1.3, 0.9)) if adjustment == "continuous" else None
     edit = Edit(cage, outer=outer, adjustment=adjustment, relight=relight, fill="none")  # type: ignore[arg-type]
     return EditStack([edit.rotate((0.0, 0.0, 80.0 if outer is None else 40.0))])
-
-
-def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """PSNR of two pictures."""
-    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
 @pytest.mark.parametrize("adjustment", ["discrete", "continuous"])

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from cagefield.cages import Cage
 from cagefield.cameras import Camera
@@ -22,24 +21,10 @@ from cagefield.patches.strength import STRONG, WEAK, strength_of
 from cagefield.patches.support import Support
 from cagefield.patches.work import Work
 from cagefield.scene import Scene
-from cagefield.sh import C0
+from solid_fields import solid_field
 from test_bending_light import INNER, LIGHT, OUTER
 from test_bending_light import room as gap_room
 from test_patches import cage, cameras, room
-
-
-def field_of(solid: NDArray[np.bool_], rgb: NDArray[np.float64]) -> VoxelField:
-    """A field that is opaque where it is solid [N,N,N]; empty vertices beside that have its colours."""
-    away, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
-    rgb, size = rgb[tuple(nearest)], len(solid)
-    vertices = np.flatnonzero(away < 2.0)
-    return VoxelField(
-        np.array([[-1.0] * 3, [1.0] * 3]),
-        (size,) * 3,
-        vertices,
-        np.where(solid.reshape(-1)[vertices], size, 0.0).astype(np.float32),
-        ((rgb.reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
-    )
 
 
 def handle(held: bool) -> VoxelField:
@@ -51,7 +36,7 @@ def handle(held: bool) -> VoxelField:
     rod = (np.hypot(x + 0.4, y) < 0.12) & (z > -0.07) & (z < 0.8) & held
     rgb = np.where(rod[..., None], 0.6, (0.8, 0.2, 0.15)) * np.ones((*x.shape, 1))
     rgb[(np.hypot(x + 0.4, y) < 0.2) & (z < -0.2) & held] = 0.0
-    return field_of((box & ~within) | rod, rgb)
+    return solid_field((box & ~within) | rod, rgb)
 
 
 @pytest.mark.parametrize("keep_source", [True, False])
@@ -94,7 +79,7 @@ def test_a_rim_in_deep_shade_does_not_colour_what_is_filled() -> None:
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     away = np.hypot(x, y)
     rgb = np.where((away < 0.35)[..., None], 0.15, 0.6) * np.ones((*x.shape, 3))
-    block = block_of(field_of(z < 0.01, rgb), EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
+    block = block_of(solid_field(z < 0.01, rgb), EditStack(), np.array([[-1.0] * 3, [1.0] * 3]))
     far = np.hypot(*(np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, indexing="ij")))) / 20.0
     hole = far < 0.24
     support = Support(

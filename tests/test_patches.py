@@ -30,16 +30,12 @@ from cagefield.patches.support import Support
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
 from cagefield.scene import Scene
+from solid_fields import db, solid_field
 
 C0 = 0.28209479177387814
 FLOOR, TOP = -0.5, 0.1
 STRENGTH = 0.7
 """How much of its light a corner lacks."""
-
-
-def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """PSNR of two pictures."""
-    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
 def room(box: bool, *, scale: float = 1.0, resolution: int = 44, reach: float = 0.3) -> VoxelField:
@@ -62,18 +58,7 @@ def room(box: bool, *, scale: float = 1.0, resolution: int = 44, reach: float = 
         other = np.where(floor, from_block, from_floor)
         rgb *= (1.0 - STRENGTH * np.clip(1.0 - other / reach, 0.0, 1.0))[..., None]
         rgb[floor & (np.abs(x - 0.1) < 0.25) & (np.abs(y) < 0.25)] = 0.0
-    # As in a trained field, the empty vertices beside a surface have its colours.
-    away, nearest = ndimage.distance_transform_edt(~solid, return_indices=True)
-    rgb = rgb[tuple(nearest)]
-    vertices = np.flatnonzero(away < 2.0)
-    density = np.where(solid.reshape(-1)[vertices], 2.0 / (edge * scale), 0.0)
-    return VoxelField(
-        np.array([[-scale] * 3, [scale] * 3]),
-        (resolution,) * 3,
-        vertices,
-        density.astype(np.float32),
-        ((rgb.reshape(-1, 3)[vertices] - 0.5) / C0).astype(np.float32)[:, None],
-    )
+    return solid_field(solid, rgb, scale)
 
 
 def cage(scale: float = 1.0) -> Cage:

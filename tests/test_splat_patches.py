@@ -31,6 +31,7 @@ from cagefield.rendering.splat_renderer import SplatRenderer
 from cagefield.rendering.splat_splitting import split_of
 from cagefield.scene import Scene
 from cagefield.sh import C0
+from solid_fields import db
 from splat_rooms import LIGHT, REACH, STEP, STRENGTH, cage, room
 
 
@@ -43,11 +44,6 @@ def seen(field: SplatField, edits: EditStack, scale: float = 1.0) -> NDArray[np.
     """Pictures [3,H,W,3] of a field under edits."""
     renderer = SplatRenderer(field).with_edits(edits)
     return np.stack([renderer.render(camera, background="white").rgb for camera in cameras(scale)])
-
-
-def db(a: NDArray[np.floating], b: NDArray[np.floating]) -> float:
-    """PSNR of two pictures."""
-    return float(-10.0 * np.log10(max(float(((a - b) ** 2).mean()), 1e-12)))
 
 
 def patched(field: SplatField, edit: Edit, light: Ambience | None = LIGHT) -> EditStack:

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from cagefield.patches.robust import loss, softened
+from cagefield.patches.robust import loss, noise_of, softened
 from cagefield.patches.seen import Sight
-from cagefield.patches.surfels import Surfels
+from cagefield.patches.surfels import Surfels, evened
 from cagefield.typing import AnyArray, Array
 
 SOME, PAIRS = 40_000, 20_000
@@ -89,20 +89,17 @@ def turned_pairs(sight: Sight, apart: Sequence[float], *, seed: int = 0) -> Turn
     first, second = first[kept], second[kept]
     change = sight.bright[second] - sight.bright[first]
     reach = min(apart)
-    return TurnedPairs(_evened(surface, first, reach), _evened(surface, second, reach), change)
+    return TurnedPairs(_smoothed(surface, first, reach), _smoothed(surface, second, reach), change)
 
 
-def _evened(surface: Surfels, rows: NDArray[np.int64], reach: float) -> Surfels:
+def _smoothed(surface: Surfels, rows: NDArray[np.int64], reach: float) -> Surfels:
     """Some elements of a surface, their normals means of those around."""
     points, normals = surface.points[rows], surface.normals[rows]
     found, others = surface.nearest(points, AROUND, reach)
     near = np.isfinite(found)
     beside = surface.normals[np.where(near, others, 0)]
     for _ in range(TIMES):
-        alike = near & (np.einsum("nki,ni->nk", beside, normals) > ALONG)
-        mean = np.einsum("nki,nk->ni", beside, alike.astype(np.float64))
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        normals = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), normals)
+        normals = evened(normals, beside, near, ALONG)
     return Surfels(points, normals)
 
 
@@ -113,7 +110,7 @@ def facing_of(first: Surfels, second: Surfels, change: Array) -> Facing | None:
     """
     if len(change) < ENOUGH:
         return None
-    noise = max(1.4826 * float(np.median(np.abs(change - np.median(change)))), 1e-3)
+    noise = noise_of(change)
     gains: list[float] = []
     for along in first.points.T:
         half = along > np.median(along)

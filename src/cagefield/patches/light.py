@@ -26,7 +26,7 @@ from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.block import SOLID, Block
 from cagefield.patches.facing import Facing, TurnedPairs, facing_of, turned_pairs
-from cagefield.patches.robust import softened
+from cagefield.patches.robust import noise_of, softened
 from cagefield.patches.seen import SeenPairs, Sight
 from cagefield.patches.sun import Sun, sun_of
 from cagefield.patches.surfels import Surfels, gridded
@@ -143,11 +143,11 @@ def ambience_of(field: VoxelField, sight: Sight) -> Ambience:
     change = pairs.log_change
 
     usual = np.array(USUAL)
-    noise = float(np.median(np.abs(change - np.median(change)))) * 1.4826
+    noise = noise_of(change)
 
     def residuals(weights: Array) -> Array:
         ambience = Ambience(reaches, tuple(weights))
-        told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / max(noise, 1e-3)
+        told = (ambience.log_openness(second) - ambience.log_openness(first) - change) / noise
         corner = (weights.sum() - usual.sum()) / CORNER
         return np.concatenate([softened(told) / np.sqrt(ALIKE), (weights - usual) / SPREAD, [corner]])
 

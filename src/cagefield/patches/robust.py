@@ -13,6 +13,15 @@ HUBER = 3.0
 """Standard deviations of noise from which on what is left counts by its size, no longer by its square."""
 
 
+LEAST = 1e-3
+"""Least standard deviation of logs of brightness: a thousandth cannot be seen."""
+
+
+def noise_of(values: Array) -> float:
+    """The standard deviation of values [N] but for those far off, by their median; at least LEAST."""
+    return max(1.4826 * float(np.median(np.abs(values - np.median(values)))), LEAST)
+
+
 def softened(left: Array) -> Array:
     """What is left over [N], in standard deviations, so that its squares are the loss."""
     return np.asarray(np.sign(left) * HUBER * np.sqrt(2.0 * (np.sqrt(1.0 + (left / HUBER) ** 2) - 1.0)))

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from cagefield.patches.light import Ambience
+from cagefield.patches.robust import noise_of
 from cagefield.patches.support import NEAR, Support
 from cagefield.patches.work import Work
 
@@ -67,7 +68,7 @@ def strength_of(work: Work, ambience: Ambience, support: Support, *, seed: int =
     weight, found = np.ones(len(shade)), np.array([1.0, float(np.median(bright + shade)), 0.0, 0.0])
     for _ in range(ROUNDS):
         left = bright - table @ found
-        noise = max(1.4826 * float(np.median(np.abs(left - np.median(left)))), 1e-3)
+        noise = noise_of(left)
         weight = share / np.maximum(1.0, np.abs(left) / (HUBER * noise)) / noise**2
         normal = table.T @ (weight[:, None] * table) + np.diag([SPREAD**-2, 1e-9, 1.0, 1.0])
         target = table.T @ (weight * bright) + np.array([SPREAD**-2, 0.0, 0.0, 0.0])

@@ -253,9 +253,13 @@ def _smooth(points: Array, normals: Array, reach: float) -> Array:
     near = np.isfinite(found)
     rows = np.where(near, rows, 0)
     for _ in range(TIMES):
-        others = normals[rows]
-        alike = near & (np.einsum("nki,ni->nk", others, normals) > ALIKE)
-        mean = np.einsum("nki,nk->ni", others, alike.astype(np.float64))
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        normals = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), normals)
+        normals = evened(normals, normals[rows], near, ALIKE)
     return normals
+
+
+def evened(normals: Array, beside: Array, near: Mask, cosine: float) -> Array:
+    """Unit normals [N,3]: means of those `beside` [N,K,3], `near` [N,K], that face much the same way."""
+    alike = near & (np.einsum("nki,ni->nk", beside, normals) > cosine)
+    mean = np.einsum("nki,nk->ni", beside, alike.astype(np.float64))
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    return np.where(length > 1e-6, mean / np.maximum(length, 1e-12), normals)
