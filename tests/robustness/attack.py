@@ -29,6 +29,10 @@ LARGE_SLACK = 0
 """The same where the honest files are large (`large_readers.py`)."""
 
 
+Work = tuple[str, int, int]
+"""A reader, and the first and (not included) the last of its inputs."""
+
+
 @dataclass
 class Outcome:
     """What came of the inputs of a reader."""
@@ -74,22 +78,29 @@ def attack(
     Inputs with faults are kept in a folder, if one is given. With `large` the readers are those of
     `large_readers.py`, whose honest files are large, and judged by LARGE_SLACK.
     """
-    found = {name: Outcome(slack=LARGE_SLACK if large else SLACK) for name in names}
-    left = [(name, first) for name in found]
-    while left:
+    return _attacked([(name, first, last) for name in names], (seed, large), kept)
+
+
+def attack_by(name: str, numbers: Iterable[int]) -> Outcome:
+    """Reads those inputs of a reader, in one process for as long as it lives."""
+    return _attacked([(name, number, number + 1) for number in numbers], ("", False), None)[name]
+
+
+def _attacked(work: list[Work], how: tuple[str, bool], kept: Path | None) -> dict[str, Outcome]:
+    found = {name: Outcome(slack=LARGE_SLACK if how[1] else SLACK) for name, _, _ in work}
+    while work:
         with tempfile.TemporaryDirectory(prefix="cagefield-attack-") as folder:
-            left = _batch(Path(folder), left, last, (seed, large), found, kept)
+            work = _batch(Path(folder), work, how, found, kept)
     return found
 
 
 def _batch(
     folder: Path,
-    work: list[tuple[str, int]],
-    last: int,
+    work: list[Work],
     how: tuple[str, bool],
     found: dict[str, Outcome],
     kept: Path | None,
-) -> list[tuple[str, int]]:
+) -> list[Work]:
     """One process: to the end, or to the input that ended it; what is left is returned.
 
     `how`: the seed of the damages, and whether the readers are the large ones.
@@ -97,7 +108,7 @@ def _batch(
     seed, large = how
     # Python's own allocator keeps arenas that others' small objects are in, of which nothing is seen then.
     environment = os.environ | ({"PYTHONMALLOC": "malloc"} if large else {})
-    arguments = [part for name, first in work for part in (name, str(first), str(last))]
+    arguments = [str(part) for each in work for part in each]
     module = "large_readers" if large else "readers"
     command = [sys.executable, str(Path(__file__).with_name("attacked_reader.py")), str(folder), seed, module]
     log = folder / "stderr"
@@ -122,7 +133,7 @@ def _batch(
                     used = _used(process.pid) - spent
                     if now >= 0 and (used > HANG or time.monotonic() - begun > WAIT):
                         _end(found[name], name, now, "hung", f"after {used:.0f} s", file, kept)
-                        return _after(work, name, now, last)
+                        return _after(work, name, now)
                     continue
                 said = json.loads(line)
                 if "honest" in said:
@@ -137,7 +148,7 @@ def _batch(
             if now >= 0:
                 tail = log.read_text(errors="replace").strip().splitlines()[-1:]
                 _end(found[name], name, now, "died", f"{process.wait()} {tail}", file, kept)
-                return _after(work, name, now, last)
+                return _after(work, name, now)
             if process.wait() != 0:
                 raise RuntimeError(f"{name} {done}: {log.read_text(errors='replace')[-2000:]}")
             return []
@@ -145,10 +156,11 @@ def _batch(
             process.kill()
 
 
-def _after(work: list[tuple[str, int]], name: str, number: int, last: int) -> list[tuple[str, int]]:
+def _after(work: list[Work], name: str, number: int) -> list[Work]:
     """What is left of the work after an input of a reader."""
-    at = [each for each, _ in work].index(name)
-    rest = [(name, number + 1)] if number + 1 < last else []
+    at = next(k for k, (each, first, last) in enumerate(work) if each == name and first <= number < last)
+    last = work[at][2]
+    rest = [(name, number + 1, last)] if number + 1 < last else []
     return [*rest, *work[at + 1 :]]
 
 
