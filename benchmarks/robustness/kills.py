@@ -1,7 +1,7 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
 python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
-    [--step 1] [--but N] [--minutes M] [--forked] [--writes] [--only NAME ...] [--out FILE.md]
+    [--step 1] [--but N] [--minutes M] [--tried N] [--forked] [--writes] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
 wanted, and at random moments; with --writes in the middle of every write, half of whose bytes are then in
@@ -9,8 +9,9 @@ the file. Editors (`cagefield view`) are killed while a page sends changes, save
 pictures; what the page was told is compared with what the next editor has. About an hour of one processor.
 
 --but N leaves out what a run with --step N has tried; --minutes M ends the kills of each command after that
-time, whose calls come in random order. --forked forks the slow commands too, of a process that has imported
-what they need: two to eight times as many kills in the same time.
+time, whose calls come in random order, and --tried N leaves out the first N of that order. --forked forks
+the slow commands too, of a process that has imported what they need: two to eight times as many kills in
+the same time.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ def main() -> None:
     parser.add_argument("--step", type=int, default=1, help="kills at every such call only")
     parser.add_argument("--but", type=int, default=0, help="not at every such call: they have been tried")
     parser.add_argument("--minutes", type=float, default=None, help="for each command's calls, at most")
+    parser.add_argument("--tried", type=int, default=0, help="so many have been, of the same calls")
     parser.add_argument("--forked", action="store_true", help="slow commands are forked, not started anew")
     parser.add_argument(
         "--writes", action="store_true", help="kills in the middle of writes, of files' content"
@@ -108,7 +110,7 @@ def _kill_command(name: str, found: kills.Killed, options: argparse.Namespace) -
     points *= 1 if slow else options.rounds
     random.Random(name).shuffle(points)
     begun = time.monotonic()
-    for at in points:
+    for at in points[options.tried :]:
         if options.minutes is not None and time.monotonic() - begun > 60.0 * options.minutes:
             break
         with tempfile.TemporaryDirectory() as folder:
