@@ -104,7 +104,8 @@ def test_what_is_no_frame_is_no_traceback(server: tuple[EditorServer, Path]) -> 
     """Before the server has let the page in, and after that."""
     for waiting in (False, True):
         with closing(page_line(server[0], waiting=waiting)) as line:
-            line.settimeout(2)  # bytes before it is let in are passed over, and it stays until pings fail, 40 s
+            # What comes before it is let in is passed over: the socket stays until pings fail, 40 s.
+            line.settimeout(2)
             line.sendall(b"\xff" * 100)
             _received(line)
     assert "Traceback" not in server[1].read_text()
