@@ -33,7 +33,7 @@ export class Presenter {
   /** Pictures that the next frame draws, and those drawn that are not on the screen yet. */
   private undrawn: Arrived[] = [];
   private drawn: Arrived[] = [];
-  /** Edits that the next frame shows. */
+  /** Edits that the next frame shows, and pictures that nobody gets to see. */
   private taken: number[] = [];
   /** The first camera message whose picture says what to orbit around, where that is yet to be seen. */
   private orbitFrom: number | null = null;
@@ -55,7 +55,7 @@ export class Presenter {
     this.drawn.push({ header, received, decoded });
   }
 
-  /** The next frame shows edits: the server may send the next ones. */
+  /** The next frame shows edits, or a picture came too late: the server may send the next ones. */
   acknowledge(edits: number[]): void {
     this.taken.push(...edits);
   }
@@ -75,13 +75,14 @@ export class Presenter {
         if (app.page.outdates(header)) {
           if (image instanceof ImageBitmap) image.close();
           app.viewport.invalidate();
+          this.acknowledge([header.picture]);
         } else {
           app.pictures.show(header, image, depth, app.camera.viewpoint(header.camera));
           this.orbitSeen(header.camera);
           this.last = header;
+          this.undrawn.push({ header, received, decoded });
         }
         this.news = performance.now();
-        this.undrawn.push({ header, received, decoded });
       } catch {
         app.say("a picture from the server could not be decoded", "warning");
         app.send({ type: "presented", picture: header.picture });
