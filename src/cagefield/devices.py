@@ -43,7 +43,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
                 "start a new process for another device"
             )
         return _started
-    import quadrants as qd
+    from cagefield.quadrants import qd
 
     qd.set_logging_level("error")
     # Kernels name constants, which `kernel_cache` sees to.

@@ -145,7 +145,7 @@ def _is_held(lock: Path) -> bool:
 def _source_digest() -> str:
     """A digest of the source in all folders that hold kernels."""
     sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
-    folders = {path.parent for path, source in sources.items() if b"import quadrants" in source}
+    folders = {path.parent for path, source in sources.items() if b"cagefield.quadrants import qd" in source}
     digest = hashlib.sha256()
     for path, source in sources.items():
         if path.parent in folders:

@@ -17,10 +17,10 @@ On a GPU the items keep their order.
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
+from cagefield.quadrants import qd
 
 LEAST = 512
 """Turns of a loop that Quadrants does not cut."""

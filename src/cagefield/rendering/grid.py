@@ -13,13 +13,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.devices import floats, ints
 from cagefield.fields.layers import places_of, slices_of
 from cagefield.fields.voxel import VoxelField
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import GridArgs
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 from cagefield.rendering.occupancy import BRICK, Occupancy

@@ -188,7 +188,7 @@ class Renderer:
 
     def _buffer(self, width: int, height: int) -> Any:
         """Where a march writes to; a numpy array on the CPU."""
-        import quadrants as qd
+        from cagefield.quadrants import qd
 
         if devices.current() == "cpu":
             return np.empty(width * height * 8, np.float32)

@@ -191,6 +191,6 @@ def project(
 
 def _empty(size: int) -> Any:
     """An uninitialised float32 array on the device."""
-    import quadrants as qd
+    from cagefield.quadrants import qd
 
     return qd.ndarray(dtype=qd.f32, shape=(max(1, size),))

@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.fields.voxel import VoxelField
 from cagefield.loops import deal_of
+from cagefield.quadrants import take_tensors
 from cagefield.rendering.kernels.tensor_maps import map_tensors
 from cagefield.warps.device_stack import DeviceStack, PackedStack
 from cagefield.warps.kernels.edit_maps import EditArgs
+
+take_tensors(torch.Tensor)
 
 
 class LayeredStack(PackedStack, Protocol):

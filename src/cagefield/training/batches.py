@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 
 from cagefield import devices
 from cagefield.devices import floats, ints
 from cagefield.loops import deal_of
+from cagefield.quadrants import qd
 from cagefield.training.exposure import Exposure
 from cagefield.training.grid_state import GridState
 from cagefield.training.kernels.gauss_newton_voxels import gauss_newton, laplacian

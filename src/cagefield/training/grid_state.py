@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import quadrants as qd
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
+from cagefield.quadrants import qd
 from cagefield.rendering import occupancy
 from cagefield.rendering.grid import brick_order, to_device, transform_of
 from cagefield.rendering.kernels.grid import GridArgs

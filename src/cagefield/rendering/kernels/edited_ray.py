@@ -9,8 +9,7 @@ are such stretches of the ray.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import vec3
 from cagefield.rendering.kernels.ray_grid import safe_inverse, slab, vec2
 from cagefield.warps.kernels.edit_maps import EditArgs, map_sample

@@ -4,9 +4,8 @@
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
 from cagefield import sh as harmonics
+from cagefield.quadrants import qd
 
 F32 = qd.types.ndarray(dtype=qd.f32, ndim=1)
 I32 = qd.types.ndarray(dtype=qd.i32, ndim=1)

@@ -2,9 +2,8 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
 from cagefield.loops import Deal, dealt, turns
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import U8, GridArgs, ivec3, to_grid, to_world, vec3
 from cagefield.warps.kernels.edit_maps import EditArgs, Nodes, map_sample
 

@@ -9,9 +9,8 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
 from cagefield.loops import Deal, dealt, turns
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.edited_ray import BENT, STAYED, STRAIGHT, EditedRay, edited_ray, map_along
 from cagefield.rendering.kernels.grid import (
     F32,

@@ -5,8 +5,7 @@ Points and reaches r are in grid coordinates; all of the box [point - r, point +
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import GridArgs, vec3
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 

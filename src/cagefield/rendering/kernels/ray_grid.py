@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import I32, contract, contract_velocity, ivec3, vec3
 
 vec2 = qd.types.vector(2, qd.f32)

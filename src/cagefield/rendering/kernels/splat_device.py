@@ -9,8 +9,7 @@ The oracle is `cagefield.rendering.splat_reference`.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels import splat_blending
 from cagefield.rendering.kernels.grid import F32, I32, sh_basis, vec3
 from cagefield.rendering.kernels.splat_blending import SUMS

@@ -2,9 +2,8 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
 from cagefield.loops import Deal, dealt, turns
+from cagefield.quadrants import qd
 from cagefield.warps.kernels.edit_maps import EditArgs, Params, map_sample
 from cagefield.warps.kernels.trilinear_hex import read3
 

@@ -6,7 +6,7 @@ accumulator, so that no atomics are needed and the sums do not depend on timing;
 shared, with atomic adds.
 """
 
-import quadrants as qd
+from cagefield.quadrants import qd
 
 HEAD = 4
 """Floats of a record before its colour gradients."""

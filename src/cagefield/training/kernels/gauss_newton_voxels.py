@@ -1,7 +1,6 @@
 """The kernels that make new densities and colours of a batch's records: Laplacian, diagonal Gauss-Newton."""
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import F32, I32, ivec3
 from cagefield.training.kernels.accumulators import HEAD
 

@@ -22,9 +22,8 @@ on a CPU.) b_v are trilinear weights.
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
 from cagefield.loops import Deal, dealt, turns
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import (
     F32,
     GridArgs,

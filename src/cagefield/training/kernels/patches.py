@@ -2,8 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import I32, GridArgs, vec3
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs, empty_run, safe_inverse, slab
 from cagefield.training.kernels.photos import PatchArgs, PhotoArgs

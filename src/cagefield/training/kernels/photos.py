@@ -4,8 +4,7 @@
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.rendering.kernels.grid import F32, I32, U8
 
 

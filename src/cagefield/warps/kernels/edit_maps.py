@@ -9,8 +9,7 @@ The float64 reference of everything here is `Edit.warp` and `EditStack.to_canoni
 
 from dataclasses import dataclass
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.warps.kernels.flow_shell import flow_sample
 from cagefield.warps.kernels.lattice import first_node, interpolate, to_nodes
 from cagefield.warps.kernels.trilinear_hex import image, in_box, locate, read3, times

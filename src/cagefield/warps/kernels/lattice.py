@@ -6,8 +6,7 @@ float64 reference is `lattice.Lattice`.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.warps.kernels.trilinear_hex import read3, times
 from cagefield.warps.packing import OFFSET, TO_NODES
 

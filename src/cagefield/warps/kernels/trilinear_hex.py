@@ -6,8 +6,7 @@ The records, and what xi, the bend and the image are, are those of `packing`. Th
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-import quadrants as qd
-
+from cagefield.quadrants import qd
 from cagefield.warps.kernels.flow_velocity import solve_columns
 from cagefield.warps.packing import AFFINE, BEND, CENTRE, IMAGE, LOW, MATRIX
 
