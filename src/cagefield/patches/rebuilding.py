@@ -2,7 +2,7 @@
 
 The densities are those of the surfaces around, at the same height over the support, and the colours are the
 membrane that spans the hole: each coefficient solves Laplace's equation between those at the hole's rim.
-Where a texture has a grain its lines go on (`patches.grain`).
+Where a texture has a grain its lines go on (`patches.grain`), and so does its pattern (`patches.pattern`).
 
 Source: Perez, Gangnet and Blake, "Poisson image editing" (2003), for the membrane (without guidance).
 """
@@ -17,6 +17,7 @@ from scipy.sparse.linalg import factorized
 from cagefield.patches.block import Block
 from cagefield.patches.footprint import HIGH, Footprint
 from cagefield.patches.grain import grain_of, streamed
+from cagefield.patches.pattern import patterned
 from cagefield.sh import sh_basis
 from cagefield.typing import AnyArray, Array, Float32, Mask
 
@@ -177,7 +178,8 @@ def _coloured(
     sure = given & (share < DOUBTED)
     given = sure if sure.any() else given
     unknown = (footprint.hole.reshape(-1) | (share > 0.0)).reshape(shape)
-    own, table = table, _spanned(unknown, given.reshape(shape), table)
+    firm = np.where(total > 0.0, 1.0 - share, 0.0) * ~footprint.hole.reshape(-1)
+    own, table = table, _spanned(unknown, given.reshape(shape), table, firm.reshape(shape))
     sh = block.sh.copy()
     beside = np.ravel_multi_index((u, v), shape)
     rows = (slot >= 0) & (share[beside] > 0.0) & (height < TOP) & (total[beside] > 0.0)
@@ -236,8 +238,12 @@ def _as_seen(sh: Float32, normal: Array) -> Array:
     return np.einsum("kd,ndc->nkc", np.linalg.solve(basis.T @ basis + firm, basis.T), seen)
 
 
-def _spanned(unknown: Mask, given: Mask, table: Array) -> Array:
-    """The rows [U*V,C] with those of the unknown [U,V]: the membrane's, and the grain's where it goes on."""
+def _spanned(unknown: Mask, given: Mask, table: Array, firm: Array) -> Array:
+    """The rows [U*V,C] with those of the unknown [U,V]: the membrane's, and the grain's where it goes on.
+
+    What is seen from all sides of them, the first three values, has the pattern around, and fits to the rows
+    themselves as far as these are `firm` [U,V].
+    """
     spanned = membrane(unknown, given, table)
     sought = unknown & ~given
     values = table[:, :3].sum(axis=1).reshape(given.shape)
@@ -245,6 +251,8 @@ def _spanned(unknown: Mask, given: Mask, table: Array) -> Array:
     rows, share = streamed(sought, given, table, grain)
     at = np.flatnonzero(sought)
     spanned[at] += share[:, None] * (rows - spanned[at])
+    own, start = (each[:, :3].reshape(*given.shape, 3) for each in (table, spanned))
+    spanned[at, :3] = patterned(sought, given, own, start, firm)[sought]
     return spanned
 
 

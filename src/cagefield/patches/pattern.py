@@ -1,0 +1,201 @@
+"""The pattern of a support goes on through a hole: every small patch there is like one that is known.
+
+A membrane, and lines that go on, are as near as one comes to what nobody saw, and leave a soft spot amid a
+pattern, which everybody sees. So from coarse to fine, and some times over, each patch that touches the hole
+finds the patch of what is known that is the most alike, and each column becomes the mean of what the patches
+over it say, those that are alike and near the rim counting the most.
+
+Source: Wexler, Shechtman and Irani, "Space-time completion of video" (2007), sections 3 and 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.linalg import eigh
+
+from cagefield.typing import Array, Mask
+
+HALF = 4
+"""Half the width of a patch, columns of its level."""
+
+LEVELS, ROUNDS = 4, (4, 5, 6, 8)
+"""Levels, each half as fine as the one before it, and how often patches are looked for on each."""
+
+FINE = 0.8
+"""Standard deviation of what a level is smoothed by before it is made coarser, columns."""
+
+SOME, ENOUGH = 4000, 20
+"""Known patches that others are compared with, at most; from how many on there is a pattern."""
+
+NARROW = 0.7
+"""Standard deviation of a patch's weights over its half width: its middle counts the most."""
+
+NUMBERS, LEARNT = 24, 2000
+"""Numbers that a patch is compared by, and patches that they are found from (principal components)."""
+
+INWARDS, DEEPEST = 1.3, 12.0
+"""How much less a patch counts for every column that it is farther from the rim, up to so many."""
+
+ALIKE = 75.0
+"""Percentile of the differences of patches from what they are most alike, at which they count less."""
+
+AT_ONCE = 512
+"""Patches that are compared at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """What `patterned` is given, on columns [U,V] of a width."""
+
+    sought: Mask
+    given: Mask
+    colours: Array
+    start: Array
+    firm: Array
+
+    def coarser(self) -> _Level:
+        """The same with columns twice as wide."""
+        share = ndimage.gaussian_filter(self.given.astype(np.float64), FINE)
+        mean = (
+            _smooth(np.where(self.given[..., None], self.colours, 0.0)) / np.maximum(share, 1e-6)[..., None]
+        )
+        # What is half firm is so on every level; its colours are smooth enough.
+        colours = np.where(self.given[..., None], mean, self.colours)
+        return _Level(
+            self.sought[::2, ::2],
+            self.given[::2, ::2],
+            colours[::2, ::2],
+            _smooth(self.start)[::2, ::2],
+            self.firm[::2, ::2],
+        )
+
+    def with_own(self, picture: Array) -> Array:
+        """A picture [U,V,C] of the sought columns, with the colours that are known."""
+        own = np.where(self.given, 1.0, np.where(self.sought, self.firm, 0.0))[..., None]
+        return np.asarray(picture + own * (self.colours - picture))
+
+
+def patterned(
+    sought: Mask, given: Mask, colours: Array, start: Array, firm: Array, *, seed: int = 0
+) -> Array:
+    """Colours [U,V,C] of the sought columns [U,V], by the pattern of the given ones [U,V].
+
+    colours [U,V,C]: the given columns', and those of sought ones that are `firm` [U,V], from 0 to 1, to which
+    the pattern fits; start [U,V,C]: what the sought ones are without a pattern, and stay where too few
+    patches are given.
+    """
+    levels = [_Level(sought & ~given, given, colours, start, firm)]
+    while len(levels) < LEVELS and min(given.shape) >> len(levels) > 2 * HALF:
+        levels.append(levels[-1].coarser())
+    chance = np.random.default_rng(seed)
+    found = levels[-1].start
+    for number, level in reversed([*enumerate(levels)]):
+        begun = found if number == len(levels) - 1 else _finer(found, level.given.shape)
+        found = _completed(level, begun, ROUNDS[number], chance)
+    return found
+
+
+def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Generator) -> Array:
+    """The picture [U,V,C] that was begun, with a pattern where it is sought, if enough of one is known."""
+    width = np.ones((2 * HALF + 1,) * 2, bool)
+    known = np.argwhere(ndimage.binary_erosion(level.given, width))
+    at = np.argwhere(ndimage.binary_dilation(level.sought, width) & (level.given | level.sought))
+    if len(known) < ENOUGH or not len(at):
+        return level.start
+    if len(known) > SOME:
+        known = known[chance.choice(len(known), SOME, replace=False)]
+    begun = np.where(level.sought[..., None], begun, level.start)
+    sources = _patches(level.with_own(begun), known)
+    compared = _Numbers.of(sources)
+    theirs = compared(sources)
+    away = np.minimum(ndimage.distance_transform_edt(level.sought), DEEPEST)
+    sure = INWARDS ** -away[tuple(at.T)]
+    for _ in range(rounds):
+        nearest, apart = _nearest(compared(_patches(level.with_own(begun), at)), theirs)
+        usual = max(float(np.percentile(apart, ALIKE)), 1e-12)
+        votes = _voted(at, sources[nearest], sure * np.exp(-0.5 * apart / usual), begun.shape)
+        begun = np.where(level.sought[..., None], votes, begun)
+    return begun
+
+
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """What patches [N,K,C] are compared by: the components [K*C,D] in which they differ the most."""
+
+    mean: Array
+    components: Array
+
+    @classmethod
+    def of(cls, patches: Array) -> _Numbers:
+        rows = _weighted(patches[:LEARNT])
+        mean = rows.mean(axis=0)
+        last = rows.shape[1] - 1
+        spread = (rows - mean).T @ (rows - mean)
+        return cls(mean, eigh(spread, subset_by_index=(max(0, last - NUMBERS + 1), last))[1])
+
+    def __call__(self, patches: Array) -> Array:
+        """[N,D] of patches [N,K,C]."""
+        return np.asarray((_weighted(patches) - self.mean) @ self.components)
+
+
+def _smooth(values: Array) -> Array:
+    """Values [U,V,C], smoothed."""
+    return np.asarray(ndimage.gaussian_filter(values, (FINE, FINE, 0.0)))
+
+
+def _finer(values: Array, shape: tuple[int, ...]) -> Array:
+    """Values [U,V,C] for columns half as wide, [*shape,C]."""
+    at = np.meshgrid(*(0.5 * np.arange(size) for size in shape[:2]), indexing="ij")
+    channels = [
+        ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(values.shape[-1])
+    ]
+    return np.stack(channels, axis=-1)
+
+
+def _window() -> tuple[NDArray[np.int64], Array]:
+    """(where the columns of a patch [K,2] are from its middle, their weights [K])."""
+    steps = np.arange(-HALF, HALF + 1)
+    away = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    return away, np.exp(-0.5 * (away**2).sum(axis=1) / (NARROW * HALF) ** 2)
+
+
+def _patches(picture: Array, at: NDArray[np.int64]) -> Array:
+    """The patches [N,K,C] of a picture [U,V,C] around columns [N,2]; its edge goes on."""
+    wide = np.pad(picture, ((HALF, HALF), (HALF, HALF), (0, 0)), mode="edge")
+    rows = at[:, None] + _window()[0] + HALF
+    return np.asarray(wide[rows[..., 0], rows[..., 1]])
+
+
+def _weighted(patches: Array) -> Array:
+    """Rows [N,K*C] whose distances are those of patches [N,K,C] with their weights."""
+    return np.asarray((patches * np.sqrt(_window()[1])[:, None]).reshape(len(patches), -1))
+
+
+def _nearest(these: Array, those: Array) -> tuple[NDArray[np.int64], Array]:
+    """(which of those [M,D] is the nearest to each of these [N,D], its squared distance [N])."""
+    rows, apart = np.zeros(len(these), np.int64), np.zeros(len(these))
+    length = (those**2).sum(axis=1)
+    for first in range(0, len(these), AT_ONCE):
+        each = slice(first, first + AT_ONCE)
+        far = length - 2.0 * these[each] @ those.T
+        rows[each] = far.argmin(axis=1)
+        apart[each] = far[np.arange(len(far)), rows[each]] + (these[each] ** 2).sum(axis=1)
+    return rows, np.maximum(apart, 0.0)
+
+
+def _voted(at: NDArray[np.int64], patches: Array, weight: Array, shape: tuple[int, ...]) -> Array:
+    """Means [U,V,C] of what patches [N,K,C] around columns [N,2] say, by weights [N]; 0 where none does."""
+    away, share = _window()
+    rows = at[:, None] + away
+    inside = ((rows >= 0) & (rows < shape[:2])).all(axis=2)
+    cell = np.ravel_multi_index(tuple(np.moveaxis(rows[inside], -1, 0)), shape[:2])
+    weights = (weight[:, None] * share)[inside]
+    size = shape[0] * shape[1]
+    total = np.maximum(np.bincount(cell, weights, size), 1e-300)
+    said = patches[inside]
+    sums = [np.bincount(cell, weights * said[:, c], size) / total for c in range(shape[2])]
+    return np.stack(sums, axis=-1).reshape(shape)
