@@ -155,16 +155,18 @@ class VoxelField:
         inside = ((g >= 0) & (g <= n - 1)).all(axis=1)
         base = np.clip(np.floor(g).astype(np.int64), 0, n - 2)
         frac = g - base
-        raw = np.zeros(len(g))
-        coefficients = np.zeros((len(g), *self.sh.shape[1:]))
-        for corner in range(8):
-            offset = np.array([corner & 1, corner >> 1 & 1, corner >> 2 & 1])
-            slot, stored = self.lookup(base + offset)
-            weight = np.where(offset == 1, frac, 1 - frac).prod(axis=1) * stored
-            raw += weight * self.density[slot]
-            coefficients += weight[:, None, None] * self.sh[slot]
         basis = spherical_harmonics.sh_basis(np.asarray(viewdirs), self.sh_degree)
-        rgb = np.clip(0.5 + np.einsum("nl,nlc->nc", basis, coefficients), 0, 1)
+        raw, colour = np.zeros(len(g)), np.full((len(g), 3), 0.5)
+        for corner in range(8):
+            offset = (corner & 1, corner >> 1 & 1, corner >> 2 & 1)
+            slot, stored = self.lookup(base + offset)
+            rows = np.flatnonzero(stored)
+            slot = slot[rows]
+            x, y, z = (frac[rows, k] if offset[k] else 1.0 - frac[rows, k] for k in range(3))
+            weight = x * y * z
+            raw[rows] += weight * self.density[slot]
+            colour[rows] += weight[:, None] * np.einsum("nl,nlc->nc", basis[rows], self.sh[slot])
+        rgb = np.clip(colour, 0, 1)
         sigma = np.where(inside, np.maximum(raw, 0), 0)
         return sigma.astype(np.float32), rgb.astype(np.float32)
 
