@@ -71,6 +71,14 @@ def test_one_colour_stays_one() -> None:
     np.testing.assert_allclose(filled(colours, gap)[1][gap], 0.25, atol=1e-9)
 
 
+def test_a_pattern_that_does_not_fit_is_left_out() -> None:
+    """Beside a rim of a colour that is nowhere else spots would show where the hole was."""
+    colours, gap = spots(), hole()
+    colours[hole(15.5) & ~gap] = (0.2, 0.4, 3.0)
+    start, found = filled(colours, gap)
+    assert np.abs(found - start)[gap].mean() < 0.02
+
+
 def test_where_little_is_known_all_stays_as_it_begins() -> None:
     colours, gap = spots(), ~hole(5.0)
     start, found = filled(colours, gap)

@@ -28,7 +28,7 @@ LEVELS, ROUNDS = 4, (4, 5, 6, 8)
 FINE = 0.8
 """Standard deviation of what a level is smoothed by before it is made coarser, columns."""
 
-SOME, ENOUGH = 4000, 20
+SOME, ENOUGH = 4000, 100
 """Known patches that others are compared with, at most; from how many on there is a pattern."""
 
 NARROW = 0.7
@@ -42,6 +42,12 @@ INWARDS, DEEPEST = 1.3, 12.0
 
 ALIKE = 75.0
 """Percentile of the differences of patches from what they are most alike, at which they count less."""
+
+FITS, STRANGE = 0.3, 1.0
+"""How far a patch at the rim is from what is most alike, over how far known patches are from their mean.
+
+Up to the first the pattern goes on there, from the second on what it begins as stays.
+"""
 
 AT_ONCE = 512
 """Patches that are compared at a time."""
@@ -95,17 +101,20 @@ def patterned(
     found = levels[-1].start
     for number, level in reversed([*enumerate(levels)]):
         begun = found if number == len(levels) - 1 else _finer(found, level.given.shape)
-        found = _completed(level, begun, ROUNDS[number], chance)
-    return found
+        found, fits = _completed(level, begun, ROUNDS[number], chance)
+    return np.asarray(start + fits[..., None] * (found - start))
 
 
-def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Generator) -> Array:
-    """The picture [U,V,C] that was begun, with a pattern where it is sought, if enough of one is known."""
+def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Generator) -> tuple[Array, Array]:
+    """(the picture [U,V,C] that was begun, with a pattern where it is sought, how well that fits [U,V]).
+
+    As it starts, where too little of a pattern is known.
+    """
     width = np.ones((2 * HALF + 1,) * 2, bool)
     known = np.argwhere(ndimage.binary_erosion(level.given, width))
     at = np.argwhere(ndimage.binary_dilation(level.sought, width) & (level.given | level.sought))
     if len(known) < ENOUGH or not len(at):
-        return level.start
+        return level.start, np.zeros(level.given.shape)
     if len(known) > SOME:
         known = known[chance.choice(len(known), SOME, replace=False)]
     begun = np.where(level.sought[..., None], begun, level.start)
@@ -119,7 +128,19 @@ def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Gener
         usual = max(float(np.percentile(apart, ALIKE)), 1e-12)
         votes = _voted(at, sources[nearest], sure * np.exp(-0.5 * apart / usual), begun.shape)
         begun = np.where(level.sought[..., None], votes, begun)
-    return begun
+    return begun, _fits(level, at, apart / max(float((theirs**2).sum(axis=1).mean()), 1e-12))
+
+
+def _fits(level: _Level, at: NDArray[np.int64], strange: Array) -> Array:
+    """How well [U,V] a pattern fits to what is given, by how strange [N] patches around columns [N,2] are."""
+    rim = level.given[tuple(at.T)]
+    unknown, fits = np.ones(level.given.shape, bool), np.zeros(level.given.shape)
+    unknown[tuple(at[rim].T)] = False
+    fits[tuple(at[rim].T)] = np.clip((STRANGE - strange[rim]) / (STRANGE - FITS), 0.0, 1.0)
+    if not unknown.all():
+        nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+        fits = ndimage.gaussian_filter(fits[tuple(nearest)], HALF)
+    return fits
 
 
 @dataclass(frozen=True, eq=False)
