@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from cagefield.patches import pattern
 from cagefield.patches.pattern import patterned
 from cagefield.patches.rebuilding import membrane
 from cagefield.typing import Array, Mask
@@ -48,6 +49,16 @@ def test_what_repeats_goes_on_as_it_is() -> None:
     start, found = filled(colours, gap)
     wrong, left = (np.abs(each - colours)[gap].mean() for each in (found, start))
     assert wrong < 0.2 * left
+
+
+def test_a_large_hole_goes_by_patches_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    colours, gap = tiles(), hole()
+    start, found = filled(colours, gap)
+    monkeypatch.setattr(pattern, "MOST", 100)
+    wrong, less, left = (
+        np.abs(each - colours)[gap].mean() for each in (found, filled(colours, gap)[1], start)
+    )
+    assert not np.array_equal(wrong, less) and less < 0.3 * left
 
 
 def test_spots_go_on() -> None:

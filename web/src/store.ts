@@ -176,6 +176,14 @@ export function relightable(editor: Editor): boolean {
   return selected(editor) !== null;
 }
 
+/** What the renderer still does before whole pictures come as they will, in words; null once they do. */
+export function awaited({ preparing, figures, state }: Editor): string | null {
+  if (preparing === null || preparing.done >= preparing.of) return null;
+  const patched = state?.edits.some((edit) => edit.enabled && (edit.fill !== "none" || edit.relight !== "none")) ?? false;
+  if (patched && figures.width > 0 && !figures.final) return "Working out what is filled, and the light";
+  return `Preparing the renderer ${preparing.done + 1}/${preparing.of} – a machine's first run only`;
+}
+
 /** Whether the selected edit uncovers something that can be filled; a copy leaves its source where it is. */
 export function fillable(editor: Editor): boolean {
   const edit = selected(editor);

@@ -3,7 +3,7 @@ import { Connection, socketAddress, type Handlers, type Socket } from "../src/co
 import { HELD, bindings, named } from "../src/keys";
 import { Latency } from "../src/latency";
 import { cageOverlay } from "../src/cage_overlay";
-import { LOOKING, START, Store, fillable, maySay, obstacle, relightable, selected, target } from "../src/store";
+import { LOOKING, START, Store, awaited, fillable, maySay, obstacle, relightable, selected, target } from "../src/store";
 import { Actions } from "../src/actions";
 import type { App } from "../src/app";
 import type { Pointer } from "../src/pointer";
@@ -65,6 +65,19 @@ describe("the store", () => {
     expect(target(now)).toBe("field");
     expect(target({ ...now, mode: "set", cage: "both" })).toBe("both");
     expect(target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) })).toBe("inner");
+  });
+
+  it("says what whole pictures wait for", () => {
+    const preparing = { type: "preparing", done: 0, of: 4 } as const;
+    const quick = { ...START.figures, width: 200, final: false };
+    const filled = state({ edits: [edit({ fill: "surroundings" })] });
+    const plain = state({ edits: [edit({ fill: "none", relight: "none" })] });
+    expect(awaited({ ...START, preparing, state: filled })).toContain("Preparing the renderer 1/4");
+    expect(awaited({ ...START, preparing, state: filled, figures: quick })).toContain("Working out");
+    expect(awaited({ ...START, preparing, state: plain, figures: quick })).toContain("Preparing the renderer 1/4");
+    expect(awaited({ ...START, preparing, state: filled, figures: { ...quick, final: true } })).toContain("Preparing");
+    expect(awaited({ ...START, preparing: { ...preparing, done: 4 }, state: filled, figures: quick })).toBeNull();
+    expect(awaited(START)).toBeNull();
   });
 
   it("knows what can be filled, and what light can go along with", () => {

@@ -49,8 +49,9 @@ FITS, STRANGE = 0.3, 1.0
 Up to the first the pattern goes on there, from the second on what it begins as stays.
 """
 
-AT_ONCE = 512
-"""Patches that are compared at a time."""
+MOST, AT_ONCE = 20_000, 512
+"""Patches of which each column has one of its own; of more, those some columns apart, at most HALF. And those
+that are compared at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +118,8 @@ def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Gener
         return level.start, np.zeros(level.given.shape)
     if len(known) > SOME:
         known = known[chance.choice(len(known), SOME, replace=False)]
+    apart = min(HALF, int(np.ceil(np.sqrt(len(at) / MOST))))
+    at = at[(at % apart == 0).all(axis=1)]
     begun = np.where(level.sought[..., None], begun, level.start)
     sources = _patches(level.with_own(begun), known)
     compared = _Numbers.of(sources)
@@ -124,11 +127,11 @@ def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Gener
     away = np.minimum(ndimage.distance_transform_edt(level.sought), DEEPEST)
     sure = INWARDS ** -away[tuple(at.T)]
     for _ in range(rounds):
-        nearest, apart = _nearest(compared(_patches(level.with_own(begun), at)), theirs)
-        usual = max(float(np.percentile(apart, ALIKE)), 1e-12)
-        votes = _voted(at, sources[nearest], sure * np.exp(-0.5 * apart / usual), begun.shape)
-        begun = np.where(level.sought[..., None], votes, begun)
-    return begun, _fits(level, at, apart / max(float((theirs**2).sum(axis=1).mean()), 1e-12))
+        nearest, strange = _nearest(level.with_own(begun), at, compared, theirs)
+        usual = max(float(np.percentile(strange, ALIKE)), 1e-12)
+        votes, total = _voted(at, sources, nearest, sure * np.exp(-0.5 * strange / usual), begun.shape)
+        begun = np.where((level.sought & (total > 0.0))[..., None], votes, begun)
+    return begun, _fits(level, at, strange / max(float((theirs**2).sum(axis=1).mean()), 1e-12))
 
 
 def _fits(level: _Level, at: NDArray[np.int64], strange: Array) -> Array:
@@ -196,27 +199,44 @@ def _weighted(patches: Array) -> Array:
     return np.asarray((patches * np.sqrt(_window()[1])[:, None]).reshape(len(patches), -1))
 
 
-def _nearest(these: Array, those: Array) -> tuple[NDArray[np.int64], Array]:
-    """(which of those [M,D] is the nearest to each of these [N,D], its squared distance [N])."""
-    rows, apart = np.zeros(len(these), np.int64), np.zeros(len(these))
+def _nearest(
+    picture: Array, at: NDArray[np.int64], compared: _Numbers, those: Array
+) -> tuple[NDArray[np.int64], Array]:
+    """(which numbers [M,D] are the nearest to those of a picture's patches [N], how far they are)."""
+    rows, apart = np.zeros(len(at), np.int64), np.zeros(len(at))
     length = (those**2).sum(axis=1)
-    for first in range(0, len(these), AT_ONCE):
+    for first in range(0, len(at), AT_ONCE):
         each = slice(first, first + AT_ONCE)
-        far = length - 2.0 * these[each] @ those.T
+        these = compared(_patches(picture, at[each]))
+        far = length - 2.0 * these @ those.T
         rows[each] = far.argmin(axis=1)
-        apart[each] = far[np.arange(len(far)), rows[each]] + (these[each] ** 2).sum(axis=1)
+        apart[each] = far[np.arange(len(far)), rows[each]] + (these**2).sum(axis=1)
     return rows, np.maximum(apart, 0.0)
 
 
-def _voted(at: NDArray[np.int64], patches: Array, weight: Array, shape: tuple[int, ...]) -> Array:
-    """Means [U,V,C] of what patches [N,K,C] around columns [N,2] say, by weights [N]; 0 where none does."""
+def _voted(
+    at: NDArray[np.int64],
+    sources: Array,
+    nearest: NDArray[np.int64],
+    weight: Array,
+    shape: tuple[int, ...],
+) -> tuple[Array, Array]:
+    """(means [U,V,C] of what patches [M,K,C] say, sums of their weights [U,V]).
+
+    Those that are the nearest [N] say it `at` columns [N,2], each with a weight [N].
+    """
     away, share = _window()
-    rows = at[:, None] + away
-    inside = ((rows >= 0) & (rows < shape[:2])).all(axis=2)
-    cell = np.ravel_multi_index(tuple(np.moveaxis(rows[inside], -1, 0)), shape[:2])
-    weights = (weight[:, None] * share)[inside]
     size = shape[0] * shape[1]
-    total = np.maximum(np.bincount(cell, weights, size), 1e-300)
-    said = patches[inside]
-    sums = [np.bincount(cell, weights * said[:, c], size) / total for c in range(shape[2])]
-    return np.stack(sums, axis=-1).reshape(shape)
+    sums, total = np.zeros((size, shape[2])), np.zeros(size)
+    # As many at a time as are quick: their patches are copied.
+    for first in range(0, len(at), 8 * AT_ONCE):
+        each = slice(first, first + 8 * AT_ONCE)
+        rows = at[each, None] + away
+        inside = ((rows >= 0) & (rows < shape[:2])).all(axis=2)
+        cell = np.ravel_multi_index(tuple(np.moveaxis(rows[inside], -1, 0)), shape[:2])
+        weights = (weight[each, None] * share)[inside]
+        said = sources[nearest[each]][inside]
+        total += np.bincount(cell, weights, size)
+        for channel in range(shape[2]):
+            sums[:, channel] += np.bincount(cell, weights * said[:, channel], size)
+    return (sums / np.maximum(total, 1e-300)[:, None]).reshape(shape), total.reshape(shape[:2])

@@ -1,5 +1,6 @@
 /** The line at the bottom: why a drag stopped, what the server said, how fast pictures come. */
 import type { App } from "../app";
+import { awaited } from "../store";
 import { h } from "./dom";
 
 const NOTICE_STAYS = 12000;
@@ -33,11 +34,11 @@ export function status(app: App): HTMLElement {
     if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
   });
   let late: ReturnType<typeof setTimeout> | undefined;
-  app.store.watch(["preparing"], ({ preparing: p }) => {
-    const goesOn = p !== null && p.done < p.of;
-    if (goesOn) preparing.textContent = `Preparing the renderer ${p.done + 1}/${p.of} – a machine's first run only`;
-    preparing.title = "Kernels are compiled for this machine and kept. Until then pictures may wait for seconds.";
-    if (!goesOn) {
+  preparing.title = "Kernels are compiled for a machine and kept; what edits uncover, and their shadows, for a scene that is open";
+  app.store.watch(["preparing", "figures", "state"], (now) => {
+    const words = awaited(now);
+    if (preparing.textContent !== (words ?? "")) preparing.textContent = words;
+    if (words === null) {
       clearTimeout(late);
       late = undefined;
       preparing.hidden = true;
