@@ -276,9 +276,7 @@ export class PageRenderer {
   }
 
   private header(width: number, height: number): PictureHeader {
-    // Edits of a drag, and the first ones after a reconnection, are of coarse lattices: better ones come.
-    const best = this.scene.edits?.header.final === true;
-    const final = best && this.drawsStills && this.still.whole && width === this.app.viewport.pixels.width;
-    return ownHeader(this.app, this.scene.edits, [width, height], final, this.took);
+    const whole = this.drawsStills && this.still.whole && width === this.app.viewport.pixels.width;
+    return ownHeader(this.app, this.scene.edits, [width, height], whole, this.took);
   }
 }

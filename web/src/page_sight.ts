@@ -37,8 +37,12 @@ export function isServed({ presenter, camera, store }: App, edits: TakenEdits | 
   return same && last.revision >= edits.header.revision && (last.final || !all);
 }
 
-/** What one of the page's pictures shows, in the words for the server's; those are numbered from 1. */
-export function ownHeader({ camera, store }: App, edits: TakenEdits | null, size: [number, number], final: boolean, renderMs: number): PictureHeader {
+/**
+ * What one of the page's pictures shows, in the words for the server's; those are numbered from 1. A `whole` one is
+ * final unless better edits come: those of a drag, and the first ones after a reconnection, are of coarse lattices.
+ */
+export function ownHeader({ camera, store }: App, edits: TakenEdits | null, size: [number, number], whole: boolean, renderMs: number): PictureHeader {
+  const final = whole && edits?.header.final === true;
   const { view, before, split } = store.now;
   const { drag, seq, revision } = edits?.header ?? { drag: 0, seq: 0, revision: 0 };
   const [width, height] = size;

@@ -1,7 +1,9 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
+import { ownHeader } from "../src/page_sight";
 import { Presenter } from "../src/presenter";
 import { Store } from "../src/store";
 import type { App } from "../src/app";
+import type { TakenEdits } from "../src/page_scene";
 import type { PictureHeader } from "../src/protocol";
 
 const HEADER: PictureHeader = {
@@ -50,4 +52,11 @@ it("says of a picture that came too late that the next may come, and shows the f
   await vi.waitFor(() => expect(show).toHaveBeenCalled());
   frame();
   expect([store.now.figures.page, store.now.figures.renderMs, presenter.last?.picture]).toEqual([false, 60, 8]);
+});
+
+it("calls a whole picture of the page's own final once its edits are", () => {
+  const app = { store: new Store(), camera: { seq: 3 } } as unknown as App;
+  const taken = (final: boolean): TakenEdits => ({ header: { drag: 0, seq: 0, revision: 2, final }, received: 0, taken: 0 }) as unknown as TakenEdits;
+  const finals = [taken(true), taken(false), null].flatMap((edits) => [true, false].map((whole) => ownHeader(app, edits, [4, 2], whole, 1).final));
+  expect(finals).toEqual([true, false, false, false, false, false]);
 });

@@ -43,9 +43,8 @@ class Grain:
 
 def grain_of(values: Array, given: Mask, span: Callable[[Mask, Array], Array]) -> Grain:
     """The grain of values [U,V] where they are given [U,V], and beyond, by a membrane `span`."""
-    weight = ndimage.gaussian_filter(given.astype(np.float64), FINE)
-    smooth = ndimage.gaussian_filter(np.where(given, values, 0.0), FINE) / np.maximum(weight, 1e-6)
-    slope = np.stack(np.gradient(smooth), axis=-1)
+    smooth = smoothed(values[..., None], given)[..., 0]
+    slope = np.stack([np.gradient(smooth, axis=axis) for axis in (0, 1)], axis=-1)
     whole = ndimage.binary_erosion(given, np.ones((3, 3), bool))
     tensor = np.einsum("uvi,uvj->uvij", slope, slope)[..., (0, 0, 1), (0, 1, 1)] * whole[..., None]
     share = ndimage.gaussian_filter(whole.astype(np.float64), WIDE)
@@ -59,6 +58,13 @@ def grain_of(values: Array, given: Mask, span: Callable[[Mask, Array], Array]) -
     apart = (a - c) ** 2 + 4.0 * b**2
     alike = apart / np.maximum((a + c) ** 2, 1e-30)
     return Grain(np.stack([np.cos(angle), np.sin(angle)], axis=-1), np.clip(alike, 0.0, 1.0))
+
+
+def smoothed(values: Array, given: Mask) -> Array:
+    """Values [U,V,C] of columns, each a mean of those nearby that are given [U,V]."""
+    share = ndimage.gaussian_filter(given.astype(np.float64), FINE)[..., None]
+    own = np.where(given[..., None], values, 0.0)
+    return np.asarray(ndimage.gaussian_filter(own, (FINE, FINE, 0.0)) / np.maximum(share, 1e-6))
 
 
 def streamed(unknown: Mask, given: Mask, table: Array, grain: Grain) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ Source: Wexler, Shechtman and Irani, "Space-time completion of video" (2007), se
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.linalg import eigh
 
+from cagefield.patches.grain import smoothed
 from cagefield.typing import Array, Mask
 
 HALF = 4
@@ -24,9 +26,6 @@ HALF = 4
 
 LEVELS, ROUNDS = 4, (4, 5, 6, 8)
 """Levels, each half as fine as the one before it, and how often patches are looked for on each."""
-
-FINE = 0.8
-"""Standard deviation of what a level is smoothed by before it is made coarser, columns."""
 
 SOME, ENOUGH = 4000, 100
 """Known patches that others are compared with, at most; from how many on there is a pattern."""
@@ -66,17 +65,13 @@ class _Level:
 
     def coarser(self) -> _Level:
         """The same with columns twice as wide."""
-        share = ndimage.gaussian_filter(self.given.astype(np.float64), FINE)
-        mean = (
-            _smooth(np.where(self.given[..., None], self.colours, 0.0)) / np.maximum(share, 1e-6)[..., None]
-        )
         # What is half firm is so on every level; its colours are smooth enough.
-        colours = np.where(self.given[..., None], mean, self.colours)
+        colours = np.where(self.given[..., None], smoothed(self.colours, self.given), self.colours)
         return _Level(
             self.sought[::2, ::2],
             self.given[::2, ::2],
             colours[::2, ::2],
-            _smooth(self.start)[::2, ::2],
+            smoothed(self.start, np.ones_like(self.given))[::2, ::2],
             self.firm[::2, ::2],
         )
 
@@ -121,7 +116,7 @@ def _completed(level: _Level, begun: Array, rounds: int, chance: np.random.Gener
     apart = min(HALF, int(np.ceil(np.sqrt(len(at) / MOST))))
     at = at[(at % apart == 0).all(axis=1)]
     begun = np.where(level.sought[..., None], begun, level.start)
-    sources = _patches(level.with_own(begun), known)
+    sources = _patches(_widened(level.with_own(begun)), known)
     compared = _Numbers.of(sources)
     theirs = compared(sources)
     away = np.minimum(ndimage.distance_transform_edt(level.sought), DEEPEST)
@@ -166,11 +161,6 @@ class _Numbers:
         return np.asarray((_weighted(patches) - self.mean) @ self.components)
 
 
-def _smooth(values: Array) -> Array:
-    """Values [U,V,C], smoothed."""
-    return np.asarray(ndimage.gaussian_filter(values, (FINE, FINE, 0.0)))
-
-
 def _finer(values: Array, shape: tuple[int, ...]) -> Array:
     """Values [U,V,C] for columns half as wide, [*shape,C]."""
     at = np.meshgrid(*(0.5 * np.arange(size) for size in shape[:2]), indexing="ij")
@@ -180,6 +170,7 @@ def _finer(values: Array, shape: tuple[int, ...]) -> Array:
     return np.stack(channels, axis=-1)
 
 
+@functools.cache
 def _window() -> tuple[NDArray[np.int64], Array]:
     """(where the columns of a patch [K,2] are from its middle, their weights [K])."""
     steps = np.arange(-HALF, HALF + 1)
@@ -187,9 +178,13 @@ def _window() -> tuple[NDArray[np.int64], Array]:
     return away, np.exp(-0.5 * (away**2).sum(axis=1) / (NARROW * HALF) ** 2)
 
 
-def _patches(picture: Array, at: NDArray[np.int64]) -> Array:
-    """The patches [N,K,C] of a picture [U,V,C] around columns [N,2]; its edge goes on."""
-    wide = np.pad(picture, ((HALF, HALF), (HALF, HALF), (0, 0)), mode="edge")
+def _widened(picture: Array) -> Array:
+    """A picture [U,V,C] whose edge goes on for half a patch."""
+    return np.pad(picture, ((HALF, HALF), (HALF, HALF), (0, 0)), mode="edge")
+
+
+def _patches(wide: Array, at: NDArray[np.int64]) -> Array:
+    """The patches [N,K,C] around columns [N,2] of a picture that was widened."""
     rows = at[:, None] + _window()[0] + HALF
     return np.asarray(wide[rows[..., 0], rows[..., 1]])
 
@@ -204,10 +199,10 @@ def _nearest(
 ) -> tuple[NDArray[np.int64], Array]:
     """(which numbers [M,D] are the nearest to those of a picture's patches [N], how far they are)."""
     rows, apart = np.zeros(len(at), np.int64), np.zeros(len(at))
-    length = (those**2).sum(axis=1)
+    length, wide = (those**2).sum(axis=1), _widened(picture)
     for first in range(0, len(at), AT_ONCE):
         each = slice(first, first + AT_ONCE)
-        these = compared(_patches(picture, at[each]))
+        these = compared(_patches(wide, at[each]))
         far = length - 2.0 * these @ those.T
         rows[each] = far.argmin(axis=1)
         apart[each] = far[np.arange(len(far)), rows[each]] + (these**2).sum(axis=1)

@@ -34,7 +34,7 @@ export function status(app: App): HTMLElement {
     if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
   });
   let late: ReturnType<typeof setTimeout> | undefined;
-  preparing.title = "Kernels are compiled for a machine and kept; what edits uncover, and their shadows, for a scene that is open";
+  preparing.title = "Kernels are compiled once for a machine; what edits uncover, and their shadows, are worked out when a scene is opened";
   app.store.watch(["preparing", "figures", "state"], (now) => {
     const words = awaited(now);
     if (preparing.textContent !== (words ?? "")) preparing.textContent = words;
