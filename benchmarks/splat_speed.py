@@ -93,8 +93,8 @@ def training_row(count: int, width: int, height: int, folder: Path) -> tuple[str
     points = SparsePoints(field.means, np.full((count, 3), 128, np.uint8))
     dataset = Dataset("random", folder, views, (), (), False, field.bounds, False, points=points)
     run = SplatRun(dataset, SplatConfig(steps=10**6, splats=count))
-    run._photo(0, 0.5)
-    milliseconds = least(lambda: run._photo(0, 0.5))
+    run.step_photo(0, 0.5)
+    milliseconds = least(lambda: run.step_photo(0, 0.5))
     return f"{width}x{height}", str(len(run.state)), number(milliseconds, 1)
 
 

@@ -24,13 +24,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Tells the pages who draws, and threads not to spin while they wait.
+    """Tells the pages who draws, kernels to run on the CPU unless CAGEFIELD_DEVICE names another device, and
+    threads not to spin while they wait.
 
     Test processes share the cores: threads that spin take them from the other processes, whose threads spin
     too, and small networks and products of small matrices then take five to twenty times as long. Libraries
     read this when they are loaded: OpenMP with PyTorch and Numba, later; OpenBLAS in the processes that this
     one starts, those of `pytest -n` and the editor's.
     """
+    os.environ.setdefault("CAGEFIELD_DEVICE", "cpu")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("--page-renderer"):

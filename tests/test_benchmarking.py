@@ -19,7 +19,7 @@ from cagefield.benchmarking.compare import seen
 from cagefield.benchmarking.edits import measure, write_picture
 from cagefield.benchmarking.edits_table import Revealed, Score, table
 from cagefield.benchmarking.figures import Figures, changed_pixels, compare, mean_psnr, supersampled
-from cagefield.benchmarking.machine import Machine
+from cagefield.benchmarking.machine import Machine, device_name
 from cagefield.benchmarking.mapped_photographs import MappedScene
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
@@ -394,8 +394,20 @@ def test_numbers() -> None:
 
 def test_machine_is_named() -> None:
     machine = Machine.here()
-    assert machine.cpu and machine.cores >= 1 and machine.device in ("cpu", "cuda", "metal", "vulkan")
+    assert machine.cpu and machine.cores >= 1
+    assert machine.device.partition(" (")[0] in ("cpu", "cuda", "metal", "vulkan")
     assert f"{machine.cores} cores, device {machine.device}" in str(machine)
+
+
+def test_a_gpu_is_named_where_its_driver_tells(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tool = tmp_path / "nvidia-smi"
+    tool.write_text("#!/bin/sh\necho 'NVIDIA Example 9000'\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert device_name("cuda") == "cuda (NVIDIA Example 9000)"
+    assert device_name("cpu") == "cpu"
+    tool.unlink()
+    assert device_name("cuda") == "cuda"
 
 
 # -- frame times -------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from cagefield.training.splat_run import SplatRun
 from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_run import VoxelRun
 
-devices.start("cpu")
+devices.start()
 
 Parts = dict[str, Any]
 

@@ -18,7 +18,7 @@ from scenes import ball_field
 
 @pytest.fixture(scope="module", autouse=True)
 def device() -> None:
-    devices.start("cpu")
+    devices.start()
 
 
 def small(number: int) -> Edit:

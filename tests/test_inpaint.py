@@ -16,7 +16,7 @@ from cagefield.training import inpaint
 from cagefield.training.inpaint import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
 from cagefield.training.visibility import LEAST_TRANSMITTANCE, unseen_vertices
 
-devices.start("cpu")
+devices.start()
 
 N = 41
 BOUNDS = np.array([[-1.0] * 3, [1.0] * 3])

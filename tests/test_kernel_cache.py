@@ -49,7 +49,7 @@ def triple(out: I32):
         out[n] *= 3
 
 with warnings_in_one_line():
-    devices.start("cpu")
+    devices.start()
     exec(sys.argv[1])
     values = np.array([1, 2], np.int32)
     double(values)

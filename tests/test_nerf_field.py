@@ -238,9 +238,9 @@ def test_an_ndc_picture_is_the_one_from_ndc_rays() -> None:
     alpha = 1 - np.exp(-sigma.reshape(z.shape) * length)
     weights = alpha * np.cumprod(np.concatenate([np.ones((36, 1)), 1 - alpha + 1e-10], 1), 1)[:, :-1]
     expected = (weights[..., None] * rgb.reshape(36, 12, 3)).sum(1)
-    coarse, _ = march(field.torch, Rays.of(camera, torch.device("cpu")))
+    coarse, _ = march(field.torch, Rays.of(camera, field.torch.device))
     # float32 positions up to 1e6 away; the last sample stops 1e-6 before infinity
-    np.testing.assert_allclose(coarse.premultiplied.numpy(), expected, atol=1e-4)
+    np.testing.assert_allclose(coarse.premultiplied.cpu().numpy(), expected, atol=1e-4)
 
 
 def test_rays_away_from_a_forward_facing_capture_see_nothing() -> None:
@@ -330,10 +330,10 @@ def test_emptied_samples_have_no_density() -> None:
 def test_pixels_may_be_chosen() -> None:
     field = small_field()
     pixels = np.array([[3, 1], [0, 7]])
-    rgb, opacity, depth = trace(field.torch, Rays.of(camera(), torch.device("cpu"), pixels))
+    rgb, opacity, depth = trace(field.torch, Rays.of(camera(), field.torch.device, pixels))
     whole = render_nerf(field, camera(), background="black")
-    np.testing.assert_allclose(rgb.numpy(), [whole.rgb[1, 3], whole.rgb[7, 0]], atol=1e-6)
-    np.testing.assert_allclose(depth.numpy(), [whole.depth[1, 3], whole.depth[7, 0]], rtol=1e-5)
+    np.testing.assert_allclose(rgb.cpu().numpy(), [whole.rgb[1, 3], whole.rgb[7, 0]], atol=1e-6)
+    np.testing.assert_allclose(depth.cpu().numpy(), [whole.depth[1, 3], whole.depth[7, 0]], rtol=1e-5)
     assert opacity.shape == (2,)
 
 
@@ -341,12 +341,12 @@ def test_lindisp_samples_are_even_in_disparity() -> None:
     from cagefield.rendering.nerf import stratified_samples
 
     field = small_field(lindisp=True, near=1.0, far=4.0, samples=(4, 0))
-    s = stratified_samples(field, Rays.of(camera(1), torch.device("cpu")), 4, None)
-    np.testing.assert_allclose(1 / s[0], [1.0, 0.75, 0.5, 0.25], rtol=1e-6)
+    s = stratified_samples(field, Rays.of(camera(1), field.torch.device), 4, None)
+    np.testing.assert_allclose(1 / s[0].cpu(), [1.0, 0.75, 0.5, 0.25], rtol=1e-6)
 
 
 def in_float64(field: NerfField) -> TorchNerf:
-    double = TorchNerf(field, torch.device("cpu"))
+    double = TorchNerf(field, field.torch.device)
     for network in (double.coarse, double.fine):
         assert network is not None
         network.layers = {name: (w.double(), b.double()) for name, (w, b) in network.layers.items()}
@@ -355,8 +355,9 @@ def in_float64(field: NerfField) -> TorchNerf:
 
 def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None) -> np.ndarray:
     """Normals [N,3] by central differences of the edited sigma, at the renderer's samples and weights."""
-    rays = Rays.of(camera, torch.device("cpu"))
-    mapped = None if edits is None else TensorMap(edits, torch.device("cpu"), preserve_opacity=False)
+    device = field.torch.device
+    rays = Rays.of(camera, device)
+    mapped = None if edits is None else TensorMap(edits, device, preserve_opacity=False)
     double = in_float64(field)
 
     def sigma(points: torch.Tensor, viewdirs: torch.Tensor) -> torch.Tensor:
@@ -371,11 +372,11 @@ def numeric_normals(field: NerfField, camera: Camera, edits: EditStack | None) -
         points, along = points.double(), along.double()
         # the edits' map is float32; NDC rays end a million units away
         size = (1e-6 if mapped is None else 1e-3) * points.norm(dim=1, keepdim=True).clamp_min(1.0)
-        offsets = [size * axis for axis in torch.eye(3)]
+        offsets = [size * axis for axis in torch.eye(3, device=device)]
         slopes = torch.stack([sigma(points + o, along) - sigma(points - o, along) for o in offsets], dim=1)
         own = torch.nn.functional.normalize(slopes, dim=1, eps=1e-30).reshape(*sums.t.shape, 3)
         total = -(own * sums.weights[..., None] * (sums.weights[..., None] > 1e-4)).sum(1)
-    return torch.nn.functional.normalize(total, dim=1).numpy()
+    return torch.nn.functional.normalize(total, dim=1).cpu().numpy()
 
 
 @pytest.mark.parametrize("name", ["none", "ndc", "move", "flow", "trilinear, then move"])

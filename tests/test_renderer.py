@@ -15,7 +15,7 @@ from cagefield.rendering.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
 from cagefield.rendering.renderer import Renderer
 
-devices.start("cpu")
+devices.start()
 
 N = 49
 CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=40, height=32, fov_x=0.75)

@@ -32,7 +32,7 @@ EDITS = {
 
 @pytest.fixture(scope="module")
 def plain() -> Renderer:
-    devices.start("cpu")
+    devices.start()
     return Renderer(ball_field(resolution=33))
 
 
@@ -79,7 +79,7 @@ def test_the_coarse_occupancy_holds_the_fine_one_and_shows_the_same(plain: Rende
 
 @pytest.mark.parametrize("seed", [0, 2])
 def test_the_coarse_occupancy_holds_what_is_squeezed_strongly(seed: int) -> None:
-    devices.start("cpu")
+    devices.start()
     dots = np.random.default_rng(seed).integers(21, 76, (12, 3))
     field = VoxelField(
         bounds=np.array([[-1.0] * 3, [1.0] * 3]),

@@ -252,7 +252,7 @@ def test_revisions_that_a_page_may_show_are_remembered() -> None:
 
 @pytest.fixture(scope="module")
 def renderers() -> RendererCache:
-    devices.start("cpu")
+    devices.start()
     return RendererCache(ball_scene())
 
 

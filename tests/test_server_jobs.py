@@ -23,7 +23,7 @@ from cagefield.server.render_worker.tasks import EndJobTask, Failed, FrameTask, 
 from full_disks import files_up_to
 from scenes import ball_scene, files_of
 
-devices.start("cpu")
+devices.start()
 
 
 @dataclass

@@ -30,7 +30,7 @@ CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=8, height=8, fov_x=0.8)
 
 @pytest.fixture
 def renderers() -> RendererCache:
-    devices.start("cpu")
+    devices.start()
     return RendererCache(ball_scene())
 
 

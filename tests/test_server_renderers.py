@@ -46,7 +46,7 @@ from scenes import ball_scene
 from sent_pictures import pixels_of
 
 # Kernels: imported once a device runs.
-devices.start("cpu")
+devices.start()
 
 from cagefield.rendering.kernels.mapped_points import map_points  # noqa: E402
 from cagefield.rendering.kernels.march import march_tiles  # noqa: E402
@@ -63,7 +63,7 @@ WHOLE = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 
 @pytest.fixture(scope="module")
 def renderers() -> RendererCache:
-    devices.start("cpu")
+    devices.start()
     return RendererCache(ball_scene())
 
 
@@ -234,7 +234,7 @@ def test_specks_do_not_count_when_a_cage_is_fitted() -> None:
 
 
 def test_the_grid_bends_with_the_edit() -> None:
-    devices.start("cpu")
+    devices.start()
     lines = grid_lines(MOVED.replace(lattice=None))
     warp = MOVED.replace(lattice=None).warp
     points = np.concatenate([np.array(line) for line in lines])

@@ -57,7 +57,7 @@ PART = Region(0, 0, SIDE, SIDE, SIDE, SIDE)
 
 @pytest.fixture(scope="module")
 def renderers() -> RendererCache:
-    devices.start("cpu")
+    devices.start()
     return RendererCache(splat_scene())
 
 

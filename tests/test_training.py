@@ -19,9 +19,17 @@ from cagefield.training.progress import Snapshots
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
 
-devices.start("cpu")
+devices.start()
+
+REPRODUCIBLE = not devices.is_gpu()
+"""On a GPU many rays add to one voxel, in any order."""
 
 CONFIG = VoxelConfig(steps=150, resolution=48, batch_rays=1024)
+
+
+def assert_same(found, expected):
+    """Equal, or on a GPU as close as sums in another order stay over a run."""
+    np.testing.assert_allclose(found, expected, atol=0.0 if REPRODUCIBLE else 1e-2, rtol=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -54,8 +62,8 @@ def test_it_learns_views_it_has_not_seen(trained):
 
 def test_the_seed_decides(dataset, trained):
     again = train_voxel(dataset, CONFIG, evaluate=False)
-    np.testing.assert_array_equal(again.field.density, trained.field.density)
-    np.testing.assert_array_equal(again.field.sh, trained.field.sh)
+    assert_same(again.field.density, trained.field.density)
+    assert_same(again.field.sh, trained.field.sh)
     other = train_voxel(
         dataset, VoxelConfig(steps=150, resolution=48, batch_rays=1024, seed=1), evaluate=False
     )
@@ -78,7 +86,7 @@ def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path)
     second = train_voxel(dataset, CONFIG, checkpoint=checkpoint, resume=True, evaluate=False)
     assert second.finished
     np.testing.assert_array_equal(second.field.vertices, trained.field.vertices)
-    np.testing.assert_array_equal(second.field.density, trained.field.density)
+    assert_same(second.field.density, trained.field.density)
 
     def no_step(progress):
         raise AssertionError("a finished run took a step")
@@ -89,7 +97,7 @@ def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path)
     )
     assert third.finished and third.steps == 150
     assert checkpoint.stat().st_mtime_ns == written
-    np.testing.assert_array_equal(third.field.density, trained.field.density)
+    assert_same(third.field.density, trained.field.density)
 
 
 def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, trained):
@@ -108,10 +116,12 @@ def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, t
     assert list(fields) == [2, 90, 150]
     # At the end, what no photo showed is filled; the rest stays.
     kept = np.searchsorted(trained.field.vertices, fields[150].vertices)
-    same = trained.field.density[kept] == fields[150].density
+    same = np.isclose(
+        trained.field.density[kept], fields[150].density, rtol=0.0, atol=0.0 if REPRODUCIBLE else 1e-2
+    )
     assert same.mean() > 0.7 and not same.all()
     assert (trained.field.density[kept][~same] == np.float32(OPAQUE / trained.field.voxel_size.max())).all()
-    np.testing.assert_array_equal(result.field.density, trained.field.density)
+    assert_same(result.field.density, trained.field.density)
     # A batch of 1,024 rays takes milliseconds; the second of sleep before it does not count.
     assert clock[91] - clock[90] < 0.5
 

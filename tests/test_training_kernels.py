@@ -11,7 +11,7 @@ from cagefield.datasets.views import View
 from cagefield.devices import floats
 from cagefield.loops import deal_of
 
-devices.start("cpu")
+devices.start()
 
 from cagefield.rendering.grid import to_device  # noqa: E402
 from cagefield.rendering.kernels.grid import ivec3  # noqa: E402

@@ -109,12 +109,14 @@ def test_targets_are_the_photos_colours_on_white(photos) -> None:
     dataset = load_dataset(photos)
     run = NerfRun(dataset, tiny(batch_rays=50))
     rays, target = run.next_batch()
-    origin = rays.origins[0].numpy()
+    origin = rays.origins[0].cpu().numpy()
     (view,) = [v for v in dataset.train if np.allclose(v.camera.origin, origin, atol=1e-5)]
-    pixels = view.camera.project(origin + 2.0 * rays.directions.numpy())[0].astype(int)
+    pixels = view.camera.project(origin + 2.0 * rays.directions.cpu().numpy())[0].astype(int)
     photo = view.load().astype(np.float64) / 255
     shown = photo[pixels[:, 1], pixels[:, 0]]
-    np.testing.assert_allclose(target.numpy(), shown[:, :3] * shown[:, 3:] + 1 - shown[:, 3:], atol=1e-5)
+    np.testing.assert_allclose(
+        target.cpu().numpy(), shown[:, :3] * shown[:, 3:] + 1 - shown[:, 3:], atol=1e-5
+    )
 
 
 def test_presets_have_the_papers_networks_and_small_ones() -> None:
@@ -191,7 +193,19 @@ def test_no_views_have_no_psnr(photos) -> None:
 
 def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
-    argv = [photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 60, "--resolution", 24]
+    argv = [
+        photos,
+        "-o",
+        tmp_path / "scene",
+        "--field",
+        "nerf",
+        "--preset",
+        "small",
+        "--steps",
+        60,
+        "--resolution",
+        24,
+    ]
     text = printed(capsys, "train", *argv)
     assert (
         "60 steps, networks of 3 x 24, 4 + 2 octaves, sampled from depth" in text and "; train PSNR" in text
@@ -225,7 +239,19 @@ def test_the_voxels_of_a_nerf_have_the_degree_that_is_asked_for(
 
 def test_a_training_whose_baking_failed_is_kept(photos, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
-    argv = [photos, "-o", tmp_path / "scene", "--field", "nerf", "--steps", 60, "--resolution", 24]
+    argv = [
+        photos,
+        "-o",
+        tmp_path / "scene",
+        "--field",
+        "nerf",
+        "--preset",
+        "small",
+        "--steps",
+        60,
+        "--resolution",
+        24,
+    ]
     bake_scene = bake.bake_scene
 
     def fails(error: BaseException) -> None:

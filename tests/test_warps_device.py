@@ -18,7 +18,7 @@ EPS = float(np.finfo(np.float32).eps)
 
 @pytest.fixture(scope="module", autouse=True)
 def device() -> None:
-    devices.start("cpu")
+    devices.start()
 
 
 def samples(n: int = 20_000, reach: float = 1.1, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

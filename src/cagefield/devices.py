@@ -26,16 +26,21 @@ _started: str | None = None
 def start(device: str = "auto", *, double: bool = False) -> str:
     """The name of the running device: "cpu", "cuda", "metal" or "vulkan".
 
-    The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes
-    CUDA or Metal where there is one, else the CPU. With `double`, numbers that kernels give no type are
-    float64: for references, not for the renderer; the first call decides.
+    The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes what
+    the environment's CAGEFIELD_DEVICE names, else CUDA or Metal where there is one, else the CPU. With
+    `double`, numbers that kernels give no type are float64: for references, not for the renderer; the first
+    call decides.
 
     Raises:
         DeviceError: an unknown name, a device this machine lacks, or a second, different device.
     """
     global _started
+    where = ""
+    if device == "auto" and _started is None and os.environ.get("CAGEFIELD_DEVICE"):
+        device, where = os.environ["CAGEFIELD_DEVICE"], " of CAGEFIELD_DEVICE"
     if device not in get_args(DeviceName):
-        raise DeviceError(f"device {device!r} is unknown; choose one of {', '.join(get_args(DeviceName))}")
+        choices = ", ".join(get_args(DeviceName))
+        raise DeviceError(f"device {device!r}{where} is unknown; choose one of {choices}")
     if _started is not None:
         if device not in ("auto", _started):
             raise DeviceError(
@@ -72,7 +77,8 @@ def start(device: str = "auto", *, double: bool = False) -> str:
             )
     except Exception as error:
         raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
-    forgive()
+    if cache is not None:
+        forgive(cache)
     _started = chosen
     return chosen
 

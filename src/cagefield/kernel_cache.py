@@ -5,6 +5,7 @@ Where one cannot be used, or fails in the middle, a warning says so, and every p
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
 import functools
@@ -76,11 +77,22 @@ def cache_folder(name: str, within: str = "") -> Path | None:
     return folder
 
 
-def forgive() -> None:
-    """Has Quadrants go on where the folder can no longer be written while kernels are compiled."""
+def forgive(folder: Path) -> None:
+    """Has Quadrants go on where its folder can no longer be written while kernels are compiled, or when the
+    process ends."""
+    from quadrants.lang import impl
     from quadrants.lang._fast_caching.python_side_cache import PythonSideCache
 
     told: list[OSError] = []
+
+    def keep_none() -> None:
+        impl.current_cfg().offline_cache = False
+
+    def look_for_room() -> None:
+        with contextlib.suppress(OSError):
+            if shutil.disk_usage(folder).free >= LEAST_BYTES:
+                return
+        keep_none()
 
     def forgiven(method: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(method)
@@ -90,6 +102,7 @@ def forgive() -> None:
             except OSError as error:
                 if not told:
                     tell_that_none_are_kept(Path(cache.cache_folder).parent, error)
+                    keep_none()
                 told.append(error)
                 return None
 
@@ -106,6 +119,8 @@ def forgive() -> None:
     PythonSideCache.store = store
     for name in ("__init__", "store", "try_load"):
         setattr(PythonSideCache, name, forgiven(getattr(PythonSideCache, name)))
+    # As a process ends, Quadrants writes what it compiled for CUDA, and aborts where it cannot.
+    atexit.register(look_for_room)
 
 
 def _is_usable(part: Path) -> bool:

@@ -21,7 +21,7 @@ def _run(kind: str, size: int, photos: Path) -> Any:
     from cagefield import devices
     from cagefield.datasets import load_dataset
 
-    devices.start("cpu")
+    devices.start()
     dataset = load_dataset(photos)
     if kind == "voxel":
         from cagefield.training.voxel_config import VoxelConfig

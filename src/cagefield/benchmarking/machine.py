@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from cagefield import devices
 
 @dataclass(frozen=True)
 class Machine:
-    """CPU model, cores that this process may use, and the device that kernels run on."""
+    """CPU model, cores that this process may use, and the device that kernels run on, with a GPU's name."""
 
     cpu: str
     cores: int
@@ -21,13 +22,25 @@ class Machine:
     @classmethod
     def here(cls) -> Machine:
         """This machine; starts the default device where none runs yet."""
-        return cls(cpu_model(), devices.threads(), devices.start())
+        return cls(cpu_model(), devices.threads(), device_name(devices.start()))
 
     def __str__(self) -> str:
         return (
             f"{self.cpu}, {self.cores} cores, device {self.device}, "
             f"Python {platform.python_version()}, cagefield {cagefield.__version__}"
         )
+
+
+def device_name(device: str) -> str:
+    """The device, and the GPU's name as its driver gives it, where it does."""
+    if device != "cuda":
+        return device
+    try:
+        command = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
+        told = subprocess.run(command, capture_output=True, text=True, timeout=10.0, check=True).stdout
+    except (OSError, subprocess.SubprocessError):
+        return device
+    return f"{device} ({told.splitlines()[0].strip()})" if told.strip() else device
 
 
 def cpu_model() -> str:

@@ -28,6 +28,9 @@ from cagefield.training.voxel_config import VoxelConfig
 from cagefield.training.voxel_defaults import Settings
 from cagefield.training.voxel_space import VoxelSpace
 
+GPU_WORKERS = 1 << 15
+"""Rays that a GPU marches at once: what they note takes 16 kB each."""
+
 
 class Batches:
     """Batches of the patches of `photos`, and the device memory that they share."""
@@ -58,7 +61,7 @@ class Batches:
         """Device arrays: losses [rays] and exposure sums [rays * 6]; the grid's accumulator is filled."""
         config, photos, space = self._config, self._photos, self._space
         count, gpu = len(chosen), devices.is_gpu()
-        workers = count if gpu else grid.workers
+        workers = min(count * config.patch**2, GPU_WORKERS) if gpu else grid.workers
         patches, losses, penalties, sums = self._buffer(count)
         patches.from_numpy(np.ascontiguousarray(chosen).reshape(-1))
         cells = grid.args

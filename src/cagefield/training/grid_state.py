@@ -5,6 +5,7 @@ Notation as in `cagefield.rendering.grid`: slot 0 is the empty vertex; slots fol
 
 # Device arrays are created here, so this module is imported by the trainer only, once a device runs.
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cagefield import devices
 from cagefield.devices import ints
 from cagefield.fields.voxel import VoxelField
 from cagefield.quadrants import qd
@@ -21,8 +23,8 @@ from cagefield.rendering.kernels.grid import GridArgs
 from cagefield.rendering.kernels.ray_grid import OccupancyArgs
 from cagefield.training.kernels.accumulators import HEAD
 
-CHUNK = 2**18
-"""Vertices that are interpolated at once."""
+CHUNK, MOST_THREADS = 2**16, 8
+"""Vertices that a thread interpolates at once, and how many threads do."""
 
 MOST_BYTES = 2 * 1024**3
 """Memory of all accumulators together, at most: of a large grid many threads have fewer."""
@@ -242,7 +244,8 @@ class GridState:
         densities = np.empty(count, np.float32)
         colours = np.zeros((count, (degree + 1) ** 2, 3), np.float32)
         curvatures = np.empty((count, 2), np.float32)
-        for begin in range(0, count, CHUNK):
+
+        def interpolate(begin: int) -> None:
             part = slice(begin, min(begin + CHUNK, count))
             xyz = np.unravel_index(vertices[part], resolution)
             out = np.zeros((part.stop - begin, values.shape[1]), np.float32)
@@ -262,6 +265,9 @@ class GridState:
             densities[part] = out[:, 0]
             colours[part, :terms] = out[:, 1 : 1 + 3 * terms].reshape(-1, terms, 3)
             curvatures[part] = out[:, 1 + 3 * terms :] * volume
+
+        with ThreadPoolExecutor(min(devices.threads(), MOST_THREADS)) as threads:
+            list(threads.map(interpolate, range(0, count, CHUNK)))
         return GridState.build(
             bounds,
             resolution,

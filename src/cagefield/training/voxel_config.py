@@ -19,7 +19,7 @@ class VoxelConfig:
         sh_degree: degree of the colour's spherical harmonics, 0 to 2; None takes 2, or 1 for an unbounded
             capture.
         seed: of the batches, jitter and random backgrounds.
-        batch_rays: rays a batch; doubled for the last stage.
+        batch_rays: rays a batch, doubled for the last stage; None takes 4096, on a GPU by the clock 32768.
         patch: edge of a pixel patch.
         rate: (first, last) learning rate; None takes (8, 2), or (4, 0.4) for an unbounded capture.
         decay: of the running curvatures, for each touch of a voxel.
@@ -42,7 +42,7 @@ class VoxelConfig:
     resolution: int | None = None
     sh_degree: int | None = None
     seed: int = 0
-    batch_rays: int = 4096
+    batch_rays: int | None = None
     patch: int = 4
     rate: tuple[float, float] | None = None
     decay: float = 0.95

@@ -28,6 +28,9 @@ RAYS_PER_SECOND = 75_000.0
 SMALLEST, LARGEST = 64, 512
 """Limits of the resolution that is chosen; a larger grid may need more than 6 GiB of memory."""
 
+BATCH, GPU_BATCH = 4096, 32768
+"""Rays of a batch: on a CPU and of a run of so many steps, and on a GPU by the clock."""
+
 UNBOUNDED = 256
 """Resolution of an unbounded capture."""
 
@@ -41,16 +44,18 @@ class Settings:
     rate: tuple[float, float]
     smooth: float
     plain: float
+    batch_rays: int
 
 
 def settings(
     config: VoxelConfig, sizes: NDArray[np.int64], *, unbounded: bool, threads: int | None
 ) -> Settings:
     """The choices for photos of these sizes [V,2]; `threads` of the CPU, None on a GPU."""
+    batch = GPU_BATCH if threads is None and config.minutes is not None else BATCH
     chosen = (
-        Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3, 2e-2)
+        Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3, 2e-2, batch)
         if unbounded
-        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5, 3e-3)
+        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5, 3e-3, batch)
     )
     named = {field.name: getattr(config, field.name) for field in dataclasses.fields(Settings)}
     return dataclasses.replace(chosen, **{name: value for name, value in named.items() if value is not None})
@@ -59,7 +64,7 @@ def settings(
 def rays(config: VoxelConfig, threads: int | None) -> float:
     """How many rays a training takes, about; infinite on a GPU by the clock."""
     if config.minutes is None:
-        return float(config.steps * config.batch_rays)
+        return float(config.steps * (config.batch_rays or BATCH))
     return math.inf if threads is None else 60.0 * config.minutes * threads * RAYS_PER_SECOND
 
 

@@ -115,7 +115,7 @@ class VoxelRun:
 
     def next_batch(self, done: float) -> None:
         config = self._config
-        patches = self._patches.take((1 + self._schedule.last) * config.batch_rays // config.patch**2)
+        patches = self._patches.take((1 + self._schedule.last) * self._settings.batch_rays // config.patch**2)
         loss = self._batches.train(self._grid, patches, self.exposure, self.step, done)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
         self.rays += len(patches) * config.patch**2

@@ -120,15 +120,23 @@ def march_batch(
 ):
     """Adds the gradients and curvatures of a batch of patches to the accumulators; writes `loss`."""
     rays = patches.size * patches.size
-    per = (patches.count + work.workers - 1) // work.workers
+    total = patches.count * rays
+    # A CPU's worker takes patches that lie together; a GPU's neighbours take neighbouring rays.
+    per = (patches.count + work.workers - 1) // work.workers * rays
+    if qd.static(gpu):
+        per = (total + work.workers - 1) // work.workers
     for turn in range(turns(deal)):
         worker = dealt(turn, deal)
         base = 0
         if qd.static(not gpu):
             base = worker * work.record
-        for patch in range(qd.min(worker * per, patches.count), qd.min((worker + 1) * per, patches.count)):
-            for r in range(rays):
-                ray = patch * rays + r
+        for n in range(per):
+            ray = worker * per + n
+            if qd.static(gpu):
+                ray = n * work.workers + worker
+            if worker < work.workers and ray < total:
+                patch = ray // rays
+                r = ray % rays
                 view = patches.patches[3 * patch]
                 column = patches.patches[3 * patch + 1] + r % patches.size
                 row = patches.patches[3 * patch + 2] + r // patches.size

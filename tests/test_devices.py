@@ -1,0 +1,25 @@
+"""Which device is started, and what is said where none can be."""
+
+from __future__ import annotations
+
+import pytest
+
+from cagefield import devices
+from cagefield.errors import DeviceError
+
+
+def test_auto_takes_what_the_environment_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(devices, "_started", None)
+    monkeypatch.setenv("CAGEFIELD_DEVICE", "tpu")
+    line = "device 'tpu' of CAGEFIELD_DEVICE is unknown; choose one of auto, cpu, cuda, metal, vulkan"
+    with pytest.raises(DeviceError) as caught:
+        devices.start()
+    assert str(caught.value) == line
+
+
+def test_one_process_has_one_device() -> None:
+    running = devices.start()
+    other = "vulkan" if running != "vulkan" else "cpu"
+    assert devices.start("auto") == devices.start(running) == running
+    with pytest.raises(DeviceError, match=f"this process already runs on '{running}'"):
+        devices.start(other)
