@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from cagefield import caches
 from cagefield import kernel_cache as kept
 
 MAP = """
@@ -156,7 +157,7 @@ def test_folders_of_other_versions_and_locks_go_when_nobody_uses_them(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     kernels = tmp_path / "cagefield" / "kernels"
-    for name, age in (("old", kept.KEPT_SECONDS + 60.0), ("recent", 60.0)):
+    for name, age in (("old", caches.KEPT_SECONDS + 60.0), ("recent", 60.0)):
         (kernels / name).mkdir(parents=True)
         os.utime(kernels / name, 2 * (time.time() - age,))
     lock = kept.kernel_cache() / "kernel_compilation_manager" / "qdcache.lock"  # type: ignore[operator]

@@ -9,7 +9,6 @@ import atexit
 import contextlib
 import errno
 import functools
-import hashlib
 import os
 import shutil
 import time
@@ -18,8 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-KEPT_SECONDS = 30 * 86400.0
-"""How long kernels of other versions of the package are kept after they were last used."""
+from cagefield.caches import KEPT_SECONDS, cache_root, source_digest
 
 LOCKED_SECONDS = 60.0
 """How long a process may hold the lock of a folder of kernels: it writes a few megabytes."""
@@ -40,7 +38,7 @@ def kernel_cache() -> Path | None:
     removed.
     """
     # Quadrants ends the process where it cannot make this folder in its own.
-    folder = cache_folder(_source_digest(), "kernel_compilation_manager")
+    folder = cache_folder(source_digest(b"cagefield.quadrants import qd"), "kernel_compilation_manager")
     if folder is None:
         return None
     lock = folder / "kernel_compilation_manager" / "qdcache.lock"
@@ -64,7 +62,7 @@ def cache_folder(name: str, within: str = "") -> Path | None:
     """
     place: str | Path = "~/.cache/cagefield/kernels"
     try:
-        place = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
+        place = cache_root() / "kernels"
         folder = place / name
         (folder / within).mkdir(parents=True, exist_ok=True)
         os.utime(folder)
@@ -155,14 +153,3 @@ def _is_held(lock: Path) -> bool:
             return True
         time.sleep(0.02)
     return False
-
-
-def _source_digest() -> str:
-    """A digest of the source in all folders that hold kernels."""
-    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
-    folders = {path.parent for path, source in sources.items() if b"cagefield.quadrants import qd" in source}
-    digest = hashlib.sha256()
-    for path, source in sources.items():
-        if path.parent in folders:
-            digest.update(source)
-    return digest.hexdigest()[:16]

@@ -13,9 +13,10 @@ from cagefield.edits.options import CastShadow
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
 from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import bent_block, bent_voxels
+from cagefield.patches.bending import bent_block, bent_voxels, light_edit
 from cagefield.patches.block import Block
 from cagefield.patches.joining import joined
+from cagefield.patches.kept import Kept
 from cagefield.patches.light import Ambience, ambience_of, with_facing, with_sun
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
@@ -46,6 +47,7 @@ class Patcher:
         pastes: Pastes | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
+        self._on_disk = Kept(field, cameras)
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
         self._around: tuple[Key, Block] | None = None
         self._suns: dict[tuple[float, float, float] | None, Ambience] = {}
@@ -112,7 +114,10 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness, and where its surfaces face."""
-        return with_facing(ambience_of(self._voxels, self._sight), self._voxels, self._sight)
+        return self._on_disk.of(
+            ("ambience",),
+            lambda: with_facing(ambience_of(self._voxels, self._sight), self._voxels, self._sight),
+        )
 
     def _lit(self, edit: Edit) -> Ambience | None:
         """What goes along of the light of an edit; None where all stays."""
@@ -122,7 +127,10 @@ class Patcher:
             return self.ambience
         direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
         if direction not in self._suns:
-            self._suns[direction] = with_sun(self.ambience, self._voxels, self._sight, direction)
+            self._suns[direction] = self._on_disk.of(
+                ("sun", direction),
+                lambda: with_sun(self.ambience, self._voxels, self._sight, direction),
+            )
         return self._suns[direction]
 
     @cached_property
@@ -132,7 +140,7 @@ class Patcher:
 
     @cached_property
     def _sight(self) -> Sight:
-        return sight_of(self._render, self._cameras, self._field.bounds)
+        return self._on_disk.of(("sight",), lambda: sight_of(self._render, self._cameras, self._field.bounds))
 
     def _patch(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
@@ -157,20 +165,23 @@ class Patcher:
             return None
         ambience = lit if relit else None
         looks = relit or (edit.fill == "surroundings" and not edit.keep_source)
-        sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
-        patch: Patch | SplatPatch
-        if isinstance(self._field, VoxelField):
-            patch = patch_of(
-                self._field,
-                stack,
-                edit,
-                ambience,
-                settled=not moving,
-                sight=sight,
-                preserve_opacity=preserve_opacity,
-            )
-        else:
-            patch = splat_patch_of(self._field, stack, edit, ambience, settled=not moving, sight=sight)
+
+        def make() -> Patch | SplatPatch:
+            sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
+            if isinstance(self._field, VoxelField):
+                return patch_of(
+                    self._field,
+                    stack,
+                    edit,
+                    ambience,
+                    settled=not moving,
+                    sight=sight,
+                    preserve_opacity=preserve_opacity,
+                )
+            return splat_patch_of(self._field, stack, edit, ambience, settled=not moving, sight=sight)
+
+        what = ("patch", *stack.active, edit, preserve_opacity)
+        patch = make() if moving else self._on_disk.of(what, make)
         self._keep(key, patch)
         return patch
 
@@ -185,14 +196,20 @@ class Patcher:
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Edit | None", self._kept[key])
-        if isinstance(self._field, VoxelField):
-            # While a cage is dragged again and again what is below it stays.
-            around: Key = (*stack.active, edit.outer, lit)
-            if self._around is None or self._around[0] != around:
-                self._around = around, bent_block(self._field, stack, edit, lit)
-            found = bent_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
-        else:
-            found = bent_splats(self._field, stack, edit, lit, self._sight)
+
+        def make() -> Patch | SplatPatch | None:
+            if isinstance(self._field, VoxelField):
+                # While a cage is dragged again and again what is below it stays.
+                around: Key = (*stack.active, edit.outer, lit)
+                if self._around is None or self._around[0] != around:
+                    self._around = around, bent_block(self._field, stack, edit, lit)
+                light = bent_voxels(self._field, stack, edit, lit, self._around[1], self._sight)
+            else:
+                light = bent_splats(self._field, stack, edit, lit, self._sight)
+            return None if light is None else light.patch
+
+        patch = self._on_disk.of(("light", *stack.active, edit), make)
+        found = None if patch is None else light_edit(edit, patch)
         self._keep(key, found)
         return found
 

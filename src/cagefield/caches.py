@@ -1,0 +1,31 @@
+"""Where what can be made again is kept for the next process, and when it is another."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+from pathlib import Path
+
+KEPT_SECONDS = 30 * 86400.0
+"""How long what nobody used is kept."""
+
+
+def cache_root() -> Path:
+    """The folder cagefield in the user's cache; it need not be there.
+
+    Raises RuntimeError where a user has no home.
+    """
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield"
+
+
+@functools.cache
+def source_digest(mark: bytes = b"") -> str:
+    """A digest of the package's source: of all folders that hold a file with such a mark in it."""
+    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
+    folders = {path.parent for path, source in sources.items() if mark in source}
+    digest = hashlib.sha256()
+    for path, source in sources.items():
+        if path.parent in folders:
+            digest.update(source)
+    return digest.hexdigest()[:16]

@@ -1,0 +1,203 @@
+"""What was worked out for a field and its edits, kept on disk for the next process.
+
+Each result is a file of arrays in the user's cache. Its name is a digest of all that the result follows
+from: the package's source, the field, its cameras, and what is asked for. A file that is damaged, missing or
+cannot be written costs the time of working it out again, and nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from cagefield.atomic_files import replaced_file
+from cagefield.caches import KEPT_SECONDS, cache_root, source_digest
+from cagefield.cages import Cage
+from cagefield.cameras import Camera
+from cagefield.edits import Edit
+from cagefield.edits.patch import NewLight, Patch, SplatPatch
+from cagefield.fields.splat import SplatField
+from cagefield.fields.voxel import VoxelField
+from cagefield.leftovers import remove_unfinished
+from cagefield.npz import read_arrays
+from cagefield.patches.facing import Facing
+from cagefield.patches.light import Ambience
+from cagefield.patches.seen import SeenPairs, Sight
+from cagefield.patches.sun import Sun
+from cagefield.patches.surfels import Surfels
+
+WORTH = 0.3
+"""Seconds that a result must have taken to be kept."""
+
+MOST_BYTES = 1 << 30
+"""Room that all files take at most: those that were not used for longest go. One takes a quarter at most."""
+
+KINDS: Final = {
+    kind.__name__: kind
+    for kind in (
+        Ambience,
+        Cage,
+        Camera,
+        Facing,
+        NewLight,
+        Patch,
+        SeenPairs,
+        Sight,
+        SplatPatch,
+        Sun,
+        Surfels,
+        VoxelField,
+    )
+}
+"""Classes that results consist of."""
+
+Made = TypeVar("Made")
+
+
+class Kept:
+    """Results for one field, photographed by these cameras; see the module."""
+
+    def __init__(self, field: VoxelField | SplatField, cameras: Sequence[Camera]) -> None:
+        self._field, self._cameras = field, cameras
+
+    def of(self, what: Sequence[object], make: Callable[[], Made]) -> Made:
+        """What `make` gives: from disk, where it was made before for the same `what`.
+
+        `what` holds edits, cages, numbers and texts. What a paste has a part in is not kept.
+        """
+        path = self._path(what)
+        if path is None:
+            return make()
+        with contextlib.suppress(OSError, ValueError):
+            return cast(Made, self._read(path))
+        began = time.perf_counter()
+        made = make()
+        if time.perf_counter() - began > WORTH:
+            with contextlib.suppress(OSError, ValueError):
+                self._write(path, made)
+        return made
+
+    @cached_property
+    def _base(self) -> bytes:
+        digest = hashlib.sha256()
+        versions = (source_digest(), np.__version__, scipy.__version__)
+        for each in (*versions, self._field, tuple(self._cameras)):
+            _add(digest, each)
+        return digest.digest()
+
+    def _path(self, what: Sequence[object]) -> Path | None:
+        digest = hashlib.sha256()
+        try:
+            _add(digest, tuple(what))
+            digest.update(self._base)
+            return cache_root() / "patches" / f"{digest.hexdigest()[:32]}.npz"
+        except (OSError, RuntimeError, TypeError):
+            return None
+
+    def _read(self, path: Path) -> object:
+        """Raises OSError where there is no file, ValueError for one that is damaged."""
+        arrays = read_arrays(path)
+        try:
+            found = self._unpacked(json.loads(arrays["tree"].tobytes()), arrays)
+        except Exception as error:  # classes of the package refuse in their own ways
+            raise ValueError(str(error)) from error
+        os.utime(path)
+        return found
+
+    def _write(self, path: Path, made: object) -> None:
+        """Raises OSError without room, ValueError for what is too large or of other classes."""
+        arrays: dict[str, NDArray[Any]] = {}
+        tree = json.dumps(self._packed(made, arrays)).encode()
+        arrays["tree"] = np.frombuffer(tree, np.uint8)
+        if sum(values.nbytes for values in arrays.values()) > MOST_BYTES // 4:
+            raise ValueError("it is too large to be kept")
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        remove_unfinished(path.parent)
+        with replaced_file(path) as temporary:
+            np.savez(temporary, **cast(Any, arrays))
+        _tidy(path.parent)
+
+    def _packed(self, value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+        """The value as JSON; its arrays are added to `arrays`, and named in it."""
+        if value is self._field:
+            return {"field": True}
+        if value is None or isinstance(value, (bool, int, float, str)):
+            return value
+        if isinstance(value, np.ndarray):
+            name = f"a{len(arrays)}"
+            arrays[name] = value
+            return {"array": name}
+        if isinstance(value, tuple):
+            return {"tuple": [self._packed(each, arrays) for each in value]}
+        if type(value) is KINDS.get(type(value).__name__):
+            values = {each.name: self._packed(getattr(value, each.name), arrays) for each in _fields(value)}
+            return {"kind": type(value).__name__, "values": values}
+        raise ValueError(f"{type(value)} is not kept")
+
+    def _unpacked(self, tree: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+        if not isinstance(tree, dict):
+            return tree
+        if "field" in tree:
+            return self._field
+        if "array" in tree:
+            return arrays[tree["array"]]
+        if "tuple" in tree:
+            return tuple(self._unpacked(each, arrays) for each in tree["tuple"])
+        values = {name: self._unpacked(value, arrays) for name, value in tree["values"].items()}
+        return KINDS[tree["kind"]](**values)
+
+
+def _fields(value: Any) -> tuple[dataclasses.Field[Any], ...]:
+    return tuple(each for each in dataclasses.fields(value) if each.init)
+
+
+def _add(digest: Any, value: object) -> None:
+    """Adds all that a value says; raises TypeError for what may say more: functions, what is pasted.
+
+    What an edit is called says nothing, and its patch follows from the rest.
+    """
+    if isinstance(value, np.ndarray):
+        digest.update(f"{value.dtype.str}{value.shape}".encode())
+        digest.update(np.ascontiguousarray(value).data)
+    elif isinstance(value, (tuple, list)):
+        digest.update(f"({len(value)}".encode())
+        for each in value:
+            _add(digest, each)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
+            raise TypeError("what is pasted may change")
+        digest.update(type(value).__name__.encode())
+        for each in _fields(value):
+            if not (isinstance(value, Edit) and each.name in ("name", "patch", "pasted")):
+                _add(digest, getattr(value, each.name))
+    elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
+        digest.update(f"<{value!r}>".encode())
+    else:
+        raise TypeError(f"a {type(value).__name__}")
+
+
+def _tidy(folder: Path) -> None:
+    """Removes what was not used for long, and what was not for longest where all take too much room."""
+    found = []
+    for path in folder.glob("*.npz"):
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            found.append((status.st_mtime, status.st_size, path))
+    room = MOST_BYTES
+    for used, size, path in sorted(found, reverse=True):
+        room -= size
+        if room < 0 or time.time() - used > KEPT_SECONDS:
+            with contextlib.suppress(OSError):
+                path.unlink()
