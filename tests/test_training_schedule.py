@@ -9,7 +9,7 @@ import pytest
 
 from cagefield.training.schedule import LARGEST_FIRST, Schedule, stages
 from cagefield.training.voxel_config import VoxelConfig
-from cagefield.training.voxel_defaults import LARGEST, SMALLEST, Settings, settings
+from cagefield.training.voxel_defaults import BATCH, LARGEST, SMALLEST, Settings, settings
 
 
 def chosen(config: VoxelConfig, side: int, threads: int | None = 2, *, unbounded: bool = False) -> Settings:
@@ -41,7 +41,7 @@ def test_a_run_of_given_steps_chooses_the_same_on_every_machine():
 def test_what_is_named_is_taken():
     named = VoxelConfig(resolution=90, sh_degree=0, rate=(3.0, 1.0), smooth=0.0, plain=0.1)
     for unbounded in (False, True):
-        assert chosen(named, 400, unbounded=unbounded) == Settings(90, 0, (3.0, 1.0), 0.0, 0.1)
+        assert chosen(named, 400, unbounded=unbounded) == Settings(90, 0, (3.0, 1.0), 0.0, 0.1, BATCH)
 
 
 @pytest.mark.parametrize("final", [16, 48, 256, 400, 512, 1024])
