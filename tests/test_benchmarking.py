@@ -371,6 +371,13 @@ def test_digests_follow_content_and_sources() -> None:
     assert len({digest([]), digest([], ["cages.py"]), digest([], ["warps"])}) == 3
 
 
+def test_what_is_measured_has_the_light_of_its_truth() -> None:
+    for case in CASES:
+        lit = {edit.relight != "none" for edit in case.edits}
+        assert lit == {case.moved is not None}, case.name
+        assert [edit.inner for edit in case.edits] == [edit.inner for edit in case.given]
+
+
 # -- tables and machine ------------------------------------------------------------------------------------
 
 

@@ -45,14 +45,16 @@ class Case:
         return files("cagefield").joinpath("examples").joinpath(self.file).read_text(encoding="utf-8")
 
     @property
+    def given(self) -> EditStack:
+        """The edit stack of the file."""
+        return parse_edits(self.text, source=self.file)
+
+    @property
     def edits(self) -> EditStack:
-        """The edit stack of the file; exact maps, which are their truth, carry the light along as it was."""
-        edits = parse_edits(self.text, source=self.file)
+        """What is measured: an exact map, where that is the truth, carries the light along as it was."""
         if self.moved is not None:
-            return edits
-        return EditStack(
-            edit.replace(relight="none") if edit.adjustment == "continuous" else edit for edit in edits
-        )
+            return self.given
+        return EditStack(edit.replace(relight="none") for edit in self.given)
 
     @property
     def kind(self) -> str:

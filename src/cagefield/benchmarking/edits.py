@@ -147,7 +147,7 @@ def write_picture(case: Case, bench: Workbench, folder: Path, size: int, *, erro
     camera = eye(case.scene, size)
     scene = bench.scene(case.scene)
     before = cast(AnyArray, shown(scene, camera).rgb8())
-    after = shown(scene.with_edits(case.edits), camera).rgb8()
+    after = shown(scene.with_edits(case.given), camera).rgb8()
     truth = (
         bench.mapped(case.scene, case.edits, [camera]) if case.moved is None else bench.moved(case, [camera])
     )
