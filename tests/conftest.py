@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from cagefield import Scene, load_dataset
 from cagefield.datasets.procedural import make_scene
 from cagefield.training.voxel import train_voxel
 from cagefield.training.voxel_config import VoxelConfig
+from own_cache import cache_of_its_own
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -25,13 +28,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Tells the pages who draws, kernels to run on the CPU unless CAGEFIELD_DEVICE names another device, and
-    threads not to spin while they wait.
+    threads not to spin while they wait. What fills edits is kept in a cache of this run's own.
 
     Test processes share the cores: threads that spin take them from the other processes, whose threads spin
     too, and small networks and products of small matrices then take five to twenty times as long. Libraries
     read this when they are loaded: OpenMP with PyTorch and Numba, later; OpenBLAS in the processes that this
     one starts, those of `pytest -n` and the editor's.
     """
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        own = Path(tempfile.mkdtemp(prefix="cagefield-tests-"))
+        cache_of_its_own(own)
+        os.environ["XDG_CACHE_HOME"] = str(own)
+        config.add_cleanup(lambda: shutil.rmtree(own, ignore_errors=True))
     os.environ.setdefault("CAGEFIELD_DEVICE", "cpu")
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -17,6 +17,19 @@ def test_auto_takes_what_the_environment_names(monkeypatch: pytest.MonkeyPatch) 
     assert str(caught.value) == line
 
 
+def test_a_device_that_is_named_there_and_missing_is_told_from_where(monkeypatch: pytest.MonkeyPatch) -> None:
+    running = devices.start()
+    monkeypatch.setattr(devices, "_started", None)
+    monkeypatch.setattr(devices, "_supported", lambda arch: False)
+    monkeypatch.setenv("CAGEFIELD_DEVICE", "cuda")
+    with pytest.raises(DeviceError, match=r"'cuda' of CAGEFIELD_DEVICE is not available .*; unset it"):
+        devices.start()
+    with pytest.raises(DeviceError, match="'vulkan' is not available on this machine; use device="):
+        devices.start("vulkan")
+    monkeypatch.setattr(devices, "_started", running)
+    assert devices.start() == running
+
+
 def test_one_process_has_one_device() -> None:
     running = devices.start()
     other = "vulkan" if running != "vulkan" else "cpu"

@@ -1,4 +1,4 @@
-"""Where what can be made again is kept for the next process, and when it is another."""
+"""The user's cache folder, and a digest of the package's source."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def cache_root() -> Path:
 
 @functools.cache
 def source_digest(mark: bytes = b"") -> str:
-    """A digest of the package's source: of all folders that hold a file with such a mark in it."""
+    """A digest of the package's source: of the folders that have a file with `mark` in it."""
     sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
     folders = {path.parent for path, source in sources.items() if mark in source}
     digest = hashlib.sha256()

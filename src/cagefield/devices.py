@@ -59,7 +59,8 @@ def start(device: str = "auto", *, double: bool = False) -> str:
     elif device == "cpu" or _supported(archs[device]):
         chosen = device
     else:
-        raise DeviceError(f'device {device!r} is not available on this machine; use device="cpu" or "auto"')
+        cure = "unset it" if where else 'use device="cpu" or "auto"'
+        raise DeviceError(f"device {device!r}{where} is not available on this machine; {cure}")
     cache = kernel_cache()
     try:
         with contextlib.redirect_stdout(io.StringIO()):

@@ -20,6 +20,7 @@ from shortages import Names, Shortage
 
 from cagefield.formats.splat_files import write_splats
 from editor_server import EditorServer, PageClient, editor_server, page
+from own_cache import cache_of_its_own
 from splat_scenes import ball_of_splats
 
 _POSE = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0]
@@ -146,10 +147,7 @@ EDITORS: dict[str, EditorAction] = {
 @contextlib.contextmanager
 def _on(place: Path) -> Iterator[None]:
     """Has editors' temporary files and cache on a disk, but for kernels, which stay where they are."""
-    kernels = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "kernels"
-    kernels.mkdir(parents=True, exist_ok=True)
-    (place / "cache" / "cagefield").mkdir(parents=True)
-    (place / "cache" / "cagefield" / "kernels").symlink_to(kernels)
+    cache_of_its_own(place / "cache")
     (place / "tmp").mkdir()
     with mock.patch.dict(os.environ, TMPDIR=str(place / "tmp"), XDG_CACHE_HOME=str(place / "cache")):
         yield

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import subprocess
 from dataclasses import dataclass
@@ -37,8 +38,10 @@ def device_name(device: str) -> str:
         return device
     try:
         command = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
+        if visible := os.environ.get("CUDA_VISIBLE_DEVICES"):
+            command += ["-i", visible.split(",")[0]]
         told = subprocess.run(command, capture_output=True, text=True, timeout=10.0, check=True).stdout
-    except (OSError, subprocess.SubprocessError):
+    except (OSError, ValueError, subprocess.SubprocessError):
         return device
     return f"{device} ({told.splitlines()[0].strip()})" if told.strip() else device
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.atomic_files import replaced_file
+from cagefield.caches import cache_root
 from cagefield.datasets.features import OnProgress
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.triangulation import triangulate
@@ -130,7 +131,7 @@ def random_points(dataset: Dataset, count: int, seed: int = 0) -> SparsePoints:
 
 def points_cache() -> Path:
     """The folder of triangulated points in the user's cache."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "points"
+    return cache_root() / "points"
 
 
 def _inside(dataset: Dataset, positions: FloatArray) -> npt.NDArray[np.bool_]:

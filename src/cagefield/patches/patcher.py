@@ -15,8 +15,8 @@ from cagefield.fields.splat import SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.bending import bent_block, bent_voxels, light_edit
 from cagefield.patches.block import Block
+from cagefield.patches.disk_cache import DiskCache
 from cagefield.patches.joining import joined
-from cagefield.patches.kept import Kept
 from cagefield.patches.light import Ambience, ambience_of, with_facing, with_sun
 from cagefield.patches.making import patch_of
 from cagefield.patches.pastes import Pastes
@@ -47,7 +47,7 @@ class Patcher:
         pastes: Pastes | None = None,
     ) -> None:
         self._field, self._cameras, self._render, self._pastes = field, cameras, render, pastes
-        self._on_disk = Kept(field, cameras)
+        self._on_disk = DiskCache(field, cameras)
         self._kept: OrderedDict[Key, Patch | SplatPatch | Edit | None] = OrderedDict()
         self._around: tuple[Key, Block] | None = None
         self._suns: dict[tuple[float, float, float] | None, Ambience] = {}
@@ -114,9 +114,9 @@ class Patcher:
     @cached_property
     def ambience(self) -> Ambience:
         """How the field's colours follow its openness, and where its surfaces face."""
-        return self._on_disk.of(
-            ("ambience",),
-            lambda: with_facing(ambience_of(self._voxels, self._sight), self._voxels, self._sight),
+        sight = self._sight  # whoever knows the light has it: drags do not wait for either
+        return self._on_disk.get_or_make(
+            ("ambience",), lambda: with_facing(ambience_of(self._voxels, sight), self._voxels, sight)
         )
 
     def _lit(self, edit: Edit) -> Ambience | None:
@@ -127,7 +127,7 @@ class Patcher:
             return self.ambience
         direction = edit.relight.direction if isinstance(edit.relight, CastShadow) else None
         if direction not in self._suns:
-            self._suns[direction] = self._on_disk.of(
+            self._suns[direction] = self._on_disk.get_or_make(
                 ("sun", direction),
                 lambda: with_sun(self.ambience, self._voxels, self._sight, direction),
             )
@@ -140,7 +140,9 @@ class Patcher:
 
     @cached_property
     def _sight(self) -> Sight:
-        return self._on_disk.of(("sight",), lambda: sight_of(self._render, self._cameras, self._field.bounds))
+        return self._on_disk.get_or_make(
+            ("sight",), lambda: sight_of(self._render, self._cameras, self._field.bounds)
+        )
 
     def _patch(
         self, below: tuple[Edit, ...], edit: Edit, moving: bool, preserve_opacity: bool
@@ -157,7 +159,7 @@ class Patcher:
         kind = edit.deleted, edit.keep_source, edit.fill, feather, edit.pasted, preserve_opacity
         what: Key = (*stack.active, edit.inner, *kind, relit and edit.relight)
         settled: Key = (*what, edit.deformed if relit or feather > 0.0 else None)
-        key = (*what, None) if moving and settled not in self._kept else settled
+        key: Key = (*what, "moving") if moving and settled not in self._kept else settled
         if key in self._kept:
             self._kept.move_to_end(key)
             return cast("Patch | SplatPatch", self._kept[key])
@@ -166,8 +168,9 @@ class Patcher:
         ambience = lit if relit else None
         looks = relit or (edit.fill == "surroundings" and not edit.keep_source)
 
+        sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
+
         def make() -> Patch | SplatPatch:
-            sight = self._sight if looks and (not moving or "_sight" in self.__dict__) else None
             if isinstance(self._field, VoxelField):
                 return patch_of(
                     self._field,
@@ -180,8 +183,8 @@ class Patcher:
                 )
             return splat_patch_of(self._field, stack, edit, ambience, settled=not moving, sight=sight)
 
-        what = ("patch", *stack.active, edit, preserve_opacity)
-        patch = make() if moving else self._on_disk.of(what, make)
+        follows_from = ("patch", ambience, *stack.active, edit, preserve_opacity)
+        patch = make() if moving else self._on_disk.get_or_make(follows_from, make)
         self._keep(key, patch)
         return patch
 
@@ -208,7 +211,7 @@ class Patcher:
                 light = bent_splats(self._field, stack, edit, lit, self._sight)
             return None if light is None else light.patch
 
-        patch = self._on_disk.of(("light", *stack.active, edit), make)
+        patch = self._on_disk.get_or_make(("light", lit, *stack.active, edit), make)
         found = None if patch is None else light_edit(edit, patch)
         self._keep(key, found)
         return found

@@ -257,7 +257,7 @@ class VoxelRun:
 
     def _signature(self) -> str:
         """What a file must have been written for."""
-        settings = dataclasses.asdict(self._config)
+        settings = dataclasses.asdict(self._config) | {"batch_rays": self._settings.batch_rays}
         return json.dumps([settings, list(self._photos.names), self._photos.sizes.tolist()])
 
 

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cagefield.caches import cache_root
 from cagefield.errors import FieldError
 from cagefield.regular_files import check_regular, open_regular
 from cagefield.scene_files import is_scene
@@ -38,7 +39,7 @@ _MOST_OF_ONE = 1 << 14
 
 def opened_folder() -> Path:
     """The folder of opened files' scenes in the user's cache."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield" / "opened"
+    return cache_root() / "opened"
 
 
 def scene_of_file(file: Path) -> Path:

@@ -15,10 +15,10 @@ import secrets
 import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 from urllib.parse import urlsplit
 
+from cagefield.caches import cache_root
 from cagefield.regular_files import UnreadableError, read_bytes
 
 _LEAST = 32
@@ -44,7 +44,7 @@ def own_token(role: Role = "edit") -> str:
     Pages that are open come again by themselves when an editor is started again. A new one each time where
     it cannot be kept.
     """
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "cagefield"
+    folder = cache_root()
     file = folder / ("token" if role == "edit" else "token-to-look")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -18,15 +18,17 @@ from cagefield.cameras import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
 from cagefield.fields.voxel import VoxelField
-from cagefield.patches import kept
+from cagefield.patches import disk_cache
+from cagefield.patches.disk_cache import DiskCache
 from cagefield.patches.facing import Facing
-from cagefield.patches.kept import Kept
 from cagefield.patches.light import Ambience
 from cagefield.patches.patcher import Patcher
 from cagefield.patches.sun import Sun
 from cagefield.rendering.render_result import RenderResult
 from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.splat_renderer import SplatRenderer
 from solid_fields import solid_field
+from splat_rooms import cage as splat_cage
 from splat_rooms import room as splat_room
 
 CAMERAS = turntable((0.0, 0.0, 0.0), 3.0, 4, elevation=0.7, width=48, height=48, fov_x=0.8)
@@ -34,9 +36,9 @@ CAMERAS = turntable((0.0, 0.0, 0.0), 3.0, 4, elevation=0.7, width=48, height=48,
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    # Not the user's cache by its variable: kernels are kept there too.
-    monkeypatch.setattr(kept, "cache_root", lambda: tmp_path)
-    monkeypatch.setattr(kept, "WORTH", -1.0)
+    # Not by the variable of the user's cache: kernels are kept there too.
+    monkeypatch.setattr(disk_cache, "cache_root", lambda: tmp_path)
+    monkeypatch.setattr(disk_cache, "LEAST_SECONDS", -1.0)
     return tmp_path / "patches"
 
 
@@ -100,6 +102,53 @@ def test_the_next_process_has_the_same_patches_without_a_picture(folder: Path) -
         np.testing.assert_array_equal(left, right)
 
 
+def test_a_drag_after_opening_is_as_one_before(folder: Path) -> None:
+    """Whoever knows the light knows what cameras see: a drag is made with both, or with neither."""
+    further = [MOVE.translate([0.0, 0.1, 0.0])]
+    found = []
+    for _ in range(2):
+        field = room()
+        patcher = Patcher(field, CAMERAS, Counted(field))
+        patcher.patched([MOVE])
+        found.append(arrays_of(patcher.patched(further, moving=True)))
+    for left, right in zip(*found, strict=True):
+        np.testing.assert_array_equal(left, right)
+
+
+def test_a_drag_before_anything_is_known_is_made_again_when_it_ends() -> None:
+    edit = [Edit.delete(MOVE.inner).replace(relight="none", feather=0.0)]
+    field = room()
+    patcher = Patcher(field, CAMERAS, Counted(field))
+    moving = patcher.patched(edit, moving=True).edits[0].patch
+    settled = patcher.patched(edit).edits[0].patch
+    assert moving is not None and settled is not None and settled is not moving
+    assert patcher.patched(edit, moving=True).edits[0].patch is settled
+
+
+def test_splats_have_the_same_patches_again() -> None:
+    """Every class that a patch of splats and its light are made of is kept."""
+    field = splat_room(True)
+    edit = Edit(splat_cage(), adjustment="discrete", relight="occlusion").translate([-0.5, 0.25, 0.0])
+    cameras = turntable((0.0, 0.0, 0.0), 3.0, 3, elevation=0.8, width=96, height=96, fov_x=0.6)
+    renderer, pictures, found = SplatRenderer(field), [], []
+
+    def render(camera: Camera) -> RenderResult:
+        pictures.append(camera)
+        shown = renderer.render(camera, background="black", normals=True)
+        assert shown is not None
+        return shown
+
+    for _ in range(2):
+        patch = Patcher(field, cameras, render).patched([edit]).edits[0].patch
+        assert isinstance(patch, SplatPatch) and patch.field is field
+        found.append(patch)
+    assert len(pictures) == 3
+    first, again = found
+    for name in ("gone", "sources", "points", "jacobian", "gains"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
+    np.testing.assert_array_equal(first.light.values, again.light.values)
+
+
 def test_what_moves_is_not_kept(folder: Path) -> None:
     patched([MOVE], moving=True)
     assert not folder.exists()
@@ -114,7 +163,7 @@ def made_again(
 ) -> bool:
     """Whether this had to be made in a new process."""
     calls = []
-    found = Kept(field, cameras).of(what, lambda: calls.append(1) or RESULT)
+    found = DiskCache(field, cameras).get_or_make(what, lambda: calls.append(1) or RESULT)
     assert isinstance(found, Patch) and found.part is None
     np.testing.assert_array_equal(found.under.density, FIELD.density)
     return bool(calls)
@@ -122,7 +171,8 @@ def made_again(
 
 def test_all_that_results_follow_from_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     assert made_again((MOVE,)) and not made_again((MOVE,))
-    assert not made_again((MOVE.replace(name="aside", patch=RESULT),))
+    assert not made_again((MOVE.replace(name="aside"),))
+    assert made_again((MOVE.replace(patch=RESULT),))
     assert made_again((MOVE.translate([0.0, 0.1, 0.0]),))
     assert made_again((MOVE.replace(fill="none"),))
     assert made_again((BEND, MOVE))
@@ -130,12 +180,12 @@ def test_all_that_results_follow_from_is_told_apart(monkeypatch: pytest.MonkeyPa
     assert made_again((MOVE,), dataclasses.replace(FIELD, contracted=True))
     assert made_again((MOVE,), cameras=CAMERAS[:3])
     assert not made_again((MOVE,))
-    monkeypatch.setattr(kept, "source_digest", lambda: "another")
+    monkeypatch.setattr(disk_cache, "VERSIONS", ("another",))
     assert made_again((MOVE,))
 
 
 def test_quick_results_are_not_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "WORTH", 1e9)
+    monkeypatch.setattr(disk_cache, "LEAST_SECONDS", 1e9)
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert not folder.exists()
 
@@ -162,7 +212,7 @@ def test_damaged_files_are_made_anew(how: str, folder: Path) -> None:
 
 def test_without_a_folder_everything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(kept, "cache_root", lambda: tmp_path / "file")
+    monkeypatch.setattr(disk_cache, "cache_root", lambda: tmp_path / "file")
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert (tmp_path / "file").read_text() == ""
 
@@ -177,6 +227,22 @@ def test_a_full_disk_leaves_nothing_half(folder: Path, monkeypatch: pytest.Monke
     assert list(folder.iterdir()) == []
 
 
+def test_the_last_room_on_a_disk_stays_free(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(disk_cache, "LEFT_BYTES", 1 << 60)
+    assert made_again((MOVE,)) and made_again((MOVE,))
+    assert list(folder.iterdir()) == []
+
+
+def test_a_result_that_cannot_be_marked_as_used_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert made_again((MOVE,))
+
+    def refused(*_: object) -> None:
+        raise PermissionError(1, "not permitted")
+
+    monkeypatch.setattr(os, "utime", refused)
+    assert not made_again((MOVE,))
+
+
 def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_again((MOVE,))
     (first,) = folder.iterdir()
@@ -187,11 +253,11 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
     os.utime(old, (now - caches.KEPT_SECONDS - 60.0,) * 2)
     made_again((BEND,))
     assert not old.exists() and len(list(folder.iterdir())) == 2
-    monkeypatch.setattr(kept, "MOST_BYTES", 4 * size + size // 2)
+    monkeypatch.setattr(disk_cache, "MOST_BYTES", 4 * size + size // 2)
     for number in range(3):
         made_again((MOVE, number))
     assert not first.exists() and len(list(folder.iterdir())) == 4
-    monkeypatch.setattr(kept, "MOST_BYTES", 2 * size)
+    monkeypatch.setattr(disk_cache, "MOST_BYTES", 2 * size)
     assert made_again(("too large",)) and made_again(("too large",))
 
 
@@ -212,13 +278,13 @@ def test_all_that_results_consist_of_comes_back() -> None:
     )
     facing = Facing((0.1, -0.2, 0.3))
     ambience = Ambience((0.1, float("inf")), (0.2, 1e-300), facing, Sun((0.0, 0.0, 1.0), 0.3, 0.1, 2.0))
-    on_disk = Kept(field, CAMERAS)
+    on_disk = DiskCache(field, CAMERAS)
     for what, made in (("patch", patch), ("ambience", ambience), ("nothing", None)):
-        assert on_disk.of((what,), lambda made=made: made) is made
+        assert on_disk.get_or_make((what,), lambda made=made: made) is made
     never = lambda: pytest.fail("it was kept")  # noqa: E731
-    assert on_disk.of(("nothing",), never) is None
-    assert on_disk.of(("ambience",), never) == ambience
-    again = on_disk.of(("patch",), never)
+    assert on_disk.get_or_make(("nothing",), never) is None
+    assert on_disk.get_or_make(("ambience",), never) == ambience
+    again = on_disk.get_or_make(("patch",), never)
     assert isinstance(again, SplatPatch) and again.field is field and again.part is None
     assert again.region == patch.region
     for name in ("gone", "sources", "points", "jacobian", "gains"):
@@ -229,8 +295,8 @@ def test_all_that_results_consist_of_comes_back() -> None:
 
 
 def test_pastes_and_functions_are_not_kept(folder: Path) -> None:
-    on_disk = Kept(room(), CAMERAS)
+    on_disk = DiskCache(room(), CAMERAS)
     for what in (Edit.paste("../other", MOVE.inner), len):
-        assert on_disk.of((what,), lambda: 1) == 1
-        assert on_disk.of((what,), lambda: 2) == 2
+        assert on_disk.get_or_make((what,), lambda: 1) == 1
+        assert on_disk.get_or_make((what,), lambda: 2) == 2
     assert not folder.exists()

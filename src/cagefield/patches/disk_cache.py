@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import errno
 import hashlib
+import importlib.metadata
 import json
 import os
+import shutil
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -38,11 +41,17 @@ from cagefield.patches.seen import SeenPairs, Sight
 from cagefield.patches.sun import Sun
 from cagefield.patches.surfels import Surfels
 
-WORTH = 0.3
-"""Seconds that a result must have taken to be kept."""
+LEAST_SECONDS = 0.3
+"""What a result must have taken to be kept."""
 
 MOST_BYTES = 1 << 30
 """Room that all files take at most: those that were not used for longest go. One takes a quarter at most."""
+
+LEFT_BYTES = 1 << 30
+"""Room that stays free on the disk, at least."""
+
+VERSIONS = source_digest(), np.__version__, scipy.__version__
+"""Of what works results out, as it was imported."""
 
 KINDS: Final = {
     kind.__name__: kind
@@ -66,13 +75,13 @@ KINDS: Final = {
 Made = TypeVar("Made")
 
 
-class Kept:
+class DiskCache:
     """Results for one field, photographed by these cameras; see the module."""
 
     def __init__(self, field: VoxelField | SplatField, cameras: Sequence[Camera]) -> None:
         self._field, self._cameras = field, cameras
 
-    def of(self, what: Sequence[object], make: Callable[[], Made]) -> Made:
+    def get_or_make(self, what: Sequence[object], make: Callable[[], Made]) -> Made:
         """What `make` gives: from disk, where it was made before for the same `what`.
 
         `what` holds edits, cages, numbers and texts. What a paste has a part in is not kept.
@@ -84,23 +93,24 @@ class Kept:
             return cast(Made, self._read(path))
         began = time.perf_counter()
         made = make()
-        if time.perf_counter() - began > WORTH:
-            with contextlib.suppress(OSError, ValueError):
+        if time.perf_counter() - began > LEAST_SECONDS:
+            with contextlib.suppress(OSError, ValueError, MemoryError):
                 self._write(path, made)
         return made
 
     @cached_property
     def _base(self) -> bytes:
         digest = hashlib.sha256()
-        versions = (source_digest(), np.__version__, scipy.__version__)
-        for each in (*versions, self._field, tuple(self._cameras)):
-            _add(digest, each)
+        for each in (*VERSIONS, importlib.metadata.version("quadrants"), tuple(self._cameras)):
+            self._add(digest, each)
+        for name in (each.name for each in _fields(self._field)):
+            self._add(digest, getattr(self._field, name))
         return digest.digest()
 
     def _path(self, what: Sequence[object]) -> Path | None:
         digest = hashlib.sha256()
         try:
-            _add(digest, tuple(what))
+            self._add(digest, tuple(what))
             digest.update(self._base)
             return cache_root() / "patches" / f"{digest.hexdigest()[:32]}.npz"
         except (OSError, RuntimeError, TypeError):
@@ -113,7 +123,8 @@ class Kept:
             found = self._unpacked(json.loads(arrays["tree"].tobytes()), arrays)
         except Exception as error:  # classes of the package refuse in their own ways
             raise ValueError(str(error)) from error
-        os.utime(path)
+        with contextlib.suppress(OSError):
+            os.utime(path)
         return found
 
     def _write(self, path: Path, made: object) -> None:
@@ -121,9 +132,12 @@ class Kept:
         arrays: dict[str, NDArray[Any]] = {}
         tree = json.dumps(self._packed(made, arrays)).encode()
         arrays["tree"] = np.frombuffer(tree, np.uint8)
-        if sum(values.nbytes for values in arrays.values()) > MOST_BYTES // 4:
+        size = sum(values.nbytes for values in arrays.values())
+        if size > MOST_BYTES // 4:
             raise ValueError("it is too large to be kept")
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if shutil.disk_usage(path.parent).free < LEFT_BYTES + size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         remove_unfinished(path.parent)
         with replaced_file(path) as temporary:
             np.savez(temporary, **cast(Any, arrays))
@@ -158,40 +172,41 @@ class Kept:
         values = {name: self._unpacked(value, arrays) for name, value in tree["values"].items()}
         return KINDS[tree["kind"]](**values)
 
+    def _add(self, digest: Any, value: object) -> None:
+        """Adds all that a value says; raises TypeError for what may say more: functions, what is pasted.
+
+        What an edit is called says nothing.
+        """
+        if value is self._field:
+            digest.update(b"field")
+        elif isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype.str}{value.shape}".encode())
+            digest.update(np.ascontiguousarray(value).data)
+        elif isinstance(value, (tuple, list)):
+            digest.update(f"({len(value)}".encode())
+            for each in value:
+                self._add(digest, each)
+        elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+            if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
+                raise TypeError("what is pasted may change")
+            digest.update(type(value).__name__.encode())
+            for each in _fields(value):
+                if not (isinstance(value, Edit) and each.name == "name"):
+                    self._add(digest, getattr(value, each.name))
+        elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
+            digest.update(f"<{value!r}>".encode())
+        else:
+            raise TypeError(f"a {type(value).__name__}")
+
 
 def _fields(value: Any) -> tuple[dataclasses.Field[Any], ...]:
     return tuple(each for each in dataclasses.fields(value) if each.init)
 
 
-def _add(digest: Any, value: object) -> None:
-    """Adds all that a value says; raises TypeError for what may say more: functions, what is pasted.
-
-    What an edit is called says nothing, and its patch follows from the rest.
-    """
-    if isinstance(value, np.ndarray):
-        digest.update(f"{value.dtype.str}{value.shape}".encode())
-        digest.update(np.ascontiguousarray(value).data)
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"({len(value)}".encode())
-        for each in value:
-            _add(digest, each)
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if isinstance(value, Edit) and (value.pasted is not None or value.source is not None):
-            raise TypeError("what is pasted may change")
-        digest.update(type(value).__name__.encode())
-        for each in _fields(value):
-            if not (isinstance(value, Edit) and each.name in ("name", "patch", "pasted")):
-                _add(digest, getattr(value, each.name))
-    elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
-        digest.update(f"<{value!r}>".encode())
-    else:
-        raise TypeError(f"a {type(value).__name__}")
-
-
 def _tidy(folder: Path) -> None:
     """Removes what was not used for long, and what was not for longest where all take too much room."""
     found = []
-    for path in folder.glob("*.npz"):
+    for path in folder.glob("[!.]*.npz"):
         with contextlib.suppress(OSError):
             status = path.stat()
             found.append((status.st_mtime, status.st_size, path))
