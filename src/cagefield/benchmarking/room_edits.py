@@ -124,11 +124,12 @@ def table(scores: Sequence[RoomScore], notes: Sequence[str] = ()) -> Table:
 
 def write_picture(learnt: Learnt, case: Case, folder: Path, size: int = 480) -> Path:
     """Writes the field as trained, edited, and the truth, side by side."""
+    moved = _moved(case)
     eye, target = _EYES[case.scene]
     camera = Camera.look_at(eye, target, width=round(0.75 * size), height=size, fov_x=float(np.radians(52.0)))
     before, after = (_clipped(show(camera).rgb) for show in (learnt.show, learnt.edited(case.edits)))
     gain = gains_to(before, _clipped(picture(capture(case.scene).scene, camera)[0]))
-    truth = _clipped(picture(_moved(case), camera)[0])
+    truth = _clipped(picture(moved, camera)[0])
     path = folder / case.file.replace(".yaml", ".png")
     write_png(path, side_by_side(_clipped(before * gain), _clipped(after * gain), truth))
     return path
