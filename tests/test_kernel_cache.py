@@ -118,6 +118,22 @@ def test_a_disk_that_fails_in_the_middle_is_one_line_of_warning(
     assert f"({reason})" in line
 
 
+@pytest.mark.parametrize(("trouble", "written"), [("", "True"), (LITTLE_ROOM, "False")])
+def test_a_process_writes_no_kernels_as_it_ends_without_room(
+    tmp_path: Path, trouble: str, written: str
+) -> None:
+    """On CUDA it would abort there; here it is seen by what Quadrants is told."""
+    ends = [
+        "import atexit",
+        "from quadrants.lang import impl",
+        "atexit.register(lambda: print(impl.current_cfg().offline_cache))",  # after what is registered later
+        "from cagefield import devices",
+        "devices.start()",
+        trouble,
+    ]
+    assert process(tmp_path / "cache", "-c", "\n".join(ends)).stdout.splitlines()[-1] == written
+
+
 def test_a_full_disk_says_nothing_where_all_kernels_are_kept_already(tmp_path: Path) -> None:
     (tmp_path / "double.py").write_text(DOUBLE)
     assert process(tmp_path / "cache", str(tmp_path / "double.py"), "").stderr == ""

@@ -14,6 +14,7 @@ from cagefield import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
+from cagefield.training import batches
 from cagefield.training.inpaint import OPAQUE
 from cagefield.training.progress import Snapshots
 from cagefield.training.voxel import train_voxel
@@ -70,6 +71,23 @@ def test_the_seed_decides(dataset, trained):
     assert other.field.density.shape != trained.field.density.shape or not np.array_equal(
         other.field.density, trained.field.density
     )
+
+
+def test_a_gpu_with_a_ray_per_lane_learns_the_same(dataset, monkeypatch):
+    """As far as a CPU can tell: its threads take the rays as a GPU's lanes do, and add up with atomics.
+
+    Without smoothing, which is of what the first of a CPU's accumulators has met, and a GPU has one.
+    """
+    few = replace(CONFIG, steps=20, smooth=0.0)
+    expected = train_voxel(dataset, few, evaluate=False).field
+    for lanes in (1 << 15, 300):  # all rays at once, and in several turns
+        with monkeypatch.context() as patched:
+            patched.setattr(devices, "is_gpu", lambda: True)
+            patched.setattr(batches, "GPU_WORKERS", lanes)
+            found = train_voxel(dataset, few, evaluate=False).field
+        np.testing.assert_array_equal(found.vertices, expected.vertices)
+        np.testing.assert_allclose(found.density, expected.density, atol=1e-3, rtol=0.0)
+        np.testing.assert_allclose(found.sh, expected.sh, atol=1e-4, rtol=0.0)
 
 
 def test_interrupted_and_resumed_is_as_uninterrupted(dataset, trained, tmp_path):

@@ -29,6 +29,10 @@ def photos(tmp_path_factory) -> Path:
 SMALL = NerfConfig.small
 
 
+QUICK = ("--field", "nerf", "--preset", "small", "--steps", 60, "--resolution", 24)
+"""Options of a command that trains in seconds, also where a GPU would take the paper's networks."""
+
+
 def tiny(**options) -> NerfConfig:
     small = {"width": 24, "depth": 3, "samples": (12, 12), "batch_rays": 64, "octaves": (4, 2), "precrop": 3}
     return SMALL(**{**small, "shown_samples": None, **options})
@@ -193,19 +197,7 @@ def test_no_views_have_no_psnr(photos) -> None:
 
 def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
-    argv = [
-        photos,
-        "-o",
-        tmp_path / "scene",
-        "--field",
-        "nerf",
-        "--preset",
-        "small",
-        "--steps",
-        60,
-        "--resolution",
-        24,
-    ]
+    argv = [photos, "-o", tmp_path / "scene", *QUICK]
     text = printed(capsys, "train", *argv)
     assert (
         "60 steps, networks of 3 x 24, 4 + 2 octaves, sampled from depth" in text and "; train PSNR" in text
@@ -239,19 +231,7 @@ def test_the_voxels_of_a_nerf_have_the_degree_that_is_asked_for(
 
 def test_a_training_whose_baking_failed_is_kept(photos, tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(NerfConfig, "small", classmethod(lambda cls, **options: tiny(**options)))
-    argv = [
-        photos,
-        "-o",
-        tmp_path / "scene",
-        "--field",
-        "nerf",
-        "--preset",
-        "small",
-        "--steps",
-        60,
-        "--resolution",
-        24,
-    ]
+    argv = [photos, "-o", tmp_path / "scene", *QUICK]
     bake_scene = bake.bake_scene
 
     def fails(error: BaseException) -> None:
