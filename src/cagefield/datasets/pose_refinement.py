@@ -1,4 +1,4 @@
-"""Bundle adjustment of given poses and intrinsics: COLMAP's, by pycolmap, on the CPU.
+"""Bundle adjustment of given poses and intrinsics, or new ones by structure from motion, by pycolmap.
 
 Matches are verified without the given poses. Points are triangulated with the given poses under a loose
 bound of the reprojection error; then bundle adjustments of poses, intrinsics and points, each with a tighter
@@ -25,11 +25,12 @@ from cagefield.cameras import Camera
 from cagefield.datasets import features, triangulation
 from cagefield.datasets.colmap import camera_of, pose_of
 from cagefield.datasets.features import OnProgress, Photo
+from cagefield.datasets.left_out import verified_matches
 from cagefield.datasets.matching import match
 from cagefield.datasets.pose_alignment import Similarity, align_poses
 from cagefield.datasets.pose_check import SEQUENCE_STEPS
+from cagefield.datasets.structure_from_motion import MOST_FOR_ALL_PAIRS, unfolded_models
 from cagefield.datasets.views import SparsePoints, View
-from cagefield.temporary_folders import TemporaryFolder
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,135 +56,78 @@ MIN_PLACED_SHARE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class RefinedPoses:
-    """New cameras of a capture, in its given world where `alignment` is there.
+    """New cameras of a capture, in its given world where `aligned`.
 
     Attributes:
         cameras: camera at the photo's full size, by name of the view.
         points: sparse points of the reconstruction.
         reprojection_error: mean, pixels of the full-size photos.
-        alignment: similarity from the reconstruction to the given world; None where poses agree too little.
+        aligned: whether they are in the given world; not where both sets of poses disagree too much.
     """
 
     cameras: dict[str, Camera]
     points: SparsePoints | None
     reprojection_error: float
-    alignment: Similarity | None
+    aligned: bool
 
 
-def refine_poses(
-    views: Sequence[View],
-    expected_error: float,
-    *,
-    on_progress: OnProgress | None = None,
-    seed: int = 0,
-) -> RefinedPoses | None:
-    """Bundle-adjusted cameras of full-size `views`; None where too few photos keep enough observations.
+class PoseSolver:
+    """Features and matches of the full-size `views` in `folder`, from which their cameras are found anew.
 
-    `expected_error` is the usual epipolar error of the given poses as a share of a photo's longer side.
-
-    Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails.
+    Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails; so do the methods.
     """
-    pycolmap = features.engine()
-    with TemporaryFolder("points") as folder:
-        shrunk, names = triangulation.shrink_views(views, folder, on_progress)
-        numbers, cameras = _shared_cameras(pycolmap, [one.camera for one in shrunk])
-        database = folder / "database.db"
-        features.create_database(
-            database, cameras, [Photo(n, c) for n, c in zip(names, numbers, strict=True)]
+
+    def __init__(
+        self, views: Sequence[View], folder: Path, on_progress: OnProgress | None = None, seed: int = 0
+    ) -> None:
+        """Finds features of all photos, and matches of neighbors in pose and in order."""
+        pycolmap = features.engine()
+        self._views, self._folder, self._seed = views, folder, seed
+        self._shrunk, self._names = triangulation.shrink_views(views, folder, on_progress)
+        self._numbers, self._cameras = shared_cameras(pycolmap, [one.camera for one in self._shrunk])
+        self._database = folder / "database.db"
+        photos = [Photo(n, c) for n, c in zip(self._names, self._numbers, strict=True)]
+        features.create_database(self._database, self._cameras, photos)
+        extracting = features.share(on_progress, 0.05, 0.5)
+        triangulation.extract_features(self._database, folder, self._names, MAX_FEATURES, extracting)
+        near = triangulation.nearest_pairs([one.camera for one in self._shrunk])
+        in_order = [(i, i + k) for i in range(len(views)) for k in SEQUENCE_STEPS if i + k < len(views)]
+        self._match(sorted({*near, *in_order}), features.share(on_progress, 0.5, 1.0))
+
+    def refine(self, expected_error: float, on_progress: OnProgress | None = None) -> RefinedPoses | None:
+        """Bundle-adjusted cameras; None where too few photos keep enough observations.
+
+        `expected_error` is the usual epipolar error of the given poses as a share of a photo's longer side.
+        """
+        pycolmap = features.engine()
+        center, scale = triangulation.normalization([one.camera for one in self._shrunk])
+        model = triangulation.posed_model(
+            pycolmap, self._cameras, self._numbers, self._shrunk, self._names, center, scale
         )
-        triangulation.extract_features(
-            database, folder, names, MAX_FEATURES, features.share(on_progress, 0.05, 0.35)
-        )
-        near = triangulation.nearest_pairs([one.camera for one in shrunk])
-        in_order = [(i, i + k) for i in range(len(names)) for k in SEQUENCE_STEPS if i + k < len(names)]
-        matching = features.share(on_progress, 0.35, 0.7)
-        match(database, names, sorted({*near, *in_order}), verify=True, seed=seed, on_progress=matching)
-        center, scale = triangulation.normalization([one.camera for one in shrunk])
-        model = triangulation.posed_model(pycolmap, cameras, numbers, shrunk, names, center, scale)
-        side = max(max(one.camera.width, one.camera.height) for one in shrunk)
+        side = max(max(one.camera.width, one.camera.height) for one in self._shrunk)
         first = float(np.clip(4.0 * expected_error * side, *FIRST_BOUNDS_PIXELS))
         for number, bound in enumerate(np.geomspace(first, LAST_BOUND_PIXELS, ROUNDS)):
             model = triangulation.triangulated(
-                pycolmap, model, database, folder, f"round-{number}", bound, least_photos=2, seed=seed
-            )
+                pycolmap, model, self._database, self._folder, f"round-{number}", float(bound),
+                least_photos=2, seed=self._seed,
+            )  # fmt: skip
             if not model.num_points3D():
                 return None
-            _adjust(pycolmap, model, bound)
-            features.share(on_progress, 0.7, 1.0)(
-                (number + 1) / ROUNDS, f"bundle adjustment {number + 1} of {ROUNDS}"
-            )
-        return _collected(model, views, shrunk, center, scale)
+            _adjust(pycolmap, model, float(bound))
+            note = f"bundle adjustment {number + 1} of {ROUNDS}"
+            features.share(on_progress, 0.0, 1.0)((number + 1) / ROUNDS, note)
+        return self._collected(model, Similarity(scale, np.eye(3), center))
 
+    def rebuild(self, on_progress: OnProgress | None = None) -> RefinedPoses | None:
+        """Cameras by structure from motion without the given poses; None where too few photos are placed."""
+        count = len(self._views)
+        few = count <= MOST_FOR_ALL_PAIRS
+        pairs = features.all_pairs(count) if few else features.likely_pairs(self._database, count)
+        self._match(pairs, features.share(on_progress, 0.0, 0.5))
+        matches = verified_matches(self._database, count)
+        mapping = features.share(on_progress, 0.5, 1.0)
+        models = unfolded_models(self._folder, matches, self._seed, mapping)
+        return self._collected(models[0], None) if models else None
 
-def camera_groups(cameras: Sequence[Camera]) -> list[int]:
-    """Number of the shared camera of each photo.
-
-    Photos of one size and lens share one; where the given intrinsics are shared by at least two photos on
-    average, those that share them do.
-    """
-    sizes = [(camera.width, camera.height, camera.model == "opencv_fisheye") for camera in cameras]
-    intrinsics = [
-        (*size, camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion)
-        for size, camera in zip(sizes, cameras, strict=True)
-    ]
-    grouped = 2 * len(set(intrinsics)) <= len(cameras)
-    return features.consecutive(intrinsics if grouped else sizes)[1]
-
-
-def _shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int], list[Any]]:
-    """(camera number of each photo, COLMAP cameras with the groups' median intrinsics)."""
-    numbers = camera_groups(cameras)
-    shared = []
-    for number in range(max(numbers) + 1):
-        group = [camera for camera, n in zip(cameras, numbers, strict=True) if n == number]
-        middle = np.median([[c.fx, c.fy, c.cx, c.cy] for c in group], axis=0)
-        lens = np.median([(*c.distortion, 0.0, 0.0, 0.0, 0.0)[:4] for c in group], axis=0)
-        if group[0].model == "opencv_fisheye":
-            model, params = "OPENCV_FISHEYE", [*middle, *lens]
-        elif len(group) >= MIN_OPENCV_PHOTOS or np.any(lens[1:]):
-            model, params = "OPENCV", [*middle, *lens]
-        else:
-            model, params = "SIMPLE_RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0]]
-        made = pycolmap.Camera(model=model, width=group[0].width, height=group[0].height, params=params)
-        made.has_prior_focal_length = True
-        shared.append(made)
-    return numbers, shared
-
-
-def _adjust(pycolmap: Any, model: Any, bound: float) -> None:
-    """Bundle adjustment of everything, after which observations with more than half the bound are removed."""
-    options = pycolmap.BundleAdjustmentOptions(print_summary=False)
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
-    options.ceres.loss_function_scale = max(1.0, 0.1 * bound)
-    options.ceres.solver_options.max_num_iterations = 50
-    options.ceres.solver_options.function_tolerance = 1e-5
-    config = pycolmap.BundleAdjustmentConfig()
-    for image_id in model.reg_image_ids():
-        config.add_image(image_id)
-    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    with features.quiet():  # pycolmap.bundle_adjustment writes headings to stderr whatever the log's level
-        pycolmap.create_default_bundle_adjuster(options, config, model).solve()
-    manager = pycolmap.ObservationManager(model)
-    manager.filter_all_points3D(max(LAST_BOUND_PIXELS, 0.5 * bound), 1.0)
-
-
-def _collected(
-    model: Any, views: Sequence[View], shrunk: Sequence[Any], center: FloatArray, scale: float
-) -> RefinedPoses | None:
-    images = {image_id - 1: model.image(image_id) for image_id in model.reg_image_ids()}
-    placed = [n for n, image in images.items() if image.num_points3D >= MIN_OBSERVATIONS]
-    if len(placed) < max(3, MIN_PLACED_SHARE * len(views)):
-        return None
-    poses = np.stack([pose_of(images[n]) for n in range(len(views))])
-    given = np.stack([view.camera.c2w for view in views])
-    alignment = align_poses(poses, given)
-    to_world = alignment or Similarity(scale, np.eye(3), center)
-    cameras = {}
-    for number, view in enumerate(views):
-        camera = camera_of(Path("refined"), model.camera(images[number].camera_id)).with_c2w(
-            to_world.moved_pose(poses[number])
-        )
-        cameras[view.name] = camera.resized(view.camera.width, view.camera.height)
-    points = triangulation.collect_points(model, shrunk, None, to_world)
-    error = float(model.compute_mean_reprojection_error()) / float(np.mean([one.scale for one in shrunk]))
-    return RefinedPoses(cameras, points, error, alignment)
+    def _match(self, pairs: features.Pairs, on_progress: OnProgress) -> None:
+        match(self._database, self._names, pairs, verify=True, seed=self._seed, on_progress=on_progress)

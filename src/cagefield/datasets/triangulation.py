@@ -139,8 +139,8 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
 def shrink_views(
     views: Sequence[View], folder: Path, on_progress: OnProgress | None
 ) -> tuple[list[ShrunkPhoto], list[str]]:
-    """Photos shrunk into `folder`/images, masks in `folder`/masks, and the names of their files."""
-    (folder / "images").mkdir()
+    """Photos shrunk into `folder`/colmap, masks in `folder`/masks, and the names of their files."""
+    (folder / "colmap").mkdir()
     (folder / "masks").mkdir()
     names = [f"{index:06}.png" for index in range(len(views))]
     shrunk = []
@@ -157,7 +157,7 @@ def extract_features(
     masks = folder / "masks"
     features.extract(
         database,
-        folder / "images",
+        folder / "colmap",
         names,
         features=count,
         longer_side=LONGER_SIDE,
@@ -167,7 +167,7 @@ def extract_features(
 
 
 def _shrink(view: View, folder: Path, name: str) -> ShrunkPhoto:
-    """The photo, shrunk, in `folder`/images; its mask in `folder`/masks where it is a cut-out."""
+    """The photo, shrunk, in `folder`/colmap; its mask in `folder`/masks where it is a cut-out."""
     pixels = read_photo(view.image_path)
     height, width = pixels.shape[:2]
     whole = _whole_camera(view, width, height)
@@ -184,7 +184,7 @@ def _shrink(view: View, folder: Path, name: str) -> ShrunkPhoto:
     picture = Image.fromarray(pixels)
     if picture.size != size:
         picture = picture.resize(size, Image.Resampling.BOX)
-    picture.save(folder / "images" / name, compress_level=1)
+    picture.save(folder / "colmap" / name, compress_level=1)
     return ShrunkPhoto(view, whole.resized(*size), size[0] / width, np.asarray(picture))
 
 
@@ -336,7 +336,7 @@ def triangulated(
         pycolmap.triangulate_points,
         model,
         database,
-        folder / "images",
+        folder / "colmap",
         out,
         clear_points=True,
         options=options,
