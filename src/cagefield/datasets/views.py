@@ -6,18 +6,31 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
-from cagefield.datasets.photos import read_photo
+from cagefield.datasets.masks import read_mask, resample_mask, shrink_mask
+from cagefield.datasets.photos import read_header, read_photo
 from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]
 
 _NAMED = 100  # missing files named in the warning, at most
+
+
+@dataclass(frozen=True)
+class PhotoMask:
+    """A picture file that excludes pixels of a photo from features, training and figures.
+
+    `excluded` "black": 8-bit values below 128 (nerfstudio's and COLMAP's convention); "white": every pixel
+    that is not zero (Instant-NGP's dynamic masks).
+    """
+
+    path: Path
+    excluded: Literal["black", "white"] = "black"
 
 
 @dataclass(frozen=True)
@@ -28,6 +41,7 @@ class View:
     camera: Camera
     image_path: Path
     downscale: int = 1
+    mask: PhotoMask | None = None
 
     def load(self) -> npt.NDArray[np.uint8]:
         """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha, box-filtered to the camera's size.
@@ -42,6 +56,22 @@ class View:
                 f"{self.downscale}, the camera has {self.camera.width}x{self.camera.height}; reopen it"
             )
         return pixels
+
+    def valid_pixels(self) -> npt.NDArray[np.bool_] | None:
+        """Pixels [H,W] of `load` that may be used, True; None where all of them may.
+
+        A mask of another size than the photo is resampled by nearest neighbors; a shrunk pixel is valid where
+        all pixels of the photo in it are, so that no excluded color is in its mean.
+
+        Raises DatasetError where the mask cannot be read or has another aspect than the photo.
+        """
+        if self.mask is None:
+            return None
+        header = read_header(self.image_path)
+        valid = read_mask(self.mask.path, self.mask.excluded)
+        valid = resample_mask(valid, header.width, header.height, self.mask.path)
+        valid = shrink_mask(valid, self.downscale)
+        return None if valid.all() else valid
 
     def downscaled(self, factor: int) -> View:
         """The same photo shrunk by a further `factor`."""
