@@ -16,6 +16,9 @@ from cagefield.errors import DatasetError
 from cagefield.rendering.images import DAMAGED, opened_picture, tiles
 
 EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+FULL_SIZE_FOLDERS = ("images", "input", "photos", "rgb", "color", "image")
+"""Folders in which photos of the whole size are, the first that is there."""
+
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
 
 _DEEP_MODES = ("I", "F")  # and "I;16...": more than 8 bits a channel
@@ -96,9 +99,13 @@ def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
     return np.rint(np.concatenate([rgb, alpha], axis=2)).astype(np.uint8)
 
 
-def photo_folders(root: Path) -> dict[int, Path]:
-    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}."""
-    folders = {1: root / "images"} if (root / "images").is_dir() else {}
+def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
+    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}.
+
+    Photos of the whole size are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that is there.
+    """
+    found = [name for name in ((whole,) if whole else FULL_SIZE_FOLDERS) if (root / name).is_dir()]
+    folders = {1: root / found[0]} if found else {}
     for folder in sorted(root.glob("images_*")):
         if folder.is_dir() and (number := re.fullmatch(r"images_([1-9]\d*)", folder.name)):
             folders[int(number[1])] = folder
