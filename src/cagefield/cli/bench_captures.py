@@ -10,7 +10,6 @@ import tyro
 
 from cagefield.cli.options import SEEDS, Device, Flag, Output, check_file, check_number, progress_bar
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.captures import CaptureScore
@@ -127,7 +126,7 @@ class BenchCaptures:
     def _open(self, name: str, folder: Path) -> Dataset:
         """The data set of that name; a built-in room is photographed where the work folder lacks it."""
         from cagefield.benchmarking.workbench import digest
-        from cagefield.cli.poses import unfolded
+        from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
         from cagefield.datasets.procedural import CAPTURES, make_capture
 
@@ -145,9 +144,7 @@ class BenchCaptures:
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
-        if not self.keep_poses and name not in CAPTURES:
-            anew = folder / f"{dataset.name}-{digest([str(real_path(dataset.path))], ())}.poses"
-            dataset = unfolded(dataset, anew, self.downscale)
+        dataset = verified(dataset, correct=not self.keep_poses).dataset
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
         return dataset

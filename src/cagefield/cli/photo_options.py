@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from cagefield.cli.poses import posed, unfolded
+from cagefield.cli.poses import posed, verified
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -29,15 +29,15 @@ class PhotoOptions:
     def load(self, posed_in: Path | None = None, keep_poses: bool = True) -> Dataset:
         """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
 
-        So do those whose poses are folded, unless `keep_poses`.
+        Poses that come with photos are verified, and corrected unless `keep_poses`, where a folder is given.
         """
         from cagefield.datasets import load_dataset
 
         data = self.data if posed_in is None else posed(self.data, posed_in)
         dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout)
-        if posed_in is None or keep_poses or data != self.data.expanduser():
+        if posed_in is None:
             return dataset
-        return unfolded(dataset, posed_in, self.downscale)
+        return verified(dataset, correct=not keep_poses and data == self.data.expanduser()).dataset
 
 
 Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]

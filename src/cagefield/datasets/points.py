@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -60,8 +61,8 @@ def points_of(
     if known is not None and len(known) >= LEAST:
         return known
     used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_further(dataset))
-    file = None if cache is None else cache / f"points-{_key(used, seed)}.npz"
-    found = None if file is None else _read(file)
+    file = None if cache is None else cache / f"points-{capture_key(used, seed)}.npz"
+    found = None if file is None else read_cached_points(file)
     if found is None:
         try:
             found = triangulate(used, on_progress=on_progress, seed=seed)
@@ -69,7 +70,7 @@ def points_of(
             warnings.warn(f"{dataset.path}: no points are made of the photos: {error}", stacklevel=2)
             return None
         if file is not None and found is not None:
-            _write(file, found)
+            write_cached_points(file, found)
     if found is None or len(found) < LEAST:
         count = 0 if found is None else len(found)
         warnings.warn(
@@ -190,22 +191,23 @@ def _further(dataset: Dataset) -> tuple[View, ...]:
     return tuple(view for view in dataset.val if view.image_path not in known)
 
 
-def _key(views: tuple[View, ...], seed: int) -> str:
+def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> str:
     """Digest of photos, names, poses, lenses and seed."""
-    digest = hashlib.sha256(_VERSION + str(seed).encode())
+    digest = hashlib.sha256(version + str(seed).encode())
     for view in views:
         header = read_header(view.image_path)
-        camera = repr((view.name, view.camera.to_dict(), view.downscale, header))
+        camera = repr((view.name, view.camera.to_dict(), view.downscale, header, view.mask, view.source))
         digest.update(camera.encode())
-        with open_regular(view.image_path) as stream:
-            digest.update(stream.read(_SAMPLE))
-            size = stream.seek(0, os.SEEK_END)
-            stream.seek(max(0, size - _SAMPLE))
-            digest.update(stream.read(_SAMPLE) + str(size).encode())
+        for file in (view.image_path, *(() if view.mask is None else (view.mask.path,))):
+            with open_regular(file) as stream:
+                digest.update(stream.read(_SAMPLE))
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(max(0, size - _SAMPLE))
+                digest.update(stream.read(_SAMPLE) + str(size).encode())
     return digest.hexdigest()[:24]
 
 
-def _write(file: Path, points: SparsePoints) -> None:
+def write_cached_points(file: Path, points: SparsePoints) -> None:
     """Writes the file whole or not at all; where the folder cannot be written to, nothing."""
     names = sorted({name for seen in points.seen_by for name in seen})
     numbers = {name: number for number, name in enumerate(names)}
@@ -226,7 +228,7 @@ def _write(file: Path, points: SparsePoints) -> None:
         return
 
 
-def _read(file: Path) -> SparsePoints | None:
+def read_cached_points(file: Path) -> SparsePoints | None:
     """The points of a file; None where it is not there or damaged."""
     try:
         arrays = read_arrays(file)

@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets import features, triangulation
-from cagefield.datasets.colmap import camera_of, pose_of
+from cagefield.datasets.colmap import pose_of
+from cagefield.datasets.colmap_lenses import lens_views
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.left_out import verified_matches
 from cagefield.datasets.matching import match
@@ -131,3 +132,76 @@ class PoseSolver:
 
     def _match(self, pairs: features.Pairs, on_progress: OnProgress) -> None:
         match(self._database, self._names, pairs, verify=True, seed=self._seed, on_progress=on_progress)
+
+    def _collected(self, model: Any, default: Similarity | None) -> RefinedPoses | None:
+        """Cameras and points of a reconstruction, aligned to the given poses, else moved by `default`."""
+        images = {image_id - 1: model.image(image_id) for image_id in model.reg_image_ids()}
+        placed = [n for n, image in sorted(images.items()) if image.num_points3D >= MIN_OBSERVATIONS]
+        if len(placed) < max(3, MIN_PLACED_SHARE * len(self._views)):
+            return None
+        poses = np.stack([pose_of(images[n]) for n in placed])
+        alignment = align_poses(poses, np.stack([self._views[n].camera.c2w for n in placed]))
+        to_world = alignment or default or Similarity(1.0, np.eye(3), np.zeros(3))
+        cameras = {}
+        for n, pose in zip(placed, poses, strict=True):
+            view = self._views[n]
+            made = model.camera(images[n].camera_id)
+            lens = lens_views(made.model.name, tuple(made.params.tolist()), made.width, made.height)[0]
+            posed = lens.camera.with_c2w(to_world.moved_pose(pose))
+            cameras[view.name] = posed.resized(view.camera.width, view.camera.height)
+        points = triangulation.collect_points(model, self._shrunk, None, to_world)
+        shrinking = float(np.mean([one.scale for one in self._shrunk]))
+        error = float(model.compute_mean_reprojection_error()) / shrinking
+        return RefinedPoses(cameras, points, error, alignment is not None or default is not None)
+
+
+def camera_groups(cameras: Sequence[Camera]) -> list[int]:
+    """Number of the shared camera of each photo.
+
+    Photos of one size and lens share one; where the given intrinsics are shared by at least two photos on
+    average, those that share them do.
+    """
+    sizes = [(camera.width, camera.height, camera.model == "opencv_fisheye") for camera in cameras]
+    intrinsics = [
+        (*size, camera.fx, camera.fy, camera.cx, camera.cy, camera.distortion)
+        for size, camera in zip(sizes, cameras, strict=True)
+    ]
+    grouped = 2 * len(set(intrinsics)) <= len(cameras)
+    return features.consecutive(intrinsics if grouped else sizes)[1]
+
+
+def shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int], list[Any]]:
+    """(camera number of each photo, COLMAP cameras with the groups' median intrinsics)."""
+    numbers = camera_groups(cameras)
+    shared = []
+    for number in range(max(numbers) + 1):
+        group = [camera for camera, n in zip(cameras, numbers, strict=True) if n == number]
+        middle = np.median([[c.fx, c.fy, c.cx, c.cy] for c in group], axis=0)
+        lens = np.median([(*c.distortion, 0.0, 0.0, 0.0, 0.0)[:4] for c in group], axis=0)
+        if group[0].model == "opencv_fisheye":
+            model, params = "OPENCV_FISHEYE", [*middle, *lens]
+        elif len(group) >= MIN_OPENCV_PHOTOS or np.any(lens[1:]):
+            model, params = "OPENCV", [*middle, *lens]
+        else:
+            model, params = "SIMPLE_RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0]]
+        made = pycolmap.Camera(model=model, width=group[0].width, height=group[0].height, params=params)
+        made.has_prior_focal_length = True
+        shared.append(made)
+    return numbers, shared
+
+
+def _adjust(pycolmap: Any, model: Any, bound: float) -> None:
+    """Bundle adjustment of everything, after which observations with more than half the bound are removed."""
+    options = pycolmap.BundleAdjustmentOptions(print_summary=False)
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = max(1.0, 0.1 * bound)
+    options.ceres.solver_options.max_num_iterations = 50
+    options.ceres.solver_options.function_tolerance = 1e-5
+    config = pycolmap.BundleAdjustmentConfig()
+    for image_id in model.reg_image_ids():
+        config.add_image(image_id)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    with features.quiet():  # pycolmap.bundle_adjustment writes headings to stderr whatever the log's level
+        pycolmap.create_default_bundle_adjuster(options, config, model).solve()
+    manager = pycolmap.ObservationManager(model)
+    manager.filter_all_points3D(max(LAST_BOUND_PIXELS, 0.5 * bound), 1.0)

@@ -1,9 +1,9 @@
 """Verification of the poses that come with photos, and their correction.
 
-The poses are measured (`pose_check`, `folds`). Right ones are left as they are. Wrong ones are bundle-adjusted
-(`pose_refinement`); where that does not cure them, structure from motion finds new ones from the photos. Of
-all of these the data set gets those with the least epipolar error, in its given world where the poses agree
-enough to tell where that is.
+The poses are measured (`pose_check`, `folds`). Right ones are left as they are. Wrong ones are
+bundle-adjusted (`pose_refinement`); where that does not cure them, structure from motion finds new ones from
+the photos. The data set gets the poses with the least epipolar error, in its given world where they agree
+with the given ones enough to tell where that is.
 
 A correction is kept in the user's cache, under a digest of photos and given cameras.
 """
@@ -11,7 +11,7 @@ A correction is kept in the user's cache, under a digest of photos and given cam
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -89,7 +89,7 @@ def verify_poses(
 
     Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails.
     """
-    views = [view.full_size() for view in all_views(dataset)]
+    views = [view.whole() for view in all_views(dataset)]
     matches = match_photos(views, partial(on_stage, "Checking poses"))
     before = pose_error(matches, views)
     fold = find_fold(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
@@ -105,7 +105,7 @@ def verify_poses(
     def judged(outcome: Outcome, found: RefinedPoses) -> Verification | None:
         """The verification with these poses where they are better than the given ones."""
         other = with_cameras(dataset, found)
-        after = pose_error(matches, [view.full_size() for view in all_views(other)])
+        after = pose_error(matches, [view.whole() for view in all_views(other)])
         if after is None or not _is_better(before, after, fold):
             return None
         if fold is not None and find_fold(other) is not None:
@@ -127,7 +127,9 @@ def verify_poses(
     return best or Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
 
 
-def _corrections(views, before, fold, seed, on_stage):  # type: ignore[no-untyped-def]
+def _corrections(
+    views: list[View], before: PoseError | None, fold: Fold | None, seed: int, on_stage: OnStage
+) -> Iterator[tuple[Outcome, RefinedPoses]]:
     """Corrected poses one after the other, the cheapest first: (outcome, poses)."""
     with TemporaryFolder("points") as folder:
         solver = PoseSolver(views, folder, partial(on_stage, "Matching photos"), seed)
@@ -164,7 +166,9 @@ def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
 
     def moved(views: tuple[View, ...]) -> tuple[View, ...]:
         return tuple(
-            view.with_full_camera(found.cameras[view.name]) for view in views if view.name in found.cameras
+            replace(view.whole(), camera=found.cameras[view.name]).downscaled(view.downscale)
+            for view in views
+            if view.name in found.cameras
         )
 
     train, test, val = moved(dataset.train), moved(dataset.test), moved(dataset.val)
@@ -177,7 +181,7 @@ def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
         test=test,
         val=val,
         bounds=bounds,
-        depths=None if positions is None else depth_range(cameras, positions),
+        depths=depth_range(cameras, positions),
         points=found.points,
     )
 
@@ -191,13 +195,13 @@ def describe(one: Verification) -> list[str]:
     if one.fold is not None:
         first, second = one.fold.pair
         lines.append(
-            f"poses are folded: {one.fold.photos} of {one.fold.compared} photos stand beside others that show "
-            f"something else ({first} and {second}), as where two sides of a thing look alike"
+            f"poses are folded: {one.fold.photos} of {one.fold.compared} photos stand beside others that "
+            f"show something else ({first} and {second}), as where two sides of a thing look alike"
         )
     elif one.before is not None and one.before.has_scattered_focals:
         lines.append(
-            f"focal lengths of photos of one size differ by {100 * one.before.focal_spread:.0f} %, more than one "
-            "lens explains"
+            f"focal lengths of photos of one size differ by {100 * one.before.focal_spread:.0f} %, more than "
+            "one lens explains"
         )
     if one.outcome in ("adjusted", "rebuilt"):
         how = {

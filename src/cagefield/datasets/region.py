@@ -107,6 +107,12 @@ def _cube(center: FloatArray, half: float) -> FloatArray:
     return np.stack([center - half, center + half])
 
 
+def depth_range(cameras: Sequence[Camera], points: FloatArray | None) -> tuple[float, float] | None:
+    """(nearest, farthest) depth of the points in all pictures; None where too few are seen."""
+    found = None if points is None else depths_of_points(cameras, points)
+    return None if found is None else (float(found[:, 0].min()), float(found[:, 1].max()))
+
+
 def depths_of_points(cameras: Sequence[Camera], points: FloatArray) -> FloatArray | None:
     """Near and far depths [N,2] of the points in each picture (1 % and 99 %); None where too few are seen."""
     sample = points[:: max(1, len(points) // 5000)]
