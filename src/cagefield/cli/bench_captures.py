@@ -45,6 +45,8 @@ class BenchCaptures:
     """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views."""
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME; left out, the masks that the data sets have."""
     keep_poses: Flag = False
     """Train on poses as they are, even where they are folded; else those are found anew."""
     room_size: int | None = None
@@ -143,7 +145,7 @@ class BenchCaptures:
                         size=self.room_size,
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
-        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
+        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout, masks=self.masks)
         dataset = verified(dataset, correct=not self.keep_poses).dataset
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")

@@ -163,20 +163,23 @@ class _Photos:
 
     def __init__(self, dataset: Dataset) -> None:
         step = max(1, -(-len(dataset.train) // _PHOTOS))
-        self._views = [(view.camera, view.load()) for view in dataset.train[::step]]
+        self._views = [(view.camera, view.load(), view.valid_pixels()) for view in dataset.train[::step]]
 
     def look(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """How many photos see each point, 0 where one shows it as empty, and their mean colour [N,3]."""
         seen = np.zeros(len(points), dtype=np.intp)
         empty = np.zeros(len(points), dtype=bool)
         summed = np.zeros((len(points), 3))
-        for camera, pixels in self._views:
+        for camera, pixels, valid in self._views:
             positions, depth = camera.project(points)
             with np.errstate(invalid="ignore"):
                 inside = np.all((positions >= 0) & (positions < (camera.width, camera.height)), axis=1)
             inside &= depth > 0 if camera.model != "opencv_fisheye" else np.isfinite(depth)
             rows = np.flatnonzero(inside)
             columns, lines = positions[rows].astype(np.intp).T
+            if valid is not None:
+                usable = valid[lines, columns]
+                rows, columns, lines = rows[usable], columns[usable], lines[usable]
             found = pixels[lines, columns]
             if found.shape[1] == 4:
                 empty[rows] |= found[:, 3] < _LEAST_OPAQUE
@@ -196,7 +199,7 @@ def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> 
     digest = hashlib.sha256(version + str(seed).encode())
     for view in views:
         header = read_header(view.image_path)
-        camera = repr((view.name, view.camera.to_dict(), view.downscale, header, view.mask, view.source))
+        camera = repr((view.name, view.camera.to_dict(), view.downscale, header, view.source))
         digest.update(camera.encode())
         for file in (view.image_path, *(() if view.mask is None else (view.mask.path,))):
             with open_regular(file) as stream:
