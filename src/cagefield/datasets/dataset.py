@@ -12,7 +12,7 @@ from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
 from cagefield.datasets.photos import report_conversions
 from cagefield.datasets.raw_photos import find_raw_photos, is_video
-from cagefield.datasets.transforms import load_transforms
+from cagefield.datasets.transforms import camera_file, load_transforms
 from cagefield.datasets.views import Dataset, View, check_holdout
 from cagefield.errors import DatasetError
 
@@ -21,7 +21,7 @@ __all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
 Reader = Callable[[Path, int | None, int], Dataset]
 """Path, factor to shrink by and holdout, as of `load_dataset`."""
 
-_TRANSFORMS = ("transforms.json", "transforms_train.json")
+_LOOKED_FOR = ("transforms.json", "transforms_train.json")
 
 
 def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int = 8) -> Dataset:
@@ -64,7 +64,7 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
                 f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
             )
         raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
-    if any((path / name).is_file() for name in _TRANSFORMS):
+    if camera_file(path) is not None:
         return load_transforms, path
     if (path / POSES_FILE).is_file():
         return load_llff, path
@@ -76,7 +76,7 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
             "train does that by itself)"
         )
     raise DatasetError(
-        f"{path}: no camera file; looked for {', '.join(_TRANSFORMS)}, {POSES_FILE} and a COLMAP model "
+        f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE} and a COLMAP model "
         "(sparse/0/cameras.bin or .txt), and there are no photos either"
     )
 
@@ -96,6 +96,6 @@ def has_photos_alone(path: Path) -> bool:
     """Whether `path` is a video, or a folder of photos without a file of their cameras."""
     if path.is_file():
         return is_video(path)
-    if not path.is_dir() or any((path / name).is_file() for name in (*_TRANSFORMS, POSES_FILE)):
+    if not path.is_dir() or camera_file(path) is not None or (path / POSES_FILE).is_file():
         return False
     return find_model(path) is None and bool(find_raw_photos(path))

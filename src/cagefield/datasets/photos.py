@@ -22,6 +22,9 @@ from cagefield.rendering.picture_formats import EFFICIENT_FORMATS
 EXTENSIONS = (
     ".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif", ".hif", ".avif", ".exr",
 )  # fmt: skip
+FULL_SIZE_FOLDERS = ("images", "input", "photos", "rgb", "color", "image")
+"""Folders in which photos of the whole size are, the first that is there."""
+
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
 
 
@@ -113,9 +116,13 @@ def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
     return np.rint(np.concatenate([rgb, alpha], axis=2)).astype(np.uint8)
 
 
-def photo_folders(root: Path) -> dict[int, Path]:
-    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}."""
-    folders = {1: root / "images"} if (root / "images").is_dir() else {}
+def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
+    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}.
+
+    Photos of the whole size are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that is there.
+    """
+    found = [name for name in ((whole,) if whole else FULL_SIZE_FOLDERS) if (root / name).is_dir()]
+    folders = {1: root / found[0]} if found else {}
     for folder in sorted(root.glob("images_*")):
         if folder.is_dir() and (number := re.fullmatch(r"images_([1-9]\d*)", folder.name)):
             folders[int(number[1])] = folder

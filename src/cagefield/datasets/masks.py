@@ -1,0 +1,65 @@
+"""Masks: pictures that say which pixels of a photo may be used, at the photo's size or another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.errors import DatasetError
+from cagefield.rendering.images import read_image
+
+Excluded = Literal["black", "white"]
+BoolArray = npt.NDArray[np.bool_]
+
+LEAST_VALID = 128
+"""8-bit value from which a pixel of a mask with black exclusions is valid."""
+
+
+def read_mask(path: Path, excluded: Excluded) -> BoolArray:
+    """Valid pixels [H,W] of a mask file at its own size.
+
+    "black": valid from LEAST_VALID on, in the mean of the channels (nerfstudio, COLMAP); "white": valid where
+    every channel is 0 (Instant-NGP's dynamic masks). Alpha is not looked at.
+
+    Raises DatasetError where the file is missing or no picture.
+    """
+    pixels = read_image(path)[..., :3]
+    if excluded == "white":
+        return np.asarray(~pixels.any(axis=2))
+    return np.asarray(pixels.mean(axis=2, dtype=np.float32) >= LEAST_VALID)
+
+
+def resample_mask(valid: BoolArray, width: int, height: int, path: Path) -> BoolArray:
+    """The mask [height,width] by nearest neighbors.
+
+    Raises DatasetError where its aspect differs by more than rounding of the smaller size to whole pixels.
+    """
+    mask_height, mask_width = valid.shape
+    if (mask_width, mask_height) == (width, height):
+        return valid
+    across, down = width / mask_width, height / mask_height
+    if abs(width - down * mask_width) > max(1.0, down) and abs(height - across * mask_height) > max(
+        1.0, across
+    ):
+        raise DatasetError(
+            f"{path}: the mask is {mask_width}x{mask_height}, its photo {width}x{height}; make a mask of the "
+            "photo's size or aspect"
+        )
+    rows = ((np.arange(height) + 0.5) * mask_height / height).astype(np.intp)
+    columns = ((np.arange(width) + 0.5) * mask_width / width).astype(np.intp)
+    return valid[rows[:, None], columns]
+
+
+def shrink_mask(valid: BoolArray, factor: int) -> BoolArray:
+    """The mask of means of `factor` x `factor` pixels: valid where all of them are.
+
+    Columns and rows left over at the right and bottom are dropped, as of photos.
+    """
+    if factor == 1:
+        return valid
+    height, width = valid.shape[0] // factor, valid.shape[1] // factor
+    blocks = valid[: height * factor, : width * factor].reshape(height, factor, width, factor)
+    return np.asarray(blocks.all(axis=(1, 3)))
