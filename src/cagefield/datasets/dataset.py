@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,12 +11,16 @@ import numpy as np
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
 from cagefield.datasets.mask_files import with_masks
+from cagefield.datasets.photos import report_conversions
 from cagefield.datasets.raw_photos import find_raw_photos, is_video
 from cagefield.datasets.transforms import camera_file, load_transforms
 from cagefield.datasets.views import Dataset, View, check_holdout
 from cagefield.errors import DatasetError
 
 __all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
+
+Reader = Callable[[Path, int | None, int], Dataset]
+"""Path, factor to shrink by and holdout, as of `load_dataset`."""
 
 _LOOKED_FOR = ("transforms.json", "transforms_train.json")
 
@@ -46,35 +50,44 @@ def load_dataset(
 def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
     """The data set without masks beside its photos."""
     with _sensible_poses(path):
-        if not path.exists():
-            raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
-        if path.is_file():
-            if path.suffix == ".json":
-                return load_transforms(path, downscale, holdout)
-            if path.name == POSES_FILE:
-                return load_llff(path, downscale, holdout)
-            if path.name in MODEL_FILES:
-                return load_colmap(path.parent, downscale, holdout)
-            if is_video(path):
-                raise DatasetError(
-                    f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
-                )
-            raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
-        if camera_file(path) is not None:
-            return load_transforms(path, downscale, holdout)
-        if (path / POSES_FILE).is_file():
-            return load_llff(path, downscale, holdout)
-        if find_model(path) is not None:
-            return load_colmap(path, downscale, holdout)
-        if has_photos_alone(path):
+        read, place = _reader_of(path)
+        dataset = read(place, downscale, holdout)
+    views = (*dataset.train, *dataset.test, *dataset.val)
+    report_conversions(path, [view.image_path for view in views])
+    return dataset
+
+
+def _reader_of(path: Path) -> tuple[Reader, Path]:
+    """What reads the data set at `path`, and the folder or file that it reads."""
+    if not path.exists():
+        raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
+    if path.is_file():
+        if path.suffix == ".json":
+            return load_transforms, path
+        if path.name == POSES_FILE:
+            return load_llff, path
+        if path.name in MODEL_FILES:
+            return load_colmap, path.parent
+        if is_video(path):
             raise DatasetError(
-                f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield "
-                "train does that by itself)"
+                f"{path}: a video has no poses; find them with: cagefield poses {path} -o DATA"
             )
+        raise DatasetError(f"{path} is no camera file; give transforms.json, {POSES_FILE} or the folder")
+    if camera_file(path) is not None:
+        return load_transforms, path
+    if (path / POSES_FILE).is_file():
+        return load_llff, path
+    if find_model(path) is not None:
+        return load_colmap, path
+    if has_photos_alone(path):
         raise DatasetError(
-            f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE} and a COLMAP model "
-            "(sparse/0/cameras.bin or .txt), and there are no photos either"
+            f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield "
+            "train does that by itself)"
         )
+    raise DatasetError(
+        f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE} and a COLMAP model "
+        "(sparse/0/cameras.bin or .txt), and there are no photos either"
+    )
 
 
 @contextmanager
