@@ -106,7 +106,7 @@ def verify_poses(
         """The verification with these poses where they are better than the given ones."""
         other = with_cameras(dataset, found)
         after = pose_error(matches, [view.whole() for view in all_views(other)])
-        if after is None or not _is_better(before, after, fold):
+        if not _is_better(before, after, fold):
             return None
         if fold is not None and find_fold(other) is not None:
             return None
@@ -133,7 +133,7 @@ def _corrections(
     """Corrected poses one after the other, the cheapest first: (outcome, poses)."""
     with TemporaryFolder("points") as folder:
         solver = PoseSolver(views, folder, partial(on_stage, "Matching photos"), seed)
-        if fold is None and before is not None:
+        if before is not None and (before.is_wrong or fold is None):
             found = solver.refine(before.median / before.size, partial(on_stage, "Adjusting poses"))
             if found is not None:
                 yield "adjusted", found
@@ -147,8 +147,13 @@ def _error(one: Verification) -> float:
     return float("inf") if one.after is None else one.after.median
 
 
-def _is_better(before: PoseError | None, after: PoseError, fold: Fold | None) -> bool:
-    """Whether poses with the error `after` take the place of those with the error `before`."""
+def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | None) -> bool:
+    """Whether poses with the error `after` take the place of those with the error `before`.
+
+    Where neither is known they are judged by the fold alone.
+    """
+    if after is None:
+        return before is None and fold is not None
     if before is None or fold is not None:
         return not after.is_wrong
     if not before.is_wrong:
