@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
+from cagefield.datasets.capture_programs import LAYOUTS, Reader, program_of_file, program_of_folder
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
 from cagefield.datasets.mask_files import with_masks
@@ -19,9 +20,6 @@ from cagefield.errors import DatasetError
 
 __all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
 
-Reader = Callable[[Path, int | None, int], Dataset]
-"""Path, factor to shrink by and holdout, as of `load_dataset`."""
-
 _LOOKED_FOR = ("transforms.json", "transforms_train.json")
 
 
@@ -32,7 +30,8 @@ def load_dataset(
 
     The first of these that a folder has is read: transforms_train.json (NeRF-synthetic), transforms.json
     (Instant-NGP, nerfstudio), poses_bounds.npy (LLFF), a COLMAP model in sparse/0, sparse or the folder
-    itself. Naming the file, or the model's folder, overrides that order.
+    itself, what a capture program writes (see `capture_programs`). Naming the file, or the model's folder,
+    overrides that order.
 
     `downscale` shrinks the photos by that factor; None takes the smallest power of two that brings the longer
     side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
@@ -62,6 +61,8 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
     if not path.exists():
         raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
     if path.is_file():
+        if (program := program_of_file(path)) is not None:
+            return program
         if path.suffix == ".json":
             return load_transforms, path
         if path.name == POSES_FILE:
@@ -79,14 +80,16 @@ def _reader_of(path: Path) -> tuple[Reader, Path]:
         return load_llff, path
     if find_model(path) is not None:
         return load_colmap, path
+    if (program := program_of_folder(path)) is not None:
+        return program
     if has_photos_alone(path):
         raise DatasetError(
             f"{path}: photos without poses; find them with: cagefield poses {path} -o DATA (cagefield "
             "train does that by itself)"
         )
     raise DatasetError(
-        f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE} and a COLMAP model "
-        "(sparse/0/cameras.bin or .txt), and there are no photos either"
+        f"{path}: no camera file; looked for {', '.join(_LOOKED_FOR)}, {POSES_FILE}, a COLMAP model "
+        f"(sparse/0/cameras.bin or .txt), {LAYOUTS}, and there are no photos either"
     )
 
 
@@ -107,4 +110,6 @@ def has_photos_alone(path: Path) -> bool:
         return is_video(path)
     if not path.is_dir() or camera_file(path) is not None or (path / POSES_FILE).is_file():
         return False
-    return find_model(path) is None and bool(find_raw_photos(path))
+    if find_model(path) is not None or program_of_folder(path) is not None:
+        return False
+    return bool(find_raw_photos(path))
