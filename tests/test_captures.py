@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from cagefield.benchmarking import captures, room_edits
 from cagefield.benchmarking.captures import CaptureScore, DepthFigures, for_training, sighted_points, table
@@ -17,11 +19,12 @@ from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.procedural import capture, make_capture
 from cagefield.datasets.procedural.hand_held import picture
-from cagefield.datasets.views import SparsePoints
+from cagefield.datasets.views import PhotoMask, SparsePoints
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import read_image
 from cagefield.rendering.render_result import RenderResult
+from cagefield.training.evaluation import Evaluation, ViewFigures
 from commands import printed, refused
 
 
@@ -63,8 +66,9 @@ def test_the_scene_itself_has_no_depth_error_and_no_fog(room):
     score = captures.measure(data, exact(), points)
     assert (score.photos, score.held_out, score.size) == (14, 2, (90, 160))
     # noise of about 42 dB, exposures of some percent; these are fitted
-    assert 24 < score.test[0] < score.test[1] and 33 < score.test[1] < 48
-    assert 33 < score.train[1] < 48 and score.ssim > 0.9
+    assert 24 < score.test.psnr < score.test.corrected and 33 < score.test.corrected < 48
+    assert 33 < score.train.corrected < 48 and score.test.ssim > 0.9
+    assert score.left_out == 0 and score.pose_error is None
     # the true depth is the photo's own; points are as far off as .7 pixels make them
     assert score.truth == DepthFigures(score.truth.rays, 0.0, 0.0, 0.0)
     assert 1000 < score.truth.rays <= 2 * captures.TRUE_RAYS
@@ -80,8 +84,8 @@ def test_depth_errors_fog_and_exposures_are_what_they_are_made(room):
     assert score.points.median == pytest.approx(0.25, abs=0.03)
     assert (score.truth.fog, score.points.fog) == (1.0, 1.0)
     plain = captures.measure(data, exact(), points)
-    # a gain for each channel takes the halved exposure out
-    assert score.test[1] == pytest.approx(plain.test[1], abs=0.01) and score.test[0] < 15
+    # an affine map of each channel takes the halved exposure out; white is saturated in one alone
+    assert score.test.corrected == pytest.approx(plain.test.corrected, abs=0.5) and score.test.psnr < 15
     assert captures.measure(data, exact(veil=0.09), points).points.fog == 0.0
     assert captures.measure(data, exact(), None).points.rays == 0
 
@@ -147,17 +151,62 @@ def test_unknown_fields_and_captures_without_held_out_photos_are_refused(room):
 def test_the_table_has_a_row_for_each_score_and_dashes_for_what_is_not_known():
     figures = DepthFigures(120, 0.0123, 0.2, 0.031)
     score = CaptureScore(
-        "beer", "splat", 62, 9, (360, 640), 300.4, 20000, (29.0, 30.0), (25.5, 26.5), 0.8123, figures,
-        DepthFigures(), 3.21,
+        "beer", "splat", 62, 9, (360, 640), 300.4, 20000, Evaluation((ViewFigures("x", 29.0, 30.0, 0.9),)),
+        Evaluation((ViewFigures("b/y.jpg", 26.5, 27.5, 0.8), ViewFigures("b/z.jpg", 24.5, 25.5, 0.9))),
+        figures, DepthFigures(), 3, (4.125, 0.5), 3.21,
     )  # fmt: skip
     text = table([score], ["Machine: mine"]).markdown()
     row = next(line for line in text.splitlines() if line.startswith("| beer"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells == [
-        "beer", "splat", "62", "9", "360x640", "300", "20000", "29.00", "25.50", "30.00", "26.50", "0.8123",
-        "120", "1.2%", "20.0%", "3.1%", "-", "-", "-", "3.2 GiB",
+        "beer", "splat", "62", "9", "3", "360x640", "300", "20000", "29.00", "30.00", "25.50", "26.50",
+        "0.8500", "24.50 (z.jpg)", "4.12 -> 0.50", "120", "1.2%", "20.0%", "3.1%", "-", "-", "-", "3.2 GiB",
     ]  # fmt: skip
     assert "- Machine: mine" in text
+    unknown = dataclasses.replace(score, test=Evaluation(), pose_error=None)
+    cells = [cell.strip() for cell in table([unknown]).markdown().splitlines()[4].strip("|").split("|")]
+    assert cells[10:15] == ["-"] * 5
+
+
+def test_photos_that_are_in_no_split_are_counted(room, tmp_path):
+    for view in load_dataset(room).train[:3]:
+        shutil.copy(view.image_path, tmp_path)
+    views = [
+        dataclasses.replace(view, image_path=tmp_path / Path(view.name).name)
+        for view in load_dataset(room).train[:2]
+    ]
+    data = dataclasses.replace(load_dataset(room), train=(views[0],), test=(views[1],), val=())
+    assert captures.left_out_photos(data) == 1
+    for name in (f"{views[0].image_path.stem}_depth_0001.png", ".hidden.jpg", "notes.txt"):
+        (tmp_path / name).write_bytes(b"")
+    assert captures.left_out_photos(data) == 1
+    (tmp_path / "frame_00099.JPG").write_bytes(b"")
+    assert captures.left_out_photos(data) == 2
+
+
+def test_figures_leave_out_what_a_mask_excludes(room, tmp_path):
+    """A square of each test photo is painted black and masked: figures are those of the other pixels."""
+    data = load_dataset(room)
+    tests = []
+    for view in data.test:
+        photo, mask = view.load(), np.full((160, 90), 255, np.uint8)
+        photo[40:80, 20:60], mask[40:80, 20:60] = 0, 0
+        paths = tmp_path / f"{Path(view.name).stem}.png", tmp_path / f"{Path(view.name).stem}_mask.png"
+        Image.fromarray(photo).save(paths[0])
+        Image.fromarray(mask).save(paths[1])
+        tests.append(dataclasses.replace(view, image_path=paths[0], mask=PhotoMask(paths[1])))
+    painted = dataclasses.replace(data, test=tuple(tests))
+    unmasked = dataclasses.replace(data, test=tuple(dataclasses.replace(v, mask=None) for v in tests))
+    plain, masked, black = (captures.measure(d, exact()).test for d in (data, painted, unmasked))
+    assert black.psnr < plain.psnr - 5
+    assert masked.psnr == pytest.approx(plain.psnr, abs=1.5) and masked.ssim > plain.ssim - 0.02
+    nothing = np.zeros((160, 90), np.uint8)
+    Image.fromarray(nothing).save(tmp_path / "none.png")
+    hidden = dataclasses.replace(tests[0], mask=PhotoMask(tmp_path / "none.png"))
+    with pytest.warns(UserWarning, match="1 of 2 photos are left out of the figures"):
+        one = captures.measure(dataclasses.replace(painted, test=(hidden, tests[1])), exact()).test
+    assert [view.name for view in one.views] == [tests[1].name]
+    assert one.worst is not None and one.worst.psnr == one.psnr
 
 
 def test_memory_is_that_of_this_process():

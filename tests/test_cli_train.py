@@ -29,7 +29,11 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_train_writes_a_scene(photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]) == 0
     out, err = capsys.readouterr()
-    match = re.search(r"60 steps, (\d+) voxels; train PSNR ([\d.]+) dB; test PSNR ([\d.]+) dB, SSIM 0", out)
+    match = re.search(
+        r"60 steps, (\d+) voxels; train PSNR ([\d.]+) dB; "
+        r"test PSNR ([\d.]+) dB \([\d.]+ color-corrected\), SSIM 0",
+        out,
+    )
     assert match and f"scene written to {tmp_path / 'scene'}" in out
     assert "Training 50%: loss 0." in err and "k rays/s" in err
     assert [entry.name for entry in tmp_path.iterdir()] == ["scene"]
@@ -47,7 +51,9 @@ def test_photos_too_small_for_ssim_give_a_scene_without_that_figure(
 ) -> None:
     argv = ["train", str(photos), "-o", str(tmp_path / "scene"), "--steps", "5", "--resolution", "16"]
     assert main([*argv, "--downscale", "6"]) == 0  # to 8 x 8 pixels
-    assert re.search(r"; test PSNR [\d.]+ dB\n", capsys.readouterr().out)
+    assert re.search(
+        r"; test PSNR [\d.]+ dB \([\d.]+ color-corrected\), worst view ", capsys.readouterr().out
+    )
     assert Scene.open(tmp_path / "scene").cameras["test"][0].width == 8
 
 

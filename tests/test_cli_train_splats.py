@@ -63,7 +63,9 @@ def test_splats_of_a_bounded_scene_where_they_are_asked_for(
     argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *STEPS, "--field", "splat"]
     assert main([*argv, "--sh-degree", "3"]) == 0
     out = capsys.readouterr().out
-    match = re.search(r"test PSNR ([\d.]+) dB, SSIM 0", out)
+    match = re.search(
+        r"test PSNR ([\d.]+) dB \([\d.]+ color-corrected\), SSIM 0[.\d]*, worst view \S+ [\d.]+ dB", out
+    )
     scene = Scene.open(tmp_path / "scene")
     assert isinstance(scene.field, SplatField) and not scene.field.unbounded
     assert scene.field.sh_degree == 3 and scene.background == (1.0, 1.0, 1.0)

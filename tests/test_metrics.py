@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import CagefieldError
-from cagefield.rendering.metrics import mse, psnr, ssim
+from cagefield.rendering.metrics import color_corrected, color_fit, mse, psnr, ssim
 
 
 def pair(shape: tuple[int, ...], noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -78,3 +78,83 @@ def test_uint8_and_float_images_agree():
 def test_errors_name_the_shapes(call, message):
     with pytest.raises(CagefieldError, match=message):
         call()
+
+
+def test_color_correction_undoes_an_affine_change_of_each_channel():
+    photo, _ = pair((20, 30, 3), 0)
+    photo = 0.1 + 0.6 * photo
+    gain, offset = np.array([0.8, 1.2, 0.9]), np.array([0.05, -0.08, 0.02])
+    picture = (photo - offset) / gain
+    fit = color_fit(picture, photo)
+    np.testing.assert_allclose(fit.gain, gain, rtol=1e-9)
+    np.testing.assert_allclose(fit.offset, offset, atol=1e-9)
+    # the picture itself is float32
+    np.testing.assert_allclose(color_corrected(picture, photo), photo, atol=1e-6)
+
+
+def test_color_correction_is_the_regression_of_the_photo_on_the_picture():
+    picture, photo = pair((40, 40, 3), 0.05)
+    picture, photo = 0.2 + 0.5 * picture, 0.2 + 0.5 * photo
+    fit = color_fit(picture, photo)
+    for channel in range(3):
+        slope, offset = np.polyfit(picture[..., channel].ravel(), photo[..., channel].ravel(), 1)
+        assert (fit.gain[channel], fit.offset[channel]) == pytest.approx((slope, offset), abs=1e-9)
+
+
+def test_saturated_pixels_take_no_part_in_the_color_fit_and_the_result_is_clipped():
+    truth = np.repeat(np.linspace(0.0, 1.0, 400).reshape(20, 20, 1), 3, 2)
+    photo = np.clip(1.5 * truth, 0, 1)
+    fit = color_fit(truth, photo)
+    np.testing.assert_allclose(fit.gain, 1.5, rtol=1e-9)
+    np.testing.assert_allclose(fit.offset, 0.0, atol=1e-9)
+    np.testing.assert_allclose(fit(truth), photo, atol=1e-6)
+
+
+def test_a_channel_of_one_value_gets_an_offset_and_a_saturated_one_stays():
+    picture, photo = np.full((12, 12, 3), 0.4), np.full((12, 12, 3), 0.5)
+    picture[..., 2] = 0.0
+    np.testing.assert_allclose(color_corrected(picture, photo)[0, 0], [0.5, 0.5, 0.0], atol=1e-7)
+
+
+def test_excluded_pixels_have_no_part_in_any_figure():
+    a, b = pair((24, 26, 3), 0.1)
+    valid = np.ones((24, 26), bool)
+    valid[3:12, 5:20] = False
+    noise = np.random.default_rng(1).uniform(size=(2, *a.shape))
+    c, d = (np.where(valid[..., None], x, y) for x, y in zip((a, b), noise, strict=True))
+    assert mse(c, d, valid) == pytest.approx(np.mean((a - b)[valid] ** 2), abs=1e-12)
+    assert psnr(c, d, valid) == psnr(a, b, valid) != psnr(a, b)
+    # windows across the mask's border add up in another order
+    assert ssim(c, d, valid) == pytest.approx(ssim(a, b, valid), abs=1e-12)
+    np.testing.assert_array_equal(color_fit(c, d, valid).gain, color_fit(a, b, valid).gain)
+    assert ssim(a, b, np.ones((24, 26), bool)) == ssim(a, b)
+
+
+def test_ssim_of_a_mask_is_the_mean_over_windows_about_its_valid_pixels():
+    """Valid on the left, far from which the windows are whole: those of the left part alone."""
+    a, b = pair((20, 40, 3), 0.1)
+    valid = np.zeros((20, 40), bool)
+    valid[:, :18] = True
+    one = np.zeros((20, 40), bool)
+    one[10, 10] = True
+    window = brute_force_ssim(a[5:16, 5:16], b[5:16, 5:16])
+    assert window == pytest.approx(ssim(a[5:16, 5:16], b[5:16, 5:16]), abs=1e-10)
+    # of one valid pixel there is no variance: only the luminance is compared
+    x, y = a[10, 10], b[10, 10]
+    luminance = (2 * x * y + 1e-4) / (x**2 + y**2 + 1e-4)
+    assert ssim(a, b, one) == pytest.approx(luminance.mean(), abs=1e-9)
+    changed = b.copy()
+    changed[:, 18:] = 0.5
+    assert ssim(a, changed, valid) == pytest.approx(ssim(a, b, valid), abs=1e-12)
+    corner = np.zeros((20, 40), bool)
+    corner[0, 0] = True
+    assert np.isnan(ssim(a, b, corner))
+
+
+@pytest.mark.parametrize(
+    ("valid", "message"),
+    [(np.ones((3, 4), bool), r"must be \[4, 3\], not \[3, 4\]"), (np.zeros((4, 3), bool), "no pixel of the")],
+)
+def test_masks_that_do_not_fit_are_refused(valid, message):
+    with pytest.raises(CagefieldError, match=message):
+        psnr(np.zeros((4, 3, 3)), np.ones((4, 3, 3)), valid)

@@ -21,12 +21,14 @@ from numpy.typing import NDArray
 from cagefield.benchmarking.learning import Learnt
 from cagefield.benchmarking.tables import Table, number
 from cagefield.datasets import Dataset, View
+from cagefield.datasets.photos import EXTENSIONS
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import CagefieldError
 from cagefield.npz import read_array
 from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.metrics import psnr, ssim
+from cagefield.rendering.metrics import color_corrected
 from cagefield.rendering.render_result import RenderResult
+from cagefield.training.evaluation import Evaluation, ViewFigures, collected, composited, view_figures
 from cagefield.typing import Array, Float32
 
 NEARER, FOGGY = 0.8, 0.1
@@ -38,11 +40,11 @@ TRUE_RAYS = 2000
 """Rays of a photo, evenly spread, on which the true depth is compared."""
 
 _COLUMNS = (
-    "capture", "field", "photos", "held out", "size", "seconds", "elements", "train PSNR", "PSNR",
-    "train, exposed", "exposed", "SSIM", "points", "depth error", "90 %", "fog", "true depth", "true 90 %",
-    "true fog", "memory",
+    "capture", "field", "photos", "held out", "left out", "size", "seconds", "elements", "train PSNR",
+    "train, corrected", "PSNR", "corrected", "SSIM", "worst view", "pose error", "points", "depth error",
+    "90 %", "fog", "true depth", "true 90 %", "true fog", "memory",
 )  # fmt: skip
-_SHOWN = ("capture", "field", "train PSNR", "PSNR", "exposed", "SSIM", "depth error", "fog", "true depth")
+_SHOWN = ("capture", "field", "train PSNR", "PSNR", "corrected", "SSIM", "worst view", "pose error", "fog")
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,12 @@ class DepthFigures:
 
 @dataclass(frozen=True)
 class CaptureScore:
-    """The figures of one field on one capture; PSNRs are (plain, with the photo's exposure fitted)."""
+    """The figures of one field on one capture.
+
+    photos      number of training photos; left_out: of photos beside them that are in no split
+    pose_error  epipolar error of the poses in pixels, as given and after they were verified; None where
+                nobody measured it
+    """
 
     name: str
     kind: str
@@ -66,11 +73,12 @@ class CaptureScore:
     size: tuple[int, int]
     seconds: float
     elements: int
-    train: tuple[float, float]
-    test: tuple[float, float]
-    ssim: float
+    train: Evaluation
+    test: Evaluation
     points: DepthFigures
     truth: DepthFigures
+    left_out: int = 0
+    pose_error: tuple[float, float] | None = None
     memory: float = float("nan")
 
 
@@ -82,17 +90,17 @@ def measure(dataset: Dataset, learnt: Learnt, points: SparsePoints | None = None
     if not dataset.test:
         raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
     some = dataset.train[:: -(-len(dataset.train) // TRAIN_VIEWS)]
-    train = np.array([_likeness(view, learnt.show(view.camera))[:2] for view in some]).mean(axis=0)
-    test, at_points, true = [], [], []
+    train = collected([_figures_of(view, learnt.show(view.camera)) for view in some])
+    test: list[ViewFigures | None] = []
+    at_points, true = [], []
     for view in dataset.test:
         frame = learnt.show(view.camera)
-        test.append(_likeness(view, frame))
+        test.append(_figures_of(view, frame))
         if points is not None:
             at_points.append(_depths(view, frame, learnt, *_point_rays(view, points)))
         known = true_depth(dataset, view)
         if known is not None:
             true.append(_depths(view, frame, learnt, *_spread_rays(known)))
-    mean = np.mean(test, axis=0)
     camera = dataset.test[0].camera
     return CaptureScore(
         dataset.name,
@@ -102,12 +110,30 @@ def measure(dataset: Dataset, learnt: Learnt, points: SparsePoints | None = None
         (camera.width, camera.height),
         learnt.seconds,
         learnt.elements,
-        (float(train[0]), float(train[1])),
-        (float(mean[0]), float(mean[1])),
-        float(mean[2]),
+        train,
+        collected(test),
         _figures(at_points),
         _figures(true),
+        left_out_photos(dataset),
     )
+
+
+def left_out_photos(dataset: Dataset) -> int:
+    """Number of photos that lie beside those of the data set, in the same folders, and belong to no split.
+
+    Pictures that are named as one of the photos with an addition (NeRF-synthetic's r_0_depth_0001.png) and
+    hidden files are none.
+    """
+    used = {view.image_path for view in (*dataset.train, *dataset.test, *dataset.val)}
+    count = 0
+    for folder in {path.parent for path in used}:
+        stems = {path.stem for path in used if path.parent == folder}
+        for path in folder.iterdir():
+            if path in used or path.suffix.lower() not in EXTENSIONS or path.name.startswith("."):
+                continue
+            pieces = path.stem.split("_")
+            count += not any("_".join(pieces[:n]) in stems for n in range(1, len(pieces)))
+    return count
 
 
 def sighted_points(dataset: Dataset) -> SparsePoints | None:
@@ -165,32 +191,8 @@ def true_depth(dataset: Dataset, view: View) -> Float32 | None:
     return some
 
 
-def _photo(view: View) -> Float32:
-    """The photo [H,W,3] in [0,1], over white where it is a cut-out."""
-    photo = view.load().astype(np.float32) / np.float32(255)
-    if photo.shape[2] == 4:
-        photo = photo[..., :3] * photo[..., 3:] + (1 - photo[..., 3:])
-    return photo
-
-
-def gains_to(picture: NDArray[Any], photo: NDArray[Any]) -> Float32:
-    """Gain [3] of each channel of a picture [H,W,3] that takes it closest to the photo (least squares)."""
-    square = (picture * picture).sum((0, 1))
-    return np.asarray((picture * photo).sum((0, 1)) / np.maximum(square, 1e-12), np.float32)
-
-
-def exposed(picture: NDArray[Any], photo: Float32) -> Float32:
-    """The picture [H,W,3] times its gains to the photo."""
-    return np.clip(picture * gains_to(picture, photo), 0, 1).astype(np.float32)
-
-
-def _likeness(view: View, frame: RenderResult) -> tuple[float, float, float]:
-    """(PSNR, PSNR with the exposure fitted, SSIM) of a picture of a photo's view, over its valid pixels."""
-    photo, picture, valid = _photo(view), np.clip(frame.rgb, 0, 1), view.valid_pixels()
-    weight = np.ones(photo.shape[:2], np.float32) if valid is None else valid.astype(np.float32)
-    gains = gains_to(picture * weight[..., None], photo)
-    fitted = np.clip(picture * gains, 0, 1).astype(np.float32)
-    return psnr(picture, photo, valid), psnr(fitted, photo, valid), ssim(picture, photo, valid)
+def _figures_of(view: View, frame: RenderResult) -> ViewFigures | None:
+    return view_figures(view.name, frame.rgb, composited(view.load()), view.valid_pixels())
 
 
 def _point_rays(view: View, points: SparsePoints) -> tuple[NDArray[np.int64], Array]:
@@ -239,9 +241,12 @@ def _figures(rays: Sequence[tuple[Array, NDArray[np.bool_]]]) -> DepthFigures:
 def table(scores: Sequence[CaptureScore], notes: Sequence[str] = ()) -> Table:
     """The scores as a table, with what its columns mean."""
     explained = (
-        "PSNR (dB) and SSIM: mean over held-out photos, never trained on; train: over "
-        f"{TRAIN_VIEWS} training photos. Exposed: each picture times the gains, one for each channel, that "
-        "take it closest to its photo: exposures of held-out photos are not known to the trainer.",
+        "PSNR (dB) and SSIM: mean over held-out photos, never trained on, over pixels that no mask excludes; "
+        f"train: over {TRAIN_VIEWS} training photos; worst view: the held-out photo of the lowest PSNR. "
+        "Corrected: after an affine map of each color channel, fitted to the photo by least squares over "
+        "unsaturated pixels: exposure and white balance of held-out photos are not known to the trainer.",
+        "Left out: photos in the same folders that are in no split. Pose error: median distance in pixels of "
+        "matches to their epipolar lines, of the poses as given -> as trained with.",
         "Depth error: at the sparse points that held-out photos see, |t - t*| / t* of the distance along the "
         f"ray, median and 90 %; fog: the share of those rays with more than {FOGGY:g} opacity before "
         f"{NEARER:g} t*. Points that fewer than two training photos see are not trained with.",
@@ -257,20 +262,23 @@ def _row(score: CaptureScore) -> tuple[str, ...]:
     def percent(value: float) -> str:
         return "-" if np.isnan(value) else f"{number(100 * value, 1)}%"
 
-    points, truth = score.points, score.truth
+    points, truth, worst = score.points, score.truth, score.test.worst
     return (
         score.name,
         score.kind,
         str(score.photos),
         str(score.held_out),
+        str(score.left_out),
         f"{score.size[0]}x{score.size[1]}",
         number(score.seconds, 0),
         str(score.elements),
-        number(score.train[0]),
-        number(score.test[0]),
-        number(score.train[1]),
-        number(score.test[1]),
-        number(score.ssim, 4),
+        number(score.train.psnr),
+        number(score.train.corrected),
+        number(score.test.psnr),
+        number(score.test.corrected),
+        number(score.test.ssim, 4),
+        "-" if worst is None else f"{number(worst.psnr)} ({PurePosixPath(worst.name).name})",
+        "-" if score.pose_error is None else " -> ".join(number(error) for error in score.pose_error),
         str(points.rays) if points.rays else "-",
         percent(points.median),
         percent(points.high),
@@ -285,14 +293,14 @@ def _row(score: CaptureScore) -> tuple[str, ...]:
 def write_pictures(
     dataset: Dataset, learnt: Learnt, folder: Path, views: int = 4, times: float = 3.0
 ) -> list[Path]:
-    """Writes photo, picture (exposed), difference and depth of some held-out photos side by side.
+    """Writes photo, picture (color-corrected), difference and depth of some held-out photos side by side.
 
     The difference is dark and `times` as strong; the depth is that of the picture, near is dark.
     """
     written = []
     for view in dataset.test[:: -(-len(dataset.test) // views)]:
-        photo, frame = _photo(view), learnt.show(view.camera)
-        picture = exposed(np.clip(frame.rgb, 0, 1), photo)
+        photo, frame = composited(view.load()), learnt.show(view.camera)
+        picture = color_corrected(np.clip(frame.rgb, 0, 1), photo, view.valid_pixels())
         difference = 1 - np.minimum(times * np.abs(picture - photo).max(-1, keepdims=True), 1)
         known = true_depth(dataset, view)
         panels = [photo, picture, np.repeat(difference, 3, -1), _grey(frame.depth, known)]

@@ -1,8 +1,8 @@
 """Edits of fields trained on the built-in rooms, against the rooms whose parts were really moved.
 
 The truth is the picture of the moved room with the light as it then falls, but for shadows, which stay where
-they were. Pictures of the trained field, edited and not, are taken times the gains that bring the unedited
-one closest to the unedited room: which exposure is the mean of a capture's is not known.
+they were. Pictures of the trained field, edited and not, go through the affine map of colors that brings the
+unedited one closest to the unedited room: which exposure is the mean of a capture's is not known.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.captures import gains_to
 from cagefield.benchmarking.cases import ROOM_CASES, Case
 from cagefield.benchmarking.figures import Figures, compare
 from cagefield.benchmarking.learning import Learnt
@@ -27,6 +26,7 @@ from cagefield.datasets.procedural import capture
 from cagefield.datasets.procedural.hand_held import picture
 from cagefield.errors import CagefieldError
 from cagefield.rendering.images import side_by_side, write_png
+from cagefield.rendering.metrics import color_fit
 from cagefield.typing import Float32
 
 _ROUNDS = 5
@@ -54,10 +54,10 @@ def measure(dataset: Dataset, learnt: Learnt, cases: Sequence[Case]) -> list[Roo
         truth = np.stack([_clipped(picture(scene, camera)[0]) for camera in cameras])
         moved = np.stack([_clipped(picture(_moved(case), camera)[0]) for camera in cameras])
         plain = [_clipped(learnt.show(camera).rgb) for camera in cameras]
-        gains = [gains_to(shown, true) for shown, true in zip(plain, truth, strict=True)]
-        after = [_clipped(edited(camera).rgb) * gain for camera, gain in zip(cameras, gains, strict=True)]
-        before = [shown * gain for shown, gain in zip(plain, gains, strict=True)]
-        figures = compare(_clipped(np.stack(before)), _clipped(np.stack(after)), truth, moved)
+        fits = [color_fit(shown, true) for shown, true in zip(plain, truth, strict=True)]
+        after = [fit(_clipped(edited(camera).rgb)) for camera, fit in zip(cameras, fits, strict=True)]
+        before = [fit(shown) for shown, fit in zip(plain, fits, strict=True)]
+        figures = compare(np.stack(before), np.stack(after), truth, moved)
         ratio = _frame_ratio(learnt, edited, cameras[:2])
         scores.append(RoomScore(case, learnt.kind, len(cameras), figures, ratio))
     return scores
@@ -128,8 +128,8 @@ def write_picture(learnt: Learnt, case: Case, folder: Path, size: int = 480) -> 
     eye, target = _EYES[case.scene]
     camera = Camera.look_at(eye, target, width=round(0.75 * size), height=size, fov_x=float(np.radians(52.0)))
     before, after = (_clipped(show(camera).rgb) for show in (learnt.show, learnt.edited(case.edits)))
-    gain = gains_to(before, _clipped(picture(capture(case.scene).scene, camera)[0]))
+    fit = color_fit(before, _clipped(picture(capture(case.scene).scene, camera)[0]))
     truth = _clipped(picture(moved, camera)[0])
     path = folder / case.file.replace(".yaml", ".png")
-    write_png(path, side_by_side(_clipped(before * gain), _clipped(after * gain), truth))
+    write_png(path, side_by_side(fit(before), fit(after), truth))
     return path

@@ -107,9 +107,11 @@ def measure(
     last: list[Progress] = []
 
     def add(now: Progress, field: VoxelField, chosen: tuple[View, ...] = some) -> None:
-        psnr, ssim = evaluate_views(field, chosen)
+        test = evaluate_views(field, chosen)
         points.append(
-            Point(now.seconds, now.step, now.resolution, now.voxels, now.psnr, psnr, ssim, len(chosen))
+            Point(
+                now.seconds, now.step, now.resolution, now.voxels, now.psnr, test.psnr, test.ssim, len(chosen)
+            )
         )
         if on_point is not None:
             on_point(points[-1])

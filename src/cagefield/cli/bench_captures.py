@@ -170,8 +170,8 @@ class BenchCaptures:
         score = captures.measure(dataset, learnt, points)
         score = dataclasses.replace(score, memory=captures.peak_memory())
         print(
-            f"{score.name}, {field}: PSNR {score.test[0]:.2f} dB ({score.test[1]:.2f} exposed) on held-out "
-            f"photos, {score.train[0]:.2f} on training photos; fog {100 * score.points.fog:.1f}%, "
+            f"{score.name}, {field}: PSNR {score.test} on held-out photos, "
+            f"{score.train.psnr:.2f} dB on training photos; fog {100 * score.points.fog:.1f}%, "
             f"depth error {100 * score.points.median:.1f}%",
             flush=True,
         )

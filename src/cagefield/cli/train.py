@@ -268,7 +268,7 @@ def train_splats(
 
 
 def summary(result: TrainResult | SplatTrainResult) -> str:
-    """One line of figures: time, steps, voxels or splats, PSNR and SSIM."""
+    """One line of figures: time, steps, voxels or splats, PSNR raw and color-corrected, SSIM, worst view."""
     from cagefield.fields.voxel import VoxelField
 
     field = result.field
@@ -277,7 +277,6 @@ def summary(result: TrainResult | SplatTrainResult) -> str:
         f"trained {result.seconds:.0f} s, {result.steps} steps, {size}",
         f"train PSNR {result.train_psnr:.2f} dB",
     ]
-    if result.test_psnr == result.test_psnr:
-        ssim = f", SSIM {result.test_ssim:.4f}" if result.test_ssim == result.test_ssim else ""
-        parts.append(f"test PSNR {result.test_psnr:.2f} dB{ssim}")
+    if result.test.views:
+        parts.append(f"test PSNR {result.test}")
     return "; ".join(parts)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
@@ -11,6 +14,12 @@ from cagefield.typing import AnyArray, Mask
 
 WINDOW, WINDOW_SIGMA = 11, 1.5
 K1, K2 = 0.01, 0.03
+
+SATURATED = 0.5 / 255
+"""Distance from 0 and from 1 below which a color counts as saturated: half a step of 8 bits."""
+
+COLOR_FITS = 5
+"""Fits of a color correction at most, each without the pixels that the one before saturates."""
 
 
 def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -23,16 +32,33 @@ def _pair(first: AnyArray, second: AnyArray) -> tuple[NDArray[np.float64], NDArr
     return floats[0], floats[1]
 
 
+def _checked_mask(valid: Mask | None, shape: tuple[int, ...]) -> Mask | None:
+    """The mask [H,W], None where every pixel of images [H,W] or [H,W,C] is valid.
+
+    Raises CagefieldError for a mask of another size, and for one without a valid pixel.
+    """
+    if valid is None:
+        return None
+    valid = np.asarray(valid, bool)
+    if valid.shape != shape[:2]:
+        raise CagefieldError(
+            f"a mask of images {list(shape)} must be {list(shape[:2])}, not {list(valid.shape)}"
+        )
+    if not valid.any():
+        raise CagefieldError("no pixel of the mask is valid; images are compared on at least one")
+    return None if valid.all() else valid
+
+
 def mse(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
-    """Mean squared difference over all pixels and channels, or the `valid` pixels [H,W]; NaN without any."""
+    """Mean squared difference over all channels of all pixels, or of those of a mask [H,W]."""
     a, b = _pair(first, second)
-    if valid is not None:
-        a, b = a[valid], b[valid]
-    return float(np.mean((a - b) ** 2)) if a.size else float("nan")
+    chosen = _checked_mask(valid, a.shape)
+    square = (a - b) ** 2
+    return float(np.mean(square if chosen is None else square[chosen]))
 
 
 def psnr(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
-    """Peak signal-to-noise ratio in dB: -10 log10(mse); inf for equal images, NaN without valid pixels."""
+    """Peak signal-to-noise ratio in dB: -10 log10(mse); inf for equal images."""
     error = mse(first, second, valid)
     return float("inf") if error == 0 else float(-10.0 * np.log10(error))
 
@@ -41,9 +67,9 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     """Mean structural similarity of [H,W] or [H,W,C] images: 1 for equal images.
 
     11x11 Gaussian window with standard deviation 1.5, only where it fits the image; K1 = .01, K2 = .03,
-    range 1; mean over pixels and channels. With `valid` [H,W] the mean is over these pixels alone, NaN where
-    the window fits around none; the window itself takes in the others too. Raises CagefieldError for images
-    smaller than the window.
+    range 1; mean over pixels and channels. With a mask [H,W]: mean over windows about valid pixels, whose
+    weights are those of their valid pixels alone and sum to 1; NaN where no window is about a valid pixel.
+    Raises CagefieldError for images smaller than the window.
     Source: Wang et al., "Image quality assessment: from error visibility to structural similarity" (2004),
     equations 13 to 16, and the authors' ssim_index.
     """
@@ -53,12 +79,27 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     offsets = np.arange(WINDOW) - WINDOW // 2
     kernel = np.exp(-0.5 * (offsets / WINDOW_SIGMA) ** 2)
     kernel /= kernel.sum()
+    edge = WINDOW // 2
+    valid = _checked_mask(valid, a.shape)
 
-    def blur(image: NDArray[np.float64]) -> NDArray[np.float64]:
-        edge = WINDOW // 2
-        smooth = correlate1d(correlate1d(image, kernel, axis=0), kernel, axis=1)
-        inner: NDArray[np.float64] = smooth[edge:-edge, edge:-edge]
-        return inner
+    def inner(image: NDArray[Any]) -> NDArray[Any]:
+        return image[edge:-edge, edge:-edge]
+
+    def smooth(image: NDArray[np.float64]) -> NDArray[np.float64]:
+        return inner(correlate1d(correlate1d(image, kernel, axis=0), kernel, axis=1))
+
+    if valid is None:
+        blur, chosen = smooth, None
+    else:
+        chosen = inner(valid)
+        if not chosen.any():
+            return float("nan")
+        weight = valid.astype(np.float64).reshape(valid.shape + (1,) * (a.ndim - 2))
+        # a window about a valid pixel has at least the weight of its middle
+        total = np.maximum(smooth(weight), kernel[edge] ** 2)
+
+        def blur(image: NDArray[np.float64]) -> NDArray[np.float64]:
+            return smooth(image * weight) / total
 
     mean_a, mean_b = blur(a), blur(b)
     # a variance below zero is rounding
@@ -69,6 +110,58 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     luminance = (2 * mean_a * mean_b + c1) / (mean_a**2 + mean_b**2 + c1)
     structure = (2 * covariance + c2) / (var_a + var_b + c2)
     similarity = luminance * structure
-    if valid is not None:
-        similarity = similarity[valid[WINDOW // 2 : -(WINDOW // 2), WINDOW // 2 : -(WINDOW // 2)]]
-    return float(np.mean(similarity)) if similarity.size else float("nan")
+    return float(np.mean(similarity if chosen is None else similarity[chosen]))
+
+
+@dataclass(frozen=True)
+class ColorFit:
+    """Affine map of each channel, clip(gain * color + offset, 0, 1); gain, offset [C]."""
+
+    gain: NDArray[np.float64]
+    offset: NDArray[np.float64]
+
+    def __call__(self, picture: AnyArray) -> NDArray[np.float32]:
+        """The corrected picture [H,W,C] in [0,1]."""
+        floats, _ = _pair(picture, picture)
+        return np.clip(floats * self.gain + self.offset, 0, 1).astype(np.float32)
+
+
+def color_fit(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> ColorFit:
+    """Least-squares affine map of each channel of a picture [H,W,C] to a photo.
+
+    Over valid pixels that are saturated in neither, nor by the map itself, which is fitted again until its
+    saturated pixels stay the same (COLOR_FITS times at most). A channel of one value gets an offset alone,
+    one without such pixels stays as it is.
+    Source: `color_correct` of multinerf (evaluation of mip-NeRF 360), its quadratic terms left out.
+    """
+    a, b = _pair(picture, photo)
+    chosen = _checked_mask(valid, a.shape)
+    a, b = (
+        (a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1])) if chosen is None else (a[chosen], b[chosen])
+    )
+    gain, offset = np.ones(a.shape[-1]), np.zeros(a.shape[-1])
+    for channel in range(a.shape[-1]):
+        x, y = a[:, channel], b[:, channel]
+        both = _unsaturated(x) & _unsaturated(y)
+        used = both
+        for _ in range(COLOR_FITS):
+            if not used.any():
+                break
+            mean_x, mean_y = x[used].mean(), y[used].mean()
+            variance = ((x[used] - mean_x) ** 2).mean()
+            slope = ((x[used] - mean_x) * (y[used] - mean_y)).mean() / variance if variance > 1e-12 else 1.0
+            gain[channel], offset[channel] = slope, mean_y - slope * mean_x
+            before, used = used, both & _unsaturated(slope * x + offset[channel])
+            if np.array_equal(before, used):
+                break
+    return ColorFit(gain, offset)
+
+
+def color_corrected(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> NDArray[np.float32]:
+    """The picture [H,W,C] in the photo's colors: each channel by the affine map of `color_fit`."""
+    return color_fit(picture, photo, valid)(picture)
+
+
+def _unsaturated(values: NDArray[np.float64]) -> Mask:
+    inside: Mask = (values >= SATURATED) & (values <= 1 - SATURATED)
+    return inside

@@ -25,7 +25,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets.points import points_cache, points_of
 from cagefield.datasets.views import Dataset
 from cagefield.fields.splat import SplatField
-from cagefield.training.evaluation import evaluate_views
+from cagefield.training.evaluation import Evaluation, evaluate_views
 from cagefield.training.loop import run_to_end
 from cagefield.training.splat_config import SplatConfig
 
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SplatTrainResult:
-    """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none.
+    """A trained field and its figures: those of the test views, and the mean PSNR of ten training views, NaN
+    where there are none.
 
     `cameras` are those of the training photos, in their order: not the data set's where poses were refined.
     """
@@ -44,11 +45,20 @@ class SplatTrainResult:
     steps: int
     seconds: float
     train_psnr: float
-    test_psnr: float
-    test_ssim: float
+    test: Evaluation
     gains: NDArray[np.float32]
     cameras: tuple[Camera, ...]
     finished: bool
+
+    @property
+    def test_psnr(self) -> float:
+        """Mean raw PSNR of the test views in dB, NaN where there are none."""
+        return self.test.psnr
+
+    @property
+    def test_ssim(self) -> float:
+        """Mean SSIM of the test views, NaN where there are none."""
+        return self.test.ssim
 
 
 def train_splat(
@@ -89,16 +99,14 @@ def train_splat(
     run = SplatRun(dataclasses.replace(dataset, points=points), config, seeds)
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
     field = run.field()
-    train_psnr = test_psnr = test_ssim = float("nan")
+    train, test = Evaluation(), Evaluation()
     if evaluate and len(field):
         moved = [
             dataclasses.replace(view, camera=camera)
             for view, camera in zip(dataset.train, run.cameras(), strict=True)
         ]
         some = moved[:: max(1, len(moved) // 10)]
-        train_psnr, _ = evaluate_views(field, tuple(some))
-        if dataset.test:
-            test_psnr, test_ssim = evaluate_views(field, dataset.test)
+        train, test = evaluate_views(field, some), evaluate_views(field, dataset.test)
     return SplatTrainResult(
-        field, run.step, run.seconds, train_psnr, test_psnr, test_ssim, run.gains, run.cameras(), finished
+        field, run.step, run.seconds, train.psnr, test, run.gains, run.cameras(), finished
     )

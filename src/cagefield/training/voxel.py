@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cagefield import devices
 from cagefield.datasets.views import Dataset
 from cagefield.fields.voxel import VoxelField
-from cagefield.training.evaluation import evaluate_views
+from cagefield.training.evaluation import Evaluation, evaluate_views
 from cagefield.training.inpaint import filled
 from cagefield.training.loop import run_to_end
 from cagefield.training.progress import Progress, Snapshots
@@ -31,16 +31,26 @@ from cagefield.training.voxel_config import VoxelConfig
 
 @dataclass(frozen=True, eq=False)
 class TrainResult:
-    """A trained field and its figures; PSNR and SSIM are means over views, NaN where there are none."""
+    """A trained field and its figures: those of the test views, and the mean PSNR of ten training views, NaN
+    where there are none."""
 
     field: VoxelField
     steps: int
     seconds: float
     train_psnr: float
-    test_psnr: float
-    test_ssim: float
+    test: Evaluation
     gains: NDArray[np.float32]
     finished: bool
+
+    @property
+    def test_psnr(self) -> float:
+        """Mean raw PSNR of the test views in dB, NaN where there are none."""
+        return self.test.psnr
+
+    @property
+    def test_ssim(self) -> float:
+        """Mean SSIM of the test views, NaN where there are none."""
+        return self.test.ssim
 
 
 def train_voxel(
@@ -81,12 +91,8 @@ def train_voxel(
     field = run.field()
     if not field.contracted:
         field = filled(field, unseen_vertices(field, [view.camera for view in dataset.train]))
-    train_psnr = test_psnr = test_ssim = float("nan")
+    train, test = Evaluation(), Evaluation()
     if evaluate and len(field.vertices):
         some = dataset.train[:: max(1, len(dataset.train) // 10)]
-        train_psnr, _ = evaluate_views(field, some)
-        if dataset.test:
-            test_psnr, test_ssim = evaluate_views(field, dataset.test)
-    return TrainResult(
-        field, run.step, run.seconds, train_psnr, test_psnr, test_ssim, run.exposure.values(), finished
-    )
+        train, test = evaluate_views(field, some), evaluate_views(field, dataset.test)
+    return TrainResult(field, run.step, run.seconds, train.psnr, test, run.exposure.values(), finished)
