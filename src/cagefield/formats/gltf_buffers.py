@@ -21,7 +21,14 @@ import numpy as np
 
 from cagefield import json_text
 from cagefield.devices import lacking_memory
-from cagefield.regular_files import MOST_TEXT, check_regular, open_regular, read_bytes, real_path
+from cagefield.regular_files import (
+    MOST_TEXT,
+    check_regular,
+    open_regular,
+    read_array,
+    read_bytes,
+    real_path,
+)
 from cagefield.typing import AnyArray
 
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
@@ -43,17 +50,12 @@ class Buffer:
     content: bytes | None = None
 
     def read(self, offset: int, size: int) -> bytes:
-        """Bytes of the buffer. Raises ValueError where they end after it."""
+        """Bytes of the buffer. Raises ValueError where they end after it, FieldError as `read_array`."""
         if offset < 0 or size < 0 or offset + size > self.size:
             raise ValueError(f"{size} bytes from {offset} on end after a buffer of {self.size}")
         if self.content is not None:
             return self.content[offset : offset + size]
-        with open_regular(self.path) as file:
-            file.seek(self.begin + offset)
-            found = file.read(size)
-        if len(found) != size:
-            raise ValueError(f"{self.path.name} has become shorter while it was read")
-        return found
+        return read_array(self.path, np.uint8, size, offset=self.begin + offset).tobytes()
 
 
 class GltfAsset:
@@ -113,6 +115,11 @@ class GltfAsset:
         if found not in (width if isinstance(width, tuple) else (width,)):
             raise ValueError(f"an attribute is {said['type']!s:.20}")
         return Accessor(self, said, found)
+
+    @property
+    def end(self) -> int:
+        """The first byte of the asset's own file that is not read."""
+        return check_regular(self.path) if self._binary is None else sum(self._binary)
 
     def external_files(self) -> tuple[Path, ...]:
         """The files that the buffers lie in, beside the asset itself."""

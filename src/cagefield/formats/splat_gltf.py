@@ -109,10 +109,10 @@ def _source(path: Path, asset: GltfAsset) -> SplatSource:
     if ignored:
         said = ", ".join(f"{count} {name}" for name, count in ignored.items())
         warnings.warn(f"{path}: left out: {said:.300}", stacklevel=2)
-    return _joined(path, parts)
+    return _joined(path, parts, asset.end)
 
 
-def _joined(path: Path, parts: list[_Part]) -> SplatSource:
+def _joined(path: Path, parts: list[_Part], end: int) -> SplatSource:
     """The splats of all instances of all primitives."""
     count = sum(part.splats.count * len(part.matrices) for part in parts)
     if count > MAX_SPLATS:
@@ -126,7 +126,6 @@ def _joined(path: Path, parts: list[_Part]) -> SplatSource:
                     yield transformed(batch, matrix).padded(degree)
 
     antialiased = all(part.splats.antialiased for part in parts)
-    end = path.stat().st_size
     return SplatSource(path, count, degree, GLTF_AXES, batches, antialiased, end=end, is_double=True)
 
 
