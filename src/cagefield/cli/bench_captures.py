@@ -25,7 +25,8 @@ class BenchCaptures:
 
     data: tyro.conf.Positional[tuple[str, ...]]
     """Data sets: folders, their camera files, or names of built-in rooms: room-digger, room-chair,
-    room-microphone, room-plant."""
+    room-microphone, room-plant, with variations after plus signs (room-chair+person): person, backdrop,
+    flash, exposure, balance."""
     out: Output = Path("benchmarks/results/captures.md")
     """Markdown file for the table."""
     fields: tuple[Literal["splat", "voxel"], ...] = ("splat",)
@@ -129,10 +130,10 @@ class BenchCaptures:
         from cagefield.benchmarking.workbench import digest
         from cagefield.cli.poses import unfolded
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.procedural import CAPTURES, make_capture
+        from cagefield.datasets.procedural import is_capture, make_capture
 
         path = Path(name)
-        if name in CAPTURES and not path.exists():
+        if is_capture(name) and not path.exists():
             key = digest([name, self.room_views, self.room_size], ("datasets/procedural", "cameras.py"))
             path = folder / f"photos-{key}" / name
             if not path.is_dir():
@@ -145,7 +146,7 @@ class BenchCaptures:
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
-        if not self.keep_poses and name not in CAPTURES:
+        if not self.keep_poses and not is_capture(name):
             anew = folder / f"{dataset.name}-{digest([str(real_path(dataset.path))], ())}.poses"
             dataset = unfolded(dataset, anew, self.downscale)
         if not dataset.test:
