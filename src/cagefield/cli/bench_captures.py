@@ -49,6 +49,9 @@ class BenchCaptures:
     """Keep every so-many-th photo for testing where the data set has no test views."""
     keep_poses: Flag = False
     """Train on poses as they are, even where they are folded; else those are found anew."""
+    perturb_poses: Flag = False
+    """Disturb every camera first, test views' too: turned by 1 degree, moved by 1 % of its distance, its
+    focal length changed by up to 5 %; --seed decides how."""
     room_size: int | None = None
     """Longer side of the photos of built-in rooms, 640 if left out."""
     room_views: int | None = None
@@ -127,6 +130,7 @@ class BenchCaptures:
 
     def _open(self, name: str, folder: Path) -> Dataset:
         """The data set of that name; a built-in room is photographed where the work folder lacks it."""
+        from cagefield.benchmarking.perturbation import perturbed
         from cagefield.benchmarking.workbench import digest
         from cagefield.cli.poses import unfolded
         from cagefield.datasets import load_dataset
@@ -146,8 +150,11 @@ class BenchCaptures:
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
-        if not self.keep_poses and not is_capture(name):
-            anew = folder / f"{dataset.name}-{digest([str(real_path(dataset.path))], ())}.poses"
+        if self.perturb_poses:
+            dataset = perturbed(dataset, self.seed)
+        if not self.keep_poses and (self.perturb_poses or not is_capture(name)):
+            given = [str(real_path(dataset.path)), *([self.seed] if self.perturb_poses else [])]
+            anew = folder / f"{dataset.name}-{digest(given, ())}.poses"
             dataset = unfolded(dataset, anew, self.downscale)
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
