@@ -14,7 +14,7 @@ import pytest
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.normalisation import Similarity
-from cagefield.datasets.points import _read, points_of, random_points, training_points
+from cagefield.datasets.points import points_of, random_points, read_cached_points, training_points
 from cagefield.datasets.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError
@@ -166,7 +166,7 @@ def test_a_cache_whose_arrays_do_not_fit_the_file_is_none(tmp_path, header):
         for name in WHOLE:
             start = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little")
             archive.writestr(f"{name}.npy", start + header.encode() + bytes(8))
-    assert _read(file) is None
+    assert read_cached_points(file) is None
 
 
 @pytest.mark.parametrize(
@@ -190,9 +190,9 @@ def test_a_cache_whose_arrays_do_not_fit_the_file_is_none(tmp_path, header):
 def test_a_cache_that_does_not_fit_together_is_none(tmp_path, changed):
     file = tmp_path / "points.npz"
     np.savez(file, **WHOLE)
-    assert len(_read(file)) == 2
+    assert len(read_cached_points(file)) == 2
     np.savez(file, **{**WHOLE, **changed})
-    assert _read(file) is None
+    assert read_cached_points(file) is None
 
 
 def test_a_cache_with_bytes_changed_raises_nothing(tmp_path):
@@ -203,7 +203,7 @@ def test_a_cache_with_bytes_changed_raises_nothing(tmp_path):
         changed = np.frombuffer(content, np.uint8).copy()
         changed[rng.integers(len(changed), size=4)] = rng.integers(256, size=4)
         file.write_bytes(changed.tobytes())
-        _read(file)
+        read_cached_points(file)
 
 
 def test_a_data_set_s_own_points_are_used_without_those_of_held_out_photos(data):

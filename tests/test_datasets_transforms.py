@@ -304,16 +304,8 @@ def _change(file: Path, change) -> None:
         (lambda v: v.update(frames=[]), "key 'frames' must be a list with at least one frame"),
         (lambda v: v["frames"].insert(1, 3), r"frames\[1\] must be an object"),
         (
-            lambda v: v["frames"][2].pop("file_path"),
-            r"frames\[2\]: key 'file_path' must name the photo, got None",
-        ),
-        (
             lambda v: v["frames"][2].update(file_path="images/" + 300 * "x"),
             r"frames\[2\]: key 'file_path' must name the photo, got 'images/x{72}$",
-        ),
-        (
-            lambda v: v["frames"][1]["transform_matrix"][0].__setitem__(2, float("nan")),
-            r"frames\[1\] \(images/0001\): transform_matrix\[0\]\[2\] is nan; every entry must be finite",
         ),
         (
             lambda v: v["frames"][1]["transform_matrix"].pop(),
@@ -323,13 +315,12 @@ def _change(file: Path, change) -> None:
             lambda v: v["frames"][1].update(transform_matrix=[[1, 0], [0, 1]]),
             r"frames\[1\] \(images/0001\): key 'transform_matrix' must be 4 rows \(or 3\) of 4 numbers",
         ),
-        (lambda v: v["frames"][1].pop("transform_matrix"), "key 'transform_matrix' must be 4 rows"),
         (
             lambda v: v["frames"][0]["transform_matrix"][0].__setitem__(0, 7.0),
             r"frames\[0\] \(images/0000\): transform_matrix is not a rigid motion",
         ),
         (lambda v: v.update(w=1080), r"key 'w' is 1080, but .*0000.png is 96x64; use the photos that"),
-        (lambda v: v.update(fl_x="90"), "key 'fl_x' must be a finite number, got '90'"),
+        (lambda v: v.update(fl_x="ninety"), "key 'fl_x' must be a finite number, got 'ninety'"),
         (lambda v: v.update(k1=float("inf")), "key 'k1' must be a finite number, got inf"),
         (lambda v: v.update(fl_x=0), "fx must be a positive focal length in pixels, got 0.0"),
         (lambda v: (v.pop("fl_x"), v.pop("fl_y"), v.pop("camera_angle_x")), "no focal length; give fl_x"),
@@ -338,8 +329,8 @@ def _change(file: Path, change) -> None:
             r"field of view along x is 3437.75 degrees; it must lie between 0 and 180 \(radians in",
         ),
         (
-            lambda v: v.update(camera_model="EQUIRECTANGULAR"),
-            "camera_model 'EQUIRECTANGULAR' cannot be read, only",
+            lambda v: v.update(camera_model="ORTHOPHOTO"),
+            "camera_model 'ORTHOPHOTO' cannot be read, only",
         ),
         (lambda v: v.update(ftheta_p0=0.2), "the lens of key 'ftheta_p0' cannot be read; undistort"),
         (lambda v: v.update(aabb_scale=-1), "key 'aabb_scale' must be positive, got -1"),
@@ -369,7 +360,7 @@ def test_truncated_json(tmp_path):
         DatasetError, match=r"transforms.json: not valid JSON at line 1, column \d+ .*copy it again"
     ):
         load_dataset(tmp_path)
-    file.write_bytes(b"\xff\xfe\x00")
+    file.write_bytes(b"\xff\x00\x00")
     with pytest.raises(DatasetError, match=r"transforms.json: cannot be read \('utf-8'"):
         load_dataset(tmp_path)
     file.write_text("[1]")

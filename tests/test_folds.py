@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from cagefield.cameras import Camera
 from cagefield.cli import poses as poses_command
 from cagefield.datasets import View, folds
+from cagefield.datasets.pose_refinement import RefinedPoses
 from cagefield.datasets.procedural.textures import noise
-from cagefield.datasets.structure_from_motion import RECORD, PosesReport
 from cagefield.datasets.views import Dataset
 from cagefield.rendering.images import write_png
 from posed_photos import ring
@@ -105,6 +103,24 @@ def test_photos_that_agree_with_nobody_do_not_count():
     assert folds.contradicting(pairs, np.full(4, np.nan), 6) == set()
 
 
+class _Solver:
+    """Takes the place of structure from motion: the cameras of a data set."""
+
+    def __init__(self, answer: Dataset) -> None:
+        self.answer, self.calls = answer, []
+
+    def __call__(self, views, folder, on_progress, seed):
+        self.calls.append([view.name for view in views])
+        return self
+
+    def refine(self, *_):
+        raise AssertionError("a folded model is not bundle-adjusted")
+
+    def rebuild(self, *_):
+        cameras = {view.name: view.camera for view in (*self.answer.train, *self.answer.test)}
+        return RefinedPoses(cameras, None, 0.5, True)
+
+
 def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
     photos, tmp_path, monkeypatch, capsys
 ):
@@ -112,34 +128,24 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
         dataset(tmp_path / "wrong", folded(), photos),
         dataset(tmp_path / "right", cameras(), photos),
     )
-    reordered = replace(right, train=(*right.test, *right.train[4:]), test=right.train[:4])
-    calls = []
-
-    def made(source, target, *, frames, on_progress):
-        calls.append(source)
-        target.mkdir()
-        (target / RECORD).write_text("{}")
-        return PosesReport(target, COUNT, COUNT, 500, 0.5)
-
-    monkeypatch.setattr("cagefield.datasets.structure_from_motion.make_poses", made)
-    monkeypatch.setattr("cagefield.datasets.load_dataset", lambda *_, **__: reordered)
-    found = poses_command.unfolded(wrong, tmp_path / "anew", None)
+    solver = _Solver(right)
+    monkeypatch.setattr("cagefield.datasets.pose_verification.PoseSolver", solver)
+    monkeypatch.setattr("cagefield.datasets.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    found = poses_command.verified(wrong).dataset
     said = capsys.readouterr().out
-    assert calls == [tmp_path / "wrong"] and "the poses are folded" in said and "--keep-poses" in said
+    assert len(solver.calls) == 1 and "poses are folded" in said and "--keep-poses" in said
     assert [view.name for view in found.test] == [view.name for view in wrong.test]
-    assert {view.name for view in found.train} == {view.name for view in wrong.train}
+    assert [view.name for view in found.train] == [view.name for view in wrong.train]
     assert found.train[0].camera == right.train[0].camera
-    assert poses_command.unfolded(right, tmp_path / "never", None) is right
-    assert not (tmp_path / "never").exists()
+    again = poses_command.verified(wrong).dataset
+    assert len(solver.calls) == 1 and again.train[0].camera == right.train[0].camera
+    assert poses_command.verified(wrong, correct=False).dataset is wrong
+    assert poses_command.verified(right).dataset is right and len(solver.calls) == 1
 
 
 def test_poses_found_anew_that_are_no_better_are_not_taken(photos, tmp_path, monkeypatch, capsys):
     wrong = dataset(tmp_path / "wrong", folded(), photos)
-
-    def made(source, target, *, frames, on_progress):
-        return PosesReport(target, COUNT, COUNT, 500, 0.5)
-
-    monkeypatch.setattr("cagefield.datasets.structure_from_motion.make_poses", made)
-    monkeypatch.setattr("cagefield.datasets.load_dataset", lambda *_, **__: wrong)
-    assert poses_command.unfolded(wrong, tmp_path / "anew", None) is wrong
-    assert "no better" in capsys.readouterr().out
+    monkeypatch.setattr("cagefield.datasets.pose_verification.PoseSolver", _Solver(wrong))
+    monkeypatch.setattr("cagefield.datasets.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    assert poses_command.verified(wrong).dataset is wrong
+    assert "nothing better was found" in capsys.readouterr().out

@@ -113,5 +113,7 @@ def test_half_a_file_with_a_digests_name_goes_with_the_next_that_is_written(
     assert [file.suffix for file in (tmp_path / "chair").iterdir()] == [".npz"]
 
     half = [left(tmp_path / "points" / "00.npz", "part", ended)]
-    points._write(tmp_path / "points" / "01.npz", SparsePoints(np.zeros((1, 3)), np.zeros((1, 3), np.uint8)))
+    points.write_cached_points(
+        tmp_path / "points" / "01.npz", SparsePoints(np.zeros((1, 3)), np.zeros((1, 3), np.uint8))
+    )
     assert [file.name for file in (tmp_path / "points").iterdir()] == ["01.npz"]

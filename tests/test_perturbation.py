@@ -62,7 +62,9 @@ def test_the_seed_decides_and_nothing_else_changes(dataset):
 
 def test_the_benchmark_disturbs_the_cameras_that_it_reads(tmp_path):
     room = make_capture("room-chair", tmp_path / "room", views=3, size=32, points=False)
-    read = BenchCaptures((str(room),), perturb_poses=True, keep_poses=True, seed=5)._open(str(room), tmp_path)
+    read = BenchCaptures((str(room),), perturb_poses=True, keep_poses=True, seed=5)._open(
+        str(room), tmp_path
+    )[0]
     expected = perturbed(load_dataset(room), 5)
     assert len(read.test) == 1
     for old, new in pairs(expected, read):

@@ -23,9 +23,10 @@ def slopes_of(picture: np.ndarray, target: np.ndarray) -> np.ndarray:
     """The kernel's derivative [H,W,3], added to ones and taken off again."""
     height, width = picture.shape[:2]
     slopes = np.ones_like(tiled(picture))
+    every = np.ones((len(slopes), slopes.shape[2]), np.float32)
     with kernels():
         structure(
-            tiled(picture), tiled(target), width, height, GAIN, BEHIND, WEIGHT,
+            tiled(picture), tiled(target), width, height, GAIN, BEHIND, every, WEIGHT,
             np.full((3, MOMENTS, height, width), np.nan, np.float32),
             np.full((3, 3, height, width), np.nan, np.float32),
             np.full((3, 2, height, width), np.nan, np.float32), slopes,

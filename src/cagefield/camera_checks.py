@@ -11,7 +11,7 @@ import numpy.typing as npt
 from cagefield.errors import CameraError
 from cagefield.typing import Array
 
-_RIGID_TOLERANCE = 5e-3  # rotations printed with three decimals stay under it; a scale of 0.5 % does not
+RIGID_TOLERANCE = 5e-3  # rotations printed with three decimals stay under it; a scale of 0.5 % does not
 
 
 def checked_pose(c2w: npt.ArrayLike) -> Array:
@@ -29,10 +29,10 @@ def checked_pose(c2w: npt.ArrayLike) -> Array:
         raise CameraError(f"the last row of c2w must be 0 0 0 1, got {pose[3].tolist()}; is it transposed?")
     rotation = pose[:3, :3]
     deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if deviation > _RIGID_TOLERANCE:
+    if deviation > RIGID_TOLERANCE:
         raise CameraError(
             f"c2w is not a rigid motion: its 3x3 part deviates from a rotation by {deviation:.3g} "
-            f"(allowed {_RIGID_TOLERANCE:g}); take scale and shear out of the pose"
+            f"(allowed {RIGID_TOLERANCE:g}); take scale and shear out of the pose"
         )
     if np.linalg.det(rotation) < 0:
         raise CameraError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -10,7 +11,6 @@ import tyro
 
 from cagefield.cli.options import SEEDS, Device, Flag, Output, check_file, check_number, progress_bar
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.captures import CaptureScore
@@ -44,9 +44,11 @@ class BenchCaptures:
     seed: int = 0
     """Of the training."""
     downscale: int | None = None
-    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
+    """Shrink the photos by this factor; left out, what their size, their number and the minutes ask for."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views."""
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME; left out, the masks that the data sets have."""
     keep_poses: Flag = False
     """Train on poses as they are, even where they are folded; else those are found anew."""
     perturb_poses: Flag = False
@@ -98,9 +100,10 @@ class BenchCaptures:
         edited: list[RoomScore] = []
         with work_folder(self.workdir) as folder:
             for name in self.data:
-                dataset = self._open(name, folder)
+                dataset, pose_error = self._open(name, folder)
                 for field in self.fields:
                     score, learnt = self._measure(dataset, field, budget)
+                    score = dataclasses.replace(score, pose_error=pose_error)
                     scores.append(score)
                     edited += self._edit(name, dataset, learnt)
         notes = (f"Machine: {Machine.here()}", f"Command: `{command_line('bench captures', self)}`")
@@ -128,13 +131,17 @@ class BenchCaptures:
                 print(f"picture written to {room_edits.write_picture(learnt, case, self.edit_pictures)}")
         return room_edits.measure(dataset, learnt, cases) if self.edits else []
 
-    def _open(self, name: str, folder: Path) -> Dataset:
-        """The data set of that name; a built-in room is photographed where the work folder lacks it."""
+    def _open(self, name: str, folder: Path) -> tuple[Dataset, tuple[float, float] | None]:
+        """The data set of that name, and its epipolar error before and after verification.
+
+        A built-in room is photographed where the work folder lacks it.
+        """
         from cagefield.benchmarking.perturbation import perturbed
         from cagefield.benchmarking.workbench import digest
-        from cagefield.cli.poses import unfolded
+        from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
         from cagefield.datasets.procedural import is_capture, make_capture
+        from cagefield.datasets.resolution import at_training_resolution
 
         path = Path(name)
         if is_capture(name) and not path.exists():
@@ -149,21 +156,22 @@ class BenchCaptures:
                         size=self.room_size,
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
-        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
+        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout, masks=self.masks)
         if self.perturb_poses:
             dataset = perturbed(dataset, self.seed)
-        if not self.keep_poses and (self.perturb_poses or not is_capture(name)):
-            given = [str(real_path(dataset.path)), *([self.seed] if self.perturb_poses else [])]
-            anew = folder / f"{dataset.name}-{digest(given, ())}.poses"
-            dataset = unfolded(dataset, anew, self.downscale)
+        if self.downscale is None:
+            dataset = at_training_resolution(dataset, self.minutes)
+        found = verified(dataset, correct=not self.keep_poses)
+        dataset = found.dataset
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
-        return dataset
+        errors = None
+        if found.before is not None and found.after is not None:
+            errors = found.before.median, found.after.median
+        return dataset, errors
 
     def _measure(self, dataset: Dataset, field: str, budget: Budget) -> tuple[CaptureScore, Learnt]:
         """The score of a field trained on the data set, and the field; writes pictures if asked."""
-        import dataclasses
-
         from cagefield.benchmarking import captures
         from cagefield.benchmarking.learning import learn
 

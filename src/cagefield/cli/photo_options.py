@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from cagefield.cli.poses import posed, unfolded
+from cagefield.cli.poses import posed, verified
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -22,22 +22,35 @@ class PhotoOptions:
     """Folder of a data set, or its transforms.json, poses_bounds.npy or COLMAP model; for training also a
     folder of photos alone or a video, whose poses are then found first."""
     downscale: int | None = None
-    """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
+    """Shrink the photos by this factor; left out, as their size, their number and the minutes of the
+    training ask for."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
 
-    def load(self, posed_in: Path | None = None, keep_poses: bool = True) -> Dataset:
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME: black pixels are excluded from features, training and
+    figures; left out, the masks that the data set has."""
+
+    def load(
+        self, posed_in: Path | None = None, keep_poses: bool = True, minutes: float | None = None
+    ) -> Dataset:
         """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
 
-        So do those whose poses are folded, unless `keep_poses`.
+        Poses that come with photos are verified, and corrected unless `keep_poses`, where a folder is given.
+        For a training of `minutes` the photos are shrunk as `at_training_resolution` says; a line says so.
         """
         from cagefield.datasets import load_dataset
+        from cagefield.datasets.resolution import at_training_resolution, describe_resolution
 
-        data = self.data if posed_in is None else posed(self.data, posed_in)
-        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout)
-        if posed_in is None or keep_poses or data != self.data.expanduser():
+        data = self.data if posed_in is None else posed(self.data, posed_in, self.masks)
+        masks = self.masks if data.expanduser() == self.data.expanduser() else None
+        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout, masks=masks)
+        if minutes is not None:
+            dataset = dataset if self.downscale is not None else at_training_resolution(dataset, minutes)
+            print(describe_resolution(dataset), flush=True)
+        if posed_in is None:
             return dataset
-        return unfolded(dataset, posed_in, self.downscale)
+        return verified(dataset, correct=not keep_poses and data == self.data.expanduser()).dataset
 
 
 Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]

@@ -60,8 +60,7 @@ class Train:
     refine_poses: Flag = False
     """Also move the photos' cameras to where the splats agree best with them; for poses that are rough."""
     keep_poses: Flag = False
-    """Train on the poses as they are, even where cameras of one place show different things; else such poses
-    are found anew first."""
+    """Train on the poses that come with the photos, as they are; else wrong ones are corrected first."""
     preset: Preset = "auto"
     """Networks of --field nerf: the paper's 8 x 256, or 4 x 128 for a CPU; auto takes the paper's on CUDA."""
     ndc: Ndc = "auto"
@@ -92,7 +91,9 @@ class Train:
         if self.resume and not checkpoint.is_file():
             raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
         self._check_options()
-        dataset = self.photos.load(target.with_name(target.name + ".poses"), self.keep_poses)
+        dataset = self.photos.load(
+            target.with_name(target.name + ".poses"), self.keep_poses, self.training.minutes
+        )
         kind = self._kind(dataset)
         devices.start(self.device)
         target.parent.mkdir(parents=True, exist_ok=True)

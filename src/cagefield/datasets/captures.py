@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
 from cagefield.errors import DatasetError
@@ -77,8 +77,7 @@ def uniform_size(said: Sequence[Size], found: Sequence[Size]) -> Size | None:
 
 def warn_of_scaling(where: str, said: Size, found: Size) -> None:
     """Warns that intrinsics of `said` pixels are scaled to photos of `found` pixels."""
-    warnings.warn(
+    warn(
         f"{where}: the intrinsics are of {said[0]}x{said[1]} pixels, all photos have {found[0]}x{found[1]}: "
-        f"the intrinsics are scaled by {found[0] / said[0]:.4g}",
-        stacklevel=4,
+        f"the intrinsics are scaled by {found[0] / said[0]:.4g}"
     )

@@ -10,16 +10,20 @@ Source: COLMAP, `src/colmap/scene/reconstruction_io_binary.cc`.
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from cagefield.datasets.colmap_lenses import PARAMETERS
 from cagefield.errors import DatasetError
 from cagefield.regular_files import check_regular, file_state, open_regular
+from cagefield.temporary_folders import TemporaryFolder
 
 _POSE = 56  # rotation quaternion and translation, float64
-_PARAMETERS = (3, 4, 4, 5, 8, 8)  # of the camera models 0 to 5, those that can be read; see `colmap._camera`
+_PARAMETERS = tuple(PARAMETERS.values())
 
 _MOST_TEXT = 1 << 30
 """Bytes of a model's file in text; one line is held at a time."""
@@ -70,6 +74,27 @@ def check_unchanged(folder: Path, states: States) -> None:
     for name in sorted({*now, *states}):
         if now.get(name) != states.get(name):
             raise DatasetError(f"{folder / name}: it has changed while it was read; wait until it is whole")
+
+
+def is_binary(folder: Path) -> bool:
+    """Whether the model in `folder` is read from its binary files: where they are there."""
+    files = [folder / f"{name}{ending}" for ending in (".bin", ".txt") for name in ("cameras", "images")]
+    binary, text = (all(file.is_file() for file in files[at : at + 2]) for at in (0, 2))
+    return binary or not (text or files[2].is_file())
+
+
+@contextlib.contextmanager
+def with_points_file(folder: Path) -> Iterator[Path]:
+    """The folder of a binary model; where it has no points, another one with the same files and none."""
+    if (folder / "points3D.bin").is_file() or not (folder / "images.bin").is_file():
+        yield folder
+        return
+    with TemporaryFolder("model") as complete:
+        for name in _RECORDS:
+            if (folder / name).is_file():
+                shutil.copyfile(folder / name, complete / name)
+        (complete / "points3D.bin").write_bytes(bytes(8))
+        yield complete
 
 
 def _states(folder: Path) -> States:

@@ -9,7 +9,6 @@ points: where the folder also has the COLMAP model that the poses came from, bot
 from __future__ import annotations
 
 import importlib.util
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +19,11 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets.captures import Size, stored_camera, unbounded_capture, uniform_size, warn_of_scaling
-from cagefield.datasets.colmap import camera_of, find_model, pose_of, read_model, sparse_points
-from cagefield.datasets.photos import EXTENSIONS, choose_downscale, photo_folders, read_header
+from cagefield.datasets.colmap import find_model, lenses_of, pose_of, read_model, sparse_points
+from cagefield.datasets.colmap_lenses import LensView, report_resampled
+from cagefield.datasets.notices import warn
+from cagefield.datasets.photo_names import photo_files
+from cagefield.datasets.photos import FULL_SIZE_FOLDERS, choose_downscale, photo_folders, read_header
 from cagefield.datasets.region import cube_of_interest, levelling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CameraError, DatasetError
@@ -50,8 +52,7 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
     levelling = np.eye(4)
     levelling[:3, :3] = levelling_rotation(poses)
 
-    folders = photo_folders(folder)
-    photos = {factor: _photos(images) for factor, images in folders.items()}
+    folders, photos = _photos(folder, len(rows))
     complete = {factor: folders[factor] for factor, found in photos.items() if len(found) == len(rows)}
     if not complete:
         found = ", ".join(f"{folders[factor].name} has {len(photos[factor])}" for factor in folders)
@@ -77,13 +78,16 @@ def load_llff(path: Path, downscale: int | None, holdout: int) -> Dataset:
             camera = Camera(
                 levelling @ poses[index], width, height, focal, focal, 0.5 * float(width), 0.5 * float(height)
             )
-            if model is not None:
-                lens = model.cameras[index].resized(camera.width, camera.height)
-                camera = lens.with_c2w(camera.c2w)
+            lens = None if model is None else model.lenses[index].resized(camera.width, camera.height)
+            if lens is not None:
+                camera = lens.camera.with_c2w(camera.c2w)
         except CameraError as error:
             raise DatasetError(f"{where}: {error}") from error
-        view = View(photo.name, stored_camera(where, camera, photo, stored), photo)
+        camera = stored_camera(where, camera, photo, stored)
+        view = View(photo.name, camera, photo, source=None if lens is None else lens.source)
         views.append(view.downscaled(factor // stored))
+    if model is not None:
+        report_resampled(str(file), model.lenses)
     points = None if model is None else model.points([view.name for view in views], levelling)
     positions = None if points is None else points.positions
     bounds = cube_of_interest([view.camera for view in views], rows[:, 15:], positions)
@@ -97,7 +101,7 @@ class _Model:
 
     reconstruction: Any
     names: tuple[str, ...]
-    cameras: tuple[Camera, ...]
+    lenses: tuple[LensView, ...]
     to_file: FloatArray
 
     def points(self, views: Sequence[str], levelling: FloatArray) -> SparsePoints | None:
@@ -117,16 +121,18 @@ def _matching_model(folder: Path, poses: FloatArray) -> _Model | None:
     try:
         reconstruction, images = read_model(place)
         images.sort(key=lambda image: image.name)
-        cameras = tuple(camera_of(place, reconstruction.cameras[image.camera_id]) for image in images)
+        views = [lenses_of(place, reconstruction.cameras[image.camera_id]) for image in images]
     except DatasetError as error:
-        warnings.warn(f"{error}; {folder / POSES_FILE} is used without lens and points", stacklevel=4)
+        warn(f"{error}; {folder / POSES_FILE} is used without lens and points")
         return None
-    if len(images) != len(poses):
+    if len(images) != len(poses) or any(len(faces) > 1 for faces in views):
         return None
     to_file = _similarity(np.stack([pose_of(image) for image in images]), poses)
     if to_file is None:
         return None
-    return _Model(reconstruction, tuple(image.name for image in images), cameras, to_file)
+    return _Model(
+        reconstruction, tuple(image.name for image in images), tuple(view for (view,) in views), to_file
+    )
 
 
 def _similarity(source: FloatArray, target: FloatArray) -> FloatArray | None:
@@ -184,5 +190,14 @@ def _read_rows(file: Path) -> npt.NDArray[np.float64]:
     return rows
 
 
-def _photos(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.suffix.lower() in EXTENSIONS)
+def _photos(folder: Path, count: int) -> tuple[dict[int, Path], dict[int, list[Path]]]:
+    """The photo folders by factor and their photos: the first that has `count` of them, else the first."""
+    whole = [name for name in FULL_SIZE_FOLDERS if (folder / name).is_dir()]
+    places = [photo_folders(folder, name) for name in whole or [""]]
+    if len(photo_files(folder)) == count:
+        places.append({1: folder})
+    found = [(place, {factor: photo_files(images) for factor, images in place.items()}) for place in places]
+    for place, photos in found:
+        if any(len(files) == count for files in photos.values()):
+            return place, photos
+    return found[0]

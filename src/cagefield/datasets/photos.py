@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator
+import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +15,17 @@ import numpy.typing as npt
 from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import DAMAGED, opened_picture, tiles
+from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
+from cagefield.rendering.images import DAMAGED, load_whole, opened_picture, reason_of, tiles
+from cagefield.rendering.picture_formats import EFFICIENT_FORMATS
 
-EXTENSIONS = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+EXTENSIONS = (
+    ".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif", ".hif", ".avif", ".exr",
+)  # fmt: skip
+FULL_SIZE_FOLDERS = ("images", "input", "photos", "rgb", "color", "image")
+"""Folders in which photos of the whole size are, the first that is there."""
+
 LONGER_SIDE = 800  # pixels; what `downscale=None` brings the longer side down to, at most
-
-_DEEP_MODES = ("I", "F")  # and "I;16...": more than 8 bits a channel
 
 
 @dataclass(frozen=True)
@@ -28,6 +35,8 @@ class Header:
     width: int
     height: int
     alpha: bool
+    conversion: str | None = None
+    """What is done to its pixels, as of `color_conversion.conversion_of`."""
 
 
 def find_photo(path: Path) -> Path | None:
@@ -43,12 +52,12 @@ def find_photo(path: Path) -> Path | None:
 
 
 def read_header(path: Path) -> Header:
-    """Size of the photo and whether it has an alpha channel.
+    """Size of the photo, whether it has an alpha channel, and how its colors are converted.
 
-    Raises DatasetError where it is not an 8-bit image.
+    Raises DatasetError where it is no image.
     """
     with _opened(path) as image:
-        return Header(image.width, image.height, _has_alpha(image))
+        return Header(image.width, image.height, has_alpha(image), conversion_of(image))
 
 
 def is_cut_out(path: Path) -> bool:
@@ -56,29 +65,40 @@ def is_cut_out(path: Path) -> bool:
     return read_header(path).alpha and bool(read_photo(path)[..., 3].min() < 255)
 
 
+def report_conversions(where: Path, photos: Iterable[Path]) -> None:
+    """Warns once for each way in which photos are converted, with their number.
+
+    Raises DatasetError where a photo is no image.
+    """
+    counts = Counter(filter(None, (read_header(photo).conversion for photo in dict.fromkeys(photos))))
+    for conversion, count in counts.items():
+        warnings.warn(f"{where}: {count} photo{'s' * (count > 1)} {conversion}", stacklevel=3)
+
+
 def read_photo(path: Path, factor: int = 1) -> npt.NDArray[np.uint8]:
     """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha: means of `factor` x `factor` pixels of the file.
 
     Columns and rows left over at the right and bottom are dropped. With alpha, colours are averaged
-    premultiplied.
+    premultiplied. Pixels are as stored: EXIF orientation is not applied, since poses refer to stored pixels.
 
     Raises DatasetError where the file cannot be read.
     """
     with _opened(path) as image:
-        mode = "RGBA" if _has_alpha(image) else "RGB"
+        convert = rgb_converter(image)
         width, height = image.width // factor, image.height // factor
         if min(width, height) < 1:
             raise DatasetError(
                 f"{path}: {image.width}x{image.height} pixels are too few to shrink by {factor}; use less"
             )
-        pixels = np.empty((height, width, len(mode)), np.uint8)
+        pixels = np.empty((height, width, 4 if has_alpha(image) else 3), np.uint8)
         try:
-            image.load()
+            load_whole(image)
             for box in tiles(width * factor, height * factor, factor):
                 x, y, end_x, end_y = (side // factor for side in box)
-                pixels[y:end_y, x:end_x] = _shrunk(image.crop(box).convert(mode), factor)
+                pixels[y:end_y, x:end_x] = _shrunk(convert(image.crop(box)), factor)
         except DAMAGED as error:
-            raise DatasetError(f"{path}: the image cannot be decoded ({error}); replace the file") from error
+            cure = "convert it to JPEG" if image.format in EFFICIENT_FORMATS else "replace the file"
+            raise DatasetError(f"{path}: the image cannot be decoded ({reason_of(error)}); {cure}") from error
     return pixels
 
 
@@ -96,9 +116,13 @@ def _shrunk(pixels: Image.Image, factor: int) -> npt.NDArray[np.uint8]:
     return np.rint(np.concatenate([rgb, alpha], axis=2)).astype(np.uint8)
 
 
-def photo_folders(root: Path) -> dict[int, Path]:
-    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}."""
-    folders = {1: root / "images"} if (root / "images").is_dir() else {}
+def photo_folders(root: Path, whole: str = "") -> dict[int, Path]:
+    """The photo folders that `root` has, by factor: {1: images, 2: images_2, 4: images_4, ...}.
+
+    Photos of the whole size are in the folder `whole`, or in the first of FULL_SIZE_FOLDERS that is there.
+    """
+    found = [name for name in ((whole,) if whole else FULL_SIZE_FOLDERS) if (root / name).is_dir()]
+    folders = {1: root / found[0]} if found else {}
     for folder in sorted(root.glob("images_*")):
         if folder.is_dir() and (number := re.fullmatch(r"images_([1-9]\d*)", folder.name)):
             folders[int(number[1])] = folder
@@ -136,16 +160,10 @@ def _opened(path: Path) -> Iterator[Image.Image]:
     with contextlib.ExitStack() as stack:
         try:
             image = stack.enter_context(opened_picture(path))
+        except DatasetError:
+            raise
         except DAMAGED as error:
             raise DatasetError(
-                f"{path}: not a readable image ({error}); replace the file or remove its frame"
+                f"{path}: not a readable image ({reason_of(error)}); replace the file or remove its frame"
             ) from error
-        if image.mode in _DEEP_MODES or image.mode.startswith("I;16"):
-            raise DatasetError(
-                f"{path}: image mode {image.mode} has more than 8 bits a channel; convert it to 8-bit RGB"
-            )
         yield image
-
-
-def _has_alpha(image: Image.Image) -> bool:
-    return image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -60,8 +61,8 @@ def points_of(
     if known is not None and len(known) >= LEAST:
         return known
     used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_further(dataset))
-    file = None if cache is None else cache / f"points-{_key(used, seed)}.npz"
-    found = None if file is None else _read(file)
+    file = None if cache is None else cache / f"points-{capture_key(used, seed)}.npz"
+    found = None if file is None else read_cached_points(file)
     if found is None:
         try:
             found = triangulate(used, on_progress=on_progress, seed=seed)
@@ -69,7 +70,7 @@ def points_of(
             warnings.warn(f"{dataset.path}: no points are made of the photos: {error}", stacklevel=2)
             return None
         if file is not None and found is not None:
-            _write(file, found)
+            write_cached_points(file, found)
     if found is None or len(found) < LEAST:
         count = 0 if found is None else len(found)
         warnings.warn(
@@ -162,20 +163,23 @@ class _Photos:
 
     def __init__(self, dataset: Dataset) -> None:
         step = max(1, -(-len(dataset.train) // _PHOTOS))
-        self._views = [(view.camera, view.load()) for view in dataset.train[::step]]
+        self._views = [(view.camera, view.load(), view.valid_pixels()) for view in dataset.train[::step]]
 
     def look(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """How many photos see each point, 0 where one shows it as empty, and their mean colour [N,3]."""
         seen = np.zeros(len(points), dtype=np.intp)
         empty = np.zeros(len(points), dtype=bool)
         summed = np.zeros((len(points), 3))
-        for camera, pixels in self._views:
+        for camera, pixels, valid in self._views:
             positions, depth = camera.project(points)
             with np.errstate(invalid="ignore"):
                 inside = np.all((positions >= 0) & (positions < (camera.width, camera.height)), axis=1)
             inside &= depth > 0 if camera.model != "opencv_fisheye" else np.isfinite(depth)
             rows = np.flatnonzero(inside)
             columns, lines = positions[rows].astype(np.intp).T
+            if valid is not None:
+                usable = valid[lines, columns]
+                rows, columns, lines = rows[usable], columns[usable], lines[usable]
             found = pixels[lines, columns]
             if found.shape[1] == 4:
                 empty[rows] |= found[:, 3] < _LEAST_OPAQUE
@@ -190,22 +194,23 @@ def _further(dataset: Dataset) -> tuple[View, ...]:
     return tuple(view for view in dataset.val if view.image_path not in known)
 
 
-def _key(views: tuple[View, ...], seed: int) -> str:
+def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> str:
     """Digest of photos, names, poses, lenses and seed."""
-    digest = hashlib.sha256(_VERSION + str(seed).encode())
+    digest = hashlib.sha256(version + str(seed).encode())
     for view in views:
         header = read_header(view.image_path)
-        camera = repr((view.name, view.camera.to_dict(), view.downscale, header))
+        camera = repr((view.name, view.camera.to_dict(), view.downscale, header, view.source))
         digest.update(camera.encode())
-        with open_regular(view.image_path) as stream:
-            digest.update(stream.read(_SAMPLE))
-            size = stream.seek(0, os.SEEK_END)
-            stream.seek(max(0, size - _SAMPLE))
-            digest.update(stream.read(_SAMPLE) + str(size).encode())
+        for file in (view.image_path, *(() if view.mask is None else (view.mask.path,))):
+            with open_regular(file) as stream:
+                digest.update(stream.read(_SAMPLE))
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(max(0, size - _SAMPLE))
+                digest.update(stream.read(_SAMPLE) + str(size).encode())
     return digest.hexdigest()[:24]
 
 
-def _write(file: Path, points: SparsePoints) -> None:
+def write_cached_points(file: Path, points: SparsePoints) -> None:
     """Writes the file whole or not at all; where the folder cannot be written to, nothing."""
     names = sorted({name for seen in points.seen_by for name in seen})
     numbers = {name: number for number, name in enumerate(names)}
@@ -226,7 +231,7 @@ def _write(file: Path, points: SparsePoints) -> None:
         return
 
 
-def _read(file: Path) -> SparsePoints | None:
+def read_cached_points(file: Path) -> SparsePoints | None:
     """The points of a file; None where it is not there or damaged."""
     try:
         arrays = read_arrays(file)

@@ -14,14 +14,20 @@ import numpy.typing as npt
 from PIL import Image, ImageOps
 from scipy.ndimage import laplace
 
+from cagefield.datasets.hidden_files import MASK_FOLDER, is_hidden
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import opened_picture
+from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
+from cagefield.rendering.images import load_whole, opened_picture
+from cagefield.rendering.picture_formats import EFFICIENT_FORMATS
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
 
-OTHER_PHOTOS = (".heic", ".heif", ".avif", ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
+OTHER_PHOTOS = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 """Photos that may not be readable: named where they are left out."""
+
+_CONVERTED = (".heic", ".heif", ".hif", ".avif", ".exr")
+"""Photos that are written anew: COLMAP and browsers do not read them."""
 
 _SHARPNESS_SIDE = 640  # pixels of the longer side at which sharpness is measured
 _DIAGONAL = 43.267  # millimetres of a 36 x 24 film's frame, which EXIF's 35 mm focal lengths refer to
@@ -50,14 +56,15 @@ def is_video(path: Path) -> bool:
 
 
 def find_raw_photos(folder: Path) -> list[Path]:
-    """The photos in a folder and below, by name; hidden files and folders are left out."""
+    """The photos in a folder and below, by name; hidden files and folders and masks are left out."""
     known = {*EXTENSIONS, *OTHER_PHOTOS}
     found = [
         file
         for file in folder.rglob("*")
         if file.suffix.lower() in known
         and file.is_file()
-        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
+        and not is_hidden(file.relative_to(folder).parts)
+        and not any(MASK_FOLDER.fullmatch(part) for part in file.relative_to(folder).parts[:-1])
     ]
     return sorted(found, key=lambda file: file.relative_to(folder).as_posix())
 
@@ -72,33 +79,38 @@ def upright(source: Path, name: str, folder: Path) -> RawPhoto:
     """
     try:
         with opened_picture(source) as image:
-            image.load()
+            conversion, convert, alpha = conversion_of(image), rgb_converter(image), has_alpha(image)
+            load_whole(image)
             exif = image.getexif()
             focal_35 = exif.get_ifd(_EXIF_IFD).get(_FOCAL_35) or 0
             turned = ImageOps.exif_transpose(image)
             as_it_is = exif.get(_ORIENTATION, 1) == 1 and source.suffix.lower() in EXTENSIONS
+        as_it_is &= source.suffix.lower() not in _CONVERTED and image.format not in EFFICIENT_FORMATS
+        as_it_is &= turned.mode in ("L", "RGB", "RGBA", "LA", "P", "CMYK", "YCbCr") and conversion is None
+        upright_photo = convert(turned)
+    except DatasetError:
+        raise
     except Exception as error:  # Pillow raises whatever its decoders do
-        wanted = "convert it to JPEG" if source.suffix.lower() in OTHER_PHOTOS else "replace the file"
+        known = source.suffix.lower() not in (*OTHER_PHOTOS, *_CONVERTED)
+        wanted = "replace the file" if known else "convert it to JPEG"
         raise DatasetError(f"{source}: cannot be read as a photo; {wanted}") from error
-    alpha = turned.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in turned.info
-    plain = turned.mode in ("L", "RGB", "RGBA", "LA", "P", "CMYK", "YCbCr")
     target = folder / name
-    if as_it_is and plain:
+    if as_it_is:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(source, target)
     else:
         name += ".png" if alpha else ".jpg"
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        converted = _eight_bit(turned).convert("RGBA" if alpha else "RGB")
-        converted.info.pop("exif", None)
+        for key in ("exif", "icc_profile", "xmp"):
+            upright_photo.info.pop(key, None)
         if alpha:
-            converted.save(target, compress_level=1)
+            upright_photo.save(target, compress_level=1)
         else:
-            converted.save(target, quality=95, subsampling=0)
+            upright_photo.save(target, quality=95, subsampling=0)
     width, height = turned.size
     focal = float(focal_35) * float(np.hypot(width, height)) / _DIAGONAL
-    grey = _eight_bit(turned).convert("L")
+    grey = upright_photo.convert("L")
     return RawPhoto(name, target, width, height, focal or None, sharpness(grey), alpha)
 
 
@@ -185,11 +197,3 @@ def _run(video: Path, options: list[str], target: Path) -> None:
 
 def _sharpness(grey: npt.NDArray[np.float32]) -> float:
     return float(laplace(grey).var() / (grey.var() + 1.0))
-
-
-def _eight_bit(image: Image.Image) -> Image.Image:
-    """An image of more than 8 bits a channel, scaled to 8; others as they are."""
-    if image.mode in ("I", "F") or image.mode.startswith("I;16"):
-        values = np.asarray(image, dtype=np.float64)
-        return Image.fromarray(np.rint(values * (255.0 / max(values.max(), 1.0))).astype(np.uint8))
-    return image

@@ -19,27 +19,32 @@ _PARALLEL_WITH_DEPTHS = 0.05  # the same where depths are known, which say more:
 _DISTANCE_SHARE = 0.7  # half-size of the cube of interest over the median distance of the cameras
 
 
-def levelling_rotation(poses: FloatArray) -> FloatArray:
+def levelling_rotation(poses: FloatArray, up: Sequence[float] | None = None) -> FloatArray:
     """A rotation [3,3] that takes the scene's up to +z and the mean direction of view to y > 0, x = 0.
 
-    `poses` [N,4,4] are OpenGL camera-to-world matrices. Up is the direction most normal to all the cameras'
-    right axes (people hold cameras level), where the cameras turn enough to tell, with the sign of the mean
-    up axis; else it is the mean up axis itself.
+    `poses` [N,4,4] are OpenGL camera-to-world matrices. Without `up` [3] it is the direction most normal to
+    all the cameras' right axes (people hold cameras level), where the cameras turn enough to tell, with the
+    sign of the mean up axis; else it is the mean up axis itself.
     """
-    rights, ups, backs = (poses[:, :3, k] for k in range(3))
+    backs = poses[:, :3, 2]
+    axis = _estimated_up(poses) if up is None else np.asarray(up, dtype=np.float64)
+    if np.linalg.norm(axis) < 1e-6:
+        return np.eye(3)
+    axis = axis / np.linalg.norm(axis)
+    candidates = np.concatenate([-backs.mean(axis=0)[None], np.eye(3)[[1, 0]]])
+    flat = candidates - (candidates @ axis)[:, None] * axis
+    ahead = flat[np.argmax(np.linalg.norm(flat, axis=1) > 1e-3)]
+    ahead = ahead / np.linalg.norm(ahead)
+    return np.stack([np.cross(ahead, axis), ahead, axis])
+
+
+def _estimated_up(poses: FloatArray) -> FloatArray:
+    rights, ups = (poses[:, :3, k] for k in range(2))
     mean_up = ups.mean(axis=0)
     values, vectors = np.linalg.eigh(rights.T @ rights / len(poses))
     normal = vectors[:, 0] * (1.0 if vectors[:, 0] @ mean_up >= 0 else -1.0)
     turns_enough = values[1] > 0.02 and values[0] < 0.1 * values[1]  # turned by 8 degrees rms, rolled by less
-    up = normal if turns_enough and normal @ mean_up > 0.5 else mean_up
-    if np.linalg.norm(up) < 1e-6:
-        return np.eye(3)
-    up = up / np.linalg.norm(up)
-    candidates = np.concatenate([-backs.mean(axis=0)[None], np.eye(3)[[1, 0]]])
-    flat = candidates - (candidates @ up)[:, None] * up
-    ahead = flat[np.argmax(np.linalg.norm(flat, axis=1) > 1e-3)]
-    ahead = ahead / np.linalg.norm(ahead)
-    return np.stack([np.cross(ahead, up), ahead, up])
+    return normal if turns_enough and normal @ mean_up > 0.5 else mean_up
 
 
 def focus_point(origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, float]:
@@ -105,6 +110,12 @@ def cube_of_interest(
 
 def _cube(center: FloatArray, half: float) -> FloatArray:
     return np.stack([center - half, center + half])
+
+
+def depth_range(cameras: Sequence[Camera], points: FloatArray | None) -> tuple[float, float] | None:
+    """(nearest, farthest) depth of the points in all pictures; None where too few are seen."""
+    found = None if points is None else depths_of_points(cameras, points)
+    return None if found is None else (float(found[:, 0].min()), float(found[:, 1].max()))
 
 
 def depths_of_points(cameras: Sequence[Camera], points: FloatArray) -> FloatArray | None:

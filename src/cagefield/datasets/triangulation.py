@@ -26,7 +26,7 @@ from cagefield.cameras import Camera
 from cagefield.datasets import features
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.matching import match
-from cagefield.datasets.photos import read_photo
+from cagefield.datasets.pose_alignment import Similarity
 from cagefield.datasets.views import SparsePoints, View
 from cagefield.temporary_folders import TemporaryFolder
 
@@ -51,7 +51,7 @@ _FLIP = np.array([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True)
-class _Shrunk:
+class ShrunkPhoto:
     """A photo as features are found in it: its camera at that size, its share of the whole photo's size."""
 
     view: View
@@ -73,26 +73,13 @@ def triangulate(
     if len(views) < 2:
         return None
     with TemporaryFolder("points") as folder:
-        (folder / "images").mkdir()
-        (folder / "masks").mkdir()
-        shrunk = []
-        for index, view in enumerate(views):
-            shrunk.append(_shrink(view, folder, f"{index:06}.png"))
-            features.share(on_progress, 0.0, 0.05)((index + 1) / len(views), "photos")
-        names = [f"{index:06}.png" for index in range(len(views))]
+        shrunk, names = shrink_views(views, folder, on_progress)
         database = folder / "database.db"
-        centre, scale = _normalisation([one.camera for one in shrunk])
+        center, scale = normalization([one.camera for one in shrunk])
         cameras = [_colmap_camera(pycolmap, one.camera) for one in shrunk]
         features.create_database(database, cameras, [Photo(n, i) for i, n in enumerate(names)])
-        features.extract(
-            database,
-            folder / "images",
-            names,
-            features=4096 if len(views) <= 150 else 2048,
-            longer_side=LONGER_SIDE,
-            masks=folder / "masks" if any((folder / "masks").iterdir()) else None,
-            on_progress=features.share(on_progress, 0.05, 0.45),
-        )
+        count = 4096 if len(views) <= 150 else 2048
+        extract_features(database, folder, names, count, features.share(on_progress, 0.05, 0.45))
         pairs = nearest_pairs([one.camera for one in shrunk])
         match(
             database,
@@ -103,11 +90,15 @@ def triangulate(
             on_progress=features.share(on_progress, 0.45, 0.95),
         )
         keypoints = _allow_matches(pycolmap, database, shrunk)
-        model = _posed_model(pycolmap, cameras, shrunk, names, centre, scale)
+        numbers = list(range(len(views)))
+        model = posed_model(pycolmap, cameras, numbers, shrunk, names, center, scale)
+        to_world = Similarity(scale, np.eye(3), center)
         points = None
-        for least_tracks in (3, 2):
-            found = _triangulated(pycolmap, model, database, folder, least_tracks, seed)
-            points = _collect(found, shrunk, keypoints, centre, scale)
+        for least in (3, 2):
+            found = triangulated(
+                pycolmap, model, database, folder, f"sparse-{least}", MAX_ERROR, least_photos=least, seed=seed
+            )
+            points = collect_points(found, shrunk, keypoints, to_world)
             if points is not None and len(points) >= FEW:
                 break
         features.share(on_progress, 0.0, 1.0)(1.0, f"{0 if points is None else len(points)} points")
@@ -144,45 +135,61 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def _shrink(view: View, folder: Path, name: str) -> _Shrunk:
-    """The photo, shrunk, in `folder`/images; its mask in `folder`/masks where it is a cut-out."""
-    pixels = read_photo(view.image_path)
+def shrink_views(
+    views: Sequence[View], folder: Path, on_progress: OnProgress | None
+) -> tuple[list[ShrunkPhoto], list[str]]:
+    """Photos shrunk into `folder`/colmap, masks in `folder`/masks, and the names of their files."""
+    (folder / "colmap").mkdir()
+    (folder / "masks").mkdir()
+    names = [f"{index:06}.png" for index in range(len(views))]
+    shrunk = []
+    for index, (view, name) in enumerate(zip(views, names, strict=True)):
+        shrunk.append(_shrink(view, folder, name))
+        features.share(on_progress, 0.0, 0.05)((index + 1) / len(views), "photos")
+    return shrunk, names
+
+
+def extract_features(
+    database: Path, folder: Path, names: Sequence[str], count: int, on_progress: OnProgress
+) -> None:
+    """At most `count` features of each of the photos that `shrink_views` wrote into `folder`."""
+    masks = folder / "masks"
+    features.extract(
+        database,
+        folder / "colmap",
+        names,
+        features=count,
+        longer_side=LONGER_SIDE,
+        masks=masks if any(masks.iterdir()) else None,
+        on_progress=on_progress,
+    )
+
+
+def _shrink(view: View, folder: Path, name: str) -> ShrunkPhoto:
+    """The photo, shrunk, in `folder`/colmap; its mask in `folder`/masks where it is a cut-out or masked."""
+    whole = view.whole()
+    pixels, valid = whole.load(), whole.valid_pixels()
     height, width = pixels.shape[:2]
-    whole = _whole_camera(view, width, height)
     scale = min(1.0, LONGER_SIDE / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
+    used = np.ones((height, width), bool) if valid is None else valid
     if pixels.shape[2] == 4:
-        opaque = pixels[..., 3] > 127
-        if not opaque.all():
-            mask = Image.fromarray(opaque).convert("L").resize(size, Image.Resampling.BOX)
-            inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE, border_value=True)
-            Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(folder / "masks" / f"{name}.png")
+        used = used & (pixels[..., 3] > 127)
+    if not used.all():
+        mask = Image.fromarray(used).convert("L").resize(size, Image.Resampling.BOX)
+        inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE, border_value=True)
+        Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(folder / "masks" / f"{name}.png")
+    if pixels.shape[2] == 4:
         alpha = pixels[..., 3:].astype(np.float32) / 255.0
         pixels = np.rint(pixels[..., :3] * alpha + 127.0 * (1.0 - alpha)).astype(np.uint8)
     picture = Image.fromarray(pixels)
     if picture.size != size:
         picture = picture.resize(size, Image.Resampling.BOX)
-    picture.save(folder / "images" / name, compress_level=1)
-    return _Shrunk(view, whole.resized(*size), size[0] / width, np.asarray(picture))
+    picture.save(folder / "colmap" / name, compress_level=1)
+    return ShrunkPhoto(view, whole.camera.resized(*size), size[0] / width, np.asarray(picture))
 
 
-def _whole_camera(view: View, width: int, height: int) -> Camera:
-    """The camera of the whole photo of `width` x `height` pixels, of which `view` is a shrunk one."""
-    camera, factor = view.camera, view.downscale
-    return Camera(
-        camera.c2w,
-        width,
-        height,
-        camera.fx * factor,
-        camera.fy * factor,
-        camera.cx * factor,
-        camera.cy * factor,
-        camera.model,
-        camera.distortion,
-    )
-
-
-def _normalisation(cameras: Sequence[Camera]) -> tuple[FloatArray, float]:
+def normalization(cameras: Sequence[Camera]) -> tuple[FloatArray, float]:
     """The middle [3] of the cameras, and their median distance to it."""
     origins = np.stack([camera.origin for camera in cameras])
     centre = origins.mean(axis=0)
@@ -200,7 +207,7 @@ def _colmap_camera(pycolmap: Any, camera: Camera) -> Any:
     return made
 
 
-def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[_Shrunk]) -> list[FloatArray]:
+def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[ShrunkPhoto]) -> list[FloatArray]:
     """Writes the matches that the poses allow as verified ones, and undistorted features.
 
     Returns each photo's features [K,2] where they are in the shrunk photo.
@@ -236,7 +243,7 @@ def _allow_matches(pycolmap: Any, path: Path, shrunk: Sequence[_Shrunk]) -> list
 
 
 def _allowed(
-    shrunk: Sequence[_Shrunk], directions: Sequence[FloatArray], first: int, second: int, matches: Any
+    shrunk: Sequence[ShrunkPhoto], directions: Sequence[FloatArray], first: int, second: int, matches: Any
 ) -> npt.NDArray[np.bool_]:
     """Which matches [K,2] lie within MAX_ERROR pixels of each other's epipolar planes."""
     baseline = shrunk[second].camera.origin - shrunk[first].camera.origin
@@ -251,22 +258,27 @@ def _allowed(
     return kept
 
 
-def _posed_model(
+def posed_model(
     pycolmap: Any,
     cameras: Sequence[Any],
-    shrunk: Sequence[_Shrunk],
+    numbers: Sequence[int],
+    shrunk: Sequence[ShrunkPhoto],
     names: Sequence[str],
-    centre: FloatArray,
+    center: FloatArray,
     scale: float,
 ) -> Any:
-    """A reconstruction with the known poses, the cameras' middle at the origin, `scale` the unit."""
+    """A reconstruction with the known poses, the cameras' middle at the origin, `scale` the unit.
+
+    Photo n has the camera `cameras[numbers[n]]`.
+    """
     model = pycolmap.Reconstruction()
-    for index, (camera, one, name) in enumerate(zip(cameras, shrunk, names, strict=True), start=1):
+    for camera in cameras:
         model.add_camera_with_trivial_rig(camera)
+    for index, (number, one, name) in enumerate(zip(numbers, shrunk, names, strict=True), start=1):
         rotation, _ = _nearest_rotation(one.camera.c2w[:3, :3] * _FLIP)
-        origin = (one.camera.origin - centre) / scale
+        origin = (one.camera.origin - center) / scale
         rigid = pycolmap.Rigid3d(pycolmap.Rotation3d(rotation.T), -rotation.T @ origin)
-        image = pycolmap.Image(name=name, camera_id=index, image_id=index)
+        image = pycolmap.Image(name=name, camera_id=number + 1, image_id=index)
         model.add_image_with_trivial_frame(image, rigid)
     return model
 
@@ -277,26 +289,39 @@ def _nearest_rotation(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return left @ right, values
 
 
-def _triangulated(
-    pycolmap: Any, model: Any, database: Path, folder: Path, least_photos: int, seed: int
+def triangulated(
+    pycolmap: Any,
+    model: Any,
+    database: Path,
+    folder: Path,
+    name: str,
+    bound: float,
+    *,
+    least_photos: int,
+    seed: int,
 ) -> Any:
+    """The model with points of tracks of `least_photos` or more, reprojected within `bound` pixels.
+
+    Its files are written to `folder`/`name`. Poses and intrinsics stay.
+    """
     options = pycolmap.IncrementalPipelineOptions(
         min_num_matches=8, extract_colors=False, random_seed=seed, fix_existing_frames=True
     )
+    angle = bound / MAX_ERROR  # degrees: a pixel of a shrunk photo is a tenth of one or less
     options.triangulation.ignore_two_view_tracks = least_photos > 2
     options.triangulation.random_seed = seed
-    options.triangulation.create_max_angle_error = 1.0
-    options.triangulation.continue_max_angle_error = 1.0
-    options.triangulation.merge_max_reproj_error = MAX_ERROR
-    options.triangulation.complete_max_reproj_error = MAX_ERROR
-    options.mapper.filter_max_reproj_error = MAX_ERROR
-    out = folder / f"sparse-{least_photos}"
+    options.triangulation.create_max_angle_error = angle
+    options.triangulation.continue_max_angle_error = angle
+    options.triangulation.merge_max_reproj_error = bound
+    options.triangulation.complete_max_reproj_error = bound
+    options.mapper.filter_max_reproj_error = bound
+    out = folder / name
     out.mkdir()
     return features.call(
         pycolmap.triangulate_points,
         model,
         database,
-        folder / "images",
+        folder / "colmap",
         out,
         clear_points=True,
         options=options,
@@ -304,24 +329,30 @@ def _triangulated(
     )
 
 
-def _collect(
-    model: Any, shrunk: Sequence[_Shrunk], keypoints: Sequence[FloatArray], centre: FloatArray, scale: float
+def collect_points(
+    model: Any, shrunk: Sequence[ShrunkPhoto], keypoints: Sequence[FloatArray] | None, to_world: Similarity
 ) -> SparsePoints | None:
-    """The model's points in the data set's world, with colours and errors of the photos that see them."""
+    """The model's points in the data set's world, with colors and errors of the photos that see them.
+
+    `keypoints` [K,2] of each photo are where its features are in the shrunk photo; None takes the model's.
+    """
     positions, rgb, seen_by, errors = [], [], [], []
     for _, point in sorted(model.points3D.items()):
         seen = {element.image_id - 1: element.point2D_idx for element in point.track.elements}
         if len(seen) < 2 or not np.isfinite(point.xyz).all() or np.abs(point.xyz).max() > 1e4:
             continue
-        colours = [_pixel(shrunk[photo].pixels, keypoints[photo][row]) for photo, row in seen.items()]
-        positions.append(np.asarray(point.xyz) * scale + centre)
-        rgb.append(np.rint(np.mean(colours, axis=0)))
+        colors = []
+        for photo, row in seen.items():
+            at = model.image(photo + 1).point2D(row).xy if keypoints is None else keypoints[photo][row]
+            colors.append(_pixel(shrunk[photo].pixels, at))
+        positions.append(np.asarray(point.xyz))
+        rgb.append(np.rint(np.mean(colors, axis=0)))
         seen_by.append(frozenset(shrunk[photo].view.name for photo in seen))
         errors.append(point.error / np.mean([shrunk[photo].scale for photo in seen]))
     if not positions:
         return None
     return SparsePoints(
-        np.array(positions),
+        to_world.moved(np.array(positions)),
         np.array(rgb, dtype=np.uint8),
         tuple(seen_by),
         np.array(errors, dtype=np.float32),

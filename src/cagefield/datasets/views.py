@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,12 +12,15 @@ import numpy.typing as npt
 
 from cagefield.cameras import Camera
 from cagefield.datasets.masks import read_mask, resample_mask, shrink_mask
+from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import read_header, read_photo
+from cagefield.datasets.undistortion import SourceLens
 from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]
 
-_NAMED = 100  # missing files named in the warning, at most
+MAX_NAMED = 100
+"""Files or frames that one warning names, at most."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +37,17 @@ class PhotoMask:
 
 @dataclass(frozen=True)
 class View:
-    """One posed photo: `camera` belongs to the image that `load` returns, shrunk by `downscale`."""
+    """One posed photo: `camera` belongs to the image that `load` returns, shrunk by `downscale`.
+
+    Where `source` is given the photo has another lens than the camera: it is resampled at load.
+    """
 
     name: str
     camera: Camera
     image_path: Path
     downscale: int = 1
     mask: PhotoMask | None = None
+    source: SourceLens | None = None
 
     def load(self) -> npt.NDArray[np.uint8]:
         """Pixels uint8 [H,W,3], or [H,W,4] with straight alpha, box-filtered to the camera's size.
@@ -50,6 +56,8 @@ class View:
         was opened.
         """
         pixels = read_photo(self.image_path, self.downscale)
+        if self.source is not None:
+            return self.source.resampled(pixels, self.camera, self._shrunk_size())
         if pixels.shape[:2] != (self.camera.height, self.camera.width):
             raise DatasetError(
                 f"{self.image_path}: {pixels.shape[1]}x{pixels.shape[0]} pixels after shrinking by "
@@ -63,19 +71,45 @@ class View:
         A mask of another size than the photo is resampled by nearest neighbors; a shrunk pixel is valid where
         all pixels of the photo in it are, so that no excluded color is in its mean.
 
+        Of a resampled photo those pixels are valid whose nearest one in the photo is.
+
         Raises DatasetError where the mask cannot be read or has another aspect than the photo.
         """
-        if self.mask is None:
-            return None
-        header = read_header(self.image_path)
-        valid = read_mask(self.mask.path, self.mask.excluded)
-        valid = resample_mask(valid, header.width, header.height, self.mask.path)
-        valid = shrink_mask(valid, self.downscale)
-        return None if valid.all() else valid
+        valid = None
+        if self.mask is not None:
+            header = read_header(self.image_path)
+            valid = read_mask(self.mask.path, self.mask.excluded)
+            valid = resample_mask(valid, header.width, header.height, self.mask.path)
+            valid = shrink_mask(valid, self.downscale)
+        if self.source is not None:
+            valid = self.source.resampled_mask(valid, self.camera, self._shrunk_size())
+        return None if valid is None or valid.all() else valid
 
     def downscaled(self, factor: int) -> View:
         """The same photo shrunk by a further `factor`."""
         return replace(self, camera=self.camera.downscaled(factor), downscale=self.downscale * factor)
+
+    def whole(self) -> View:
+        """The same photo, not shrunk: all pixels of its file, and their camera.
+
+        Raises DatasetError where the file cannot be read.
+        """
+        factor, camera = self.downscale, self.camera
+        if factor == 1:
+            return self
+        if self.source is None:
+            header = read_header(self.image_path)
+            width, height = header.width, header.height
+        else:
+            width, height = camera.width * factor, camera.height * factor
+        fx, fy, cx, cy = (factor * value for value in (camera.fx, camera.fy, camera.cx, camera.cy))
+        full = replace(camera, width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)
+        return replace(self, camera=full, downscale=1)
+
+    def _shrunk_size(self) -> tuple[float, float]:
+        """Width and height of the whole photo in shrunk pixels: no whole numbers where some are left over."""
+        header = read_header(self.image_path)
+        return header.width / self.downscale, header.height / self.downscale
 
 
 def _identity() -> FloatArray:
@@ -178,14 +212,23 @@ def check_holdout(every: int) -> None:
 
 
 def hold_out(views: Sequence[View], every: int) -> tuple[tuple[View, ...], tuple[View, ...]]:
-    """Training and test views: sorted by name, the first and each `every`-th after it test; 0 holds none out.
+    """Training and test views: sorted by name, the first photo and each `every`-th after it test; 0 is none.
 
-    A single view trains.
+    All views of a photo (a panorama's faces) are held out together. A single photo trains.
     """
     ordered = sorted(views, key=lambda view: view.name)
-    if every == 0 or len(ordered) == 1:
+    number = {photo: i for i, photo in enumerate(dict.fromkeys(view.image_path for view in ordered))}
+    if every == 0 or len(number) == 1:
         return tuple(ordered), ()
-    return tuple(v for i, v in enumerate(ordered) if i % every), tuple(ordered[::every])
+    tested = [number[view.image_path] % every == 0 for view in ordered]
+    parts = list(zip(ordered, tested, strict=True))
+    return tuple(v for v, test in parts if not test), tuple(v for v, test in parts if test)
+
+
+def named(names: Sequence[str]) -> str:
+    """Names in a row, at most MAX_NAMED of them."""
+    more = f" and {len(names) - MAX_NAMED} more" if len(names) > MAX_NAMED else ""
+    return ", ".join(names[:MAX_NAMED]) + more
 
 
 def report_missing(path: Path, missing: Sequence[str], total: int) -> None:
@@ -195,15 +238,21 @@ def report_missing(path: Path, missing: Sequence[str], total: int) -> None:
     """
     if not missing:
         return
-    names = ", ".join(missing[:_NAMED]) + (
-        f" and {len(missing) - _NAMED} more" if len(missing) > _NAMED else ""
-    )
     if len(missing) == total:
         raise DatasetError(
             f"{path}: none of the photos of its {total} frames is there; put them where "
-            f"the file says: {names}"
+            f"the file says: {named(missing)}"
         )
-    warnings.warn(
-        f"{path}: {len(missing)} of {total} frames are left out, their photos are missing: {names}",
-        stacklevel=4,
-    )
+    warn(f"{path}: {len(missing)} of {total} frames are left out, their photos are missing: {named(missing)}")
+
+
+def report_unposed(path: Path, names: Sequence[str], total: int) -> None:
+    """Warns once, by count and name, of frames without a pose or with one that is not finite.
+
+    Raises DatasetError where none is left.
+    """
+    if not names:
+        return
+    if len(names) == total:
+        raise DatasetError(f"{path}: none of its {total} frames has a finite pose; find the poses again")
+    warn(f"{path}: {len(names)} of {total} frames are left out, they have no finite pose: {named(names)}")

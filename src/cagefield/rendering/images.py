@@ -19,7 +19,14 @@ from PIL import Image
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.regular_files import check_regular
+from cagefield.rendering.color_conversion import has_alpha, rgb_converter
 from cagefield.rendering.jpeg_scan import end_of_pixels
+from cagefield.rendering.picture_formats import (
+    EFFICIENT_FORMATS,
+    open_picture,
+    orientation_is_pixels,
+    turned_as_stored,
+)
 from cagefield.rendering.render_result import to_uint8
 from cagefield.rendering.tiff_tags import check_tags
 from cagefield.rendering.video_encoder import encoder
@@ -34,6 +41,9 @@ MOST_BYTES = 1 << 30
 _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
+_DENSEST_EFFICIENT = 16 * _DENSEST
+"""The same of HEIF and AVIF: flat blocks of 64 x 64 pixels take a fraction of a bit."""
+
 _TILE = 1 << 16
 
 _ZEROS = bytes(64)
@@ -46,6 +56,11 @@ DAMAGED = (
 """What pillow raises of damaged pictures."""
 
 
+def reason_of(error: Exception) -> str:
+    """A decoder's reason as one line of at most 200 characters."""
+    return " ".join(str(error).split())[:200]
+
+
 def check_pixels(image: Image.Image, size: int | None = None) -> None:
     """Passes where an opened picture, of which only the header is read, has at most MOST_PIXELS.
 
@@ -56,7 +71,8 @@ def check_pixels(image: Image.Image, size: int | None = None) -> None:
         raise ValueError(
             f"{image.width} x {image.height} pixels, at most {MOST_PIXELS >> 20} million are read; shrink it"
         )
-    if size is not None and count > max(_ALWAYS, _DENSEST * size):
+    densest = _DENSEST_EFFICIENT if image.format in EFFICIENT_FORMATS else _DENSEST
+    if size is not None and count > max(_ALWAYS, densest * size):
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
@@ -89,17 +105,20 @@ class _PictureFile(io.BufferedReader):
 def opened_picture(path: Path) -> Iterator[Image.Image]:
     """The picture in a file, of which the header is read, and at most MOST_PIXELS can be.
 
-    Raises ValueError for more, and what DAMAGED lists for a file that is no picture.
+    Pixels are as stored: EXIF's orientation is not applied, the rotation of HEIF and AVIF is.
+
+    Raises ValueError for more, what DAMAGED lists for a file that is no picture, and DatasetError for one
+    whose decoder is not installed.
     """
     check_regular(path, MOST_BYTES)
     with _PictureFile(path) as file:
         check_tags(file, path.stat().st_size)
-        with Image.open(file) as image:
+        with open_picture(file) as image:
             check_pixels(image, path.stat().st_size)
             if image.format in ("JPEG", "MPO"):
                 image.load = partial(_load_jpeg, image, file)
             try:
-                yield image
+                yield turned_as_stored(image) if orientation_is_pixels(image) else image
             finally:
                 image.__dict__.pop("load", None)  # it holds the picture
 
@@ -112,6 +131,14 @@ def _load_jpeg(image: Image.Image, file: _PictureFile) -> Any:
     file.pixels_end = end_of_pixels(file)
     file.seek(place)
     return image.load()
+
+
+def load_whole(image: Image.Image) -> None:
+    """Decodes an opened picture. Raises what DAMAGED lists, and ValueError for another size than it said."""
+    said = image.size
+    image.load()
+    if image.size != said:
+        raise ValueError(f"{image.size[0]} x {image.size[1]} pixels, its header says {said[0]} x {said[1]}")
 
 
 def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
@@ -130,27 +157,26 @@ def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int
 def read_image(path: str | os.PathLike[str]) -> UInt8:
     """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
 
-    Grey, palette and 16-bit files are converted; pixels come as stored, EXIF orientation is not applied
-    (camera poses refer to the stored pixels). Raises DatasetError for a file that is missing or no picture.
+    Files of other depths, modes and color profiles are converted (see `color_conversion`); pixels come as
+    stored, EXIF orientation is not applied (camera poses refer to the stored pixels). Raises DatasetError for
+    a file that is missing or no picture.
     """
     path = Path(path)
     try:
         with opened_picture(path) as image:
-            image.load()
-            deep = image.mode.startswith("I")
-            transparent = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
-            mode = "RGBA" if transparent and not deep else "RGB"
-            pixels = np.empty((image.height, image.width, len(mode)), np.uint8)
-            for x, y, end_x, end_y in tiles(image.width, image.height):
-                part = image.crop((x, y, end_x, end_y))
-                if deep:
-                    part = Image.fromarray((np.asarray(part) / 257.0 + 0.5).astype(np.uint8))
-                pixels[y:end_y, x:end_x] = np.asarray(part.convert(mode))
+            convert = rgb_converter(image)
+            load_whole(image)
+            pixels = np.empty((image.height, image.width, 4 if has_alpha(image) else 3), np.uint8)
+            for box in tiles(image.width, image.height):
+                x, y, end_x, end_y = box
+                pixels[y:end_y, x:end_x] = np.asarray(convert(image.crop(box)))
             return pixels
     except FileNotFoundError as error:
         raise DatasetError(f"{path}: there is no such image") from error
+    except DatasetError:
+        raise
     except DAMAGED as error:
-        raise DatasetError(f"{path}: not a readable image ({error})") from error
+        raise DatasetError(f"{path}: not a readable image ({reason_of(error)})") from error
 
 
 def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8:

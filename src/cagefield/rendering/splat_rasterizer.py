@@ -115,20 +115,23 @@ class Projection:
         sums: Float32 | None = None,
         empty: Float32 = NOWHERE,
         veil: float = 0.0,
+        weights: Float32 | None = None,
     ) -> Float32:
         """Sums [pairs, SUMS] (see `splat_blending`) for dL/d(picture) `slopes` [tiles,3,AREA].
 
         `colour` [tiles,3,AREA] is the picture over its background, whose part in the gradient is included.
         `empty` [2,h,w] are distances along the picture's rays, at its size or smaller, up to which there is
         nothing, 0 where nobody knows, and how sure that is: each alpha before them adds that times `veil` to
-        the loss.
+        the loss. `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing.
         """
+        if weights is None:
+            weights = np.ones((self.tiles, AREA), np.float32)
         if sums is None or len(sums) < self.pairs:
             sums = np.empty((self.pairs, splat_blending.SUMS), np.float32)
         with kernels():
             splat_blending.gradients(
-                self.packed, self.ids, self.starts, stops, self.width, self.height, colour, slopes, empty,
-                np.float32(veil), sums,
+                self.packed, self.ids, self.starts, stops, self.width, self.height, colour, slopes, weights,
+                empty, np.float32(veil), sums,
             )  # fmt: skip
         return sums
 

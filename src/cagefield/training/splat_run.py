@@ -17,7 +17,7 @@ from cagefield.datasets.views import Dataset
 from cagefield.fields.splat import SplatField
 from cagefield.rendering.deformed_splats import DeformedSplats
 from cagefield.rendering.kernels.splat_blending import SUMS
-from cagefield.rendering.kernels.splat_projection import AREA
+from cagefield.rendering.kernels.splat_projection import AREA, TILE
 from cagefield.rendering.splat_rasterizer import (
     COLOUR,
     Buffers,
@@ -36,13 +36,23 @@ from cagefield.training.checkpoint_checks import (
     check_run,
     refusing_damage,
 )
+from cagefield.training.free_space import FreeSpace
 from cagefield.training.kernels.gauss_newton_splats import gauss_newton, residuals
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
+from cagefield.training.robust_weights import FROM as ROBUST_FROM
+from cagefield.training.robust_weights import RobustWeights
 from cagefield.training.splat_config import SplatConfig
 from cagefield.training.splat_growth import fading, needles, split
 from cagefield.training.splat_poses import FROM, PoseRefinement
-from cagefield.training.splat_seeds import Seeds, camera_scale, depths_seen, first_splats, in_front_of
+from cagefield.training.splat_seeds import (
+    NEAREST_SHARE,
+    Seeds,
+    camera_scale,
+    depths_seen,
+    first_splats,
+    in_front_of,
+)
 from cagefield.training.splat_state import SplatState
 from cagefield.training.splat_views import load_views
 
@@ -96,10 +106,18 @@ class SplatRun:
         self._most = most_splats([view.cameras[0] for view in self.views], config)
         self.state, self.empty = seeds or first_splats(dataset, self.views, config, self._most)
         self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
+        self._free_space = FreeSpace(
+            [view.cameras[0] for view in self.views],
+            [None if depth is None else depth[0] / NEAREST_SHARE for depth in self._depths],
+            self.state.means,
+        )
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fitted = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
+        robust = (not alpha) if config.robust is None else config.robust
+        sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
+        self._robust = RobustWeights([(-(-h // TILE), -(-w // TILE)) for w, h in sizes]) if robust else None
         self.poses = PoseRefinement(len(self.views), self._scale)
         self._buffers = Buffers()
         self._queue: list[int] = []
@@ -123,6 +141,8 @@ class SplatRun:
             self._carve()
         if not self._queue:
             self.poses.centre()
+            if self._robust is not None:
+                self._robust.update_scale()
             self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
         self.step_photo(self._queue.pop(), done)
         self.step += 1
@@ -153,14 +173,17 @@ class SplatRun:
         lens = intrinsics(camera)
         rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
         degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
+        weights = self._weights(index, level, projected.tiles)
         with kernels():
             size = projected.width, projected.height
-            residuals(out, target, *size, gain, background, colour, slopes, tile_sums)
+            residuals(out, target, *size, gain, background, weights, colour, slopes, tile_sums)
+            if self._robust is not None and level == 0:
+                self._robust.add(index, slopes, gain, self.views[index].valid_at(0))
             structured = config.structure > 0.0 and done >= STRUCTURE_FROM
             if structured and min(size) >= WINDOW:
-                self._structure(projected, colour, target, gain, background, slopes)
+                self._structure(projected, colour, target, gain, background, weights, slopes)
             sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
-            projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil)
+            projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil, weights)
             chain(
                 projected.order, projected.firsts, projected.slots, sums, projected.packed, splats.means,
                 state.log_scales, state.quaternions, splats.opacities, splats.sh, world_to_camera(camera),
@@ -179,7 +202,7 @@ class SplatRun:
         state.error[projected.order] += state.gradients[projected.order, 15]
         state.hits[projected.order] += 1
         self._expose(index, tile_sums)
-        loss = float(tile_sums[:, 0].sum()) / (3 * size[0] * size[1])
+        loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
 
     def _structure(
@@ -189,16 +212,27 @@ class SplatRun:
         target: NDArray[np.uint8],
         gain: NDArray[np.float32],
         background: NDArray[np.float32],
+        weights: NDArray[np.float32],
         slopes: NDArray[np.float32],
     ) -> None:
         """Adds what structural similarity says of the picture's pixels to the slopes of their error."""
         size = (projected.height, projected.width)
         structure(
-            colour, target, projected.width, projected.height, gain, background, self._config.structure,
+            colour, target, projected.width, projected.height, gain, background, weights,
+            self._config.structure,
             self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
             self._buffers.take("slopes_of", (3, 3, *size), np.float32),
             self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
         )  # fmt: skip
+
+    def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32]:
+        """Weights [tiles,AREA] of a photo's pixels: 0 where its mask excludes them."""
+        weights = self._buffers.take("weights", (tiles, AREA), np.float32)
+        valid = self.views[index].valid_at(level)
+        weights[:] = 1.0 if valid is None else valid
+        if self._robust is not None and level == 0 and self.done >= ROBUST_FROM:
+            self._robust.weigh(index, weights)
+        return weights
 
     def _behind(self) -> NDArray[np.float32]:
         """The background of the next picture: behind cut-outs a random one, so that they become opaque."""
@@ -219,7 +253,7 @@ class SplatRun:
     def _carve(self) -> None:
         """Takes out needles, and what stands nearer to a camera than anything that it shows can be."""
         state = self.state
-        close = needles(state.log_scales)
+        close = needles(state.log_scales) | self._free_space.occupied(state)
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
                 close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
@@ -276,9 +310,11 @@ class SplatRun:
             "random": self._rng.bit_generator.state,
         }
         arrays = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
-        write_checkpoint(
-            path, self._signature(), scalars, {**arrays, "gains": self.gains, "motions": self.poses.motions}
-        )
+        arrays |= {"gains": self.gains, "motions": self.poses.motions}
+        if self._robust is not None:
+            arrays |= {"residuals": self._robust.residuals, "visits": self._robust.visits}
+            scalars["robust_scale"] = self._robust.scale
+        write_checkpoint(path, self._signature(), scalars, arrays)
 
     def restore(self, path: Path) -> None:
         """Takes the run's state from a file written by `store`.
@@ -297,18 +333,23 @@ class SplatRun:
             name: (str(array.dtype), ("N", *array.shape[1:])) for name, array in own.items()
         }
         count = len(self.views)
-        lengths = check_arrays(
-            arrays, forms | {"gains": ("float32", (count, 3)), "motions": ("float64", (count, 6))}
-        )
+        forms |= {"gains": ("float32", (count, 3)), "motions": ("float64", (count, 6))}
+        if self._robust is not None:
+            forms |= {"residuals": ("float32", (len(self._robust.residuals),)), "visits": ("int64", (count,))}
+            check_finite(arrays, ("residuals",))
+        lengths = check_arrays(arrays, forms)
         check_finite(arrays, ("means", "log_scales", "quaternions", "logits", "sh", "gains", "motions"))
         check_run(scalars, "running_loss")
         queue = scalars["queue"]
-        if len(arrays) != len(own) + 2 or not lengths["N"]:
+        if len(arrays) != len(forms) or not lengths["N"]:
             raise ValueError(f"{lengths['N']} splats and {len(arrays)} arrays")
         if not isinstance(queue, list) or not set(queue) <= set(range(count)) or len(queue) > count:
             raise ValueError(f"photos that come next: {queue!s:.40}")
         self._rng.bit_generator.state = scalars["random"]
         self.gains, self.poses.motions = arrays.pop("gains"), arrays.pop("motions")
+        if self._robust is not None:
+            self._robust.residuals, self._robust.visits = arrays.pop("residuals"), arrays.pop("visits")
+            self._robust.scale = float(scalars["robust_scale"])
         self.state = SplatState(**arrays)
         self.step, self.seconds = scalars["step"], scalars["seconds"]
         self.running_loss, self._queue = scalars["running_loss"], [int(number) for number in queue]

@@ -40,6 +40,9 @@ NEARBY = 0.85
 HEARSAY = 0.2
 """How sure that is."""
 
+NEAREST_SHARE = 0.7
+"""The least depth that a photo may show, over the 1 % quantile of the depths of known points in it."""
+
 RANDOM = 4000
 """Random points, where a data set has none, at most."""
 
@@ -173,7 +176,7 @@ def depths_seen(cameras: Sequence[Camera], positions: NDArray[Any]) -> list[tupl
                 (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
             )
         near, usual = np.quantile(depth[seen], (0.01, 0.5)) if seen.sum() >= 20 else (0.0, 0.0)
-        found.append((0.7 * float(near), float(usual)) if usual > 0 else None)
+        found.append((NEAREST_SHARE * float(near), float(usual)) if usual > 0 else None)
     return found
 
 
@@ -204,7 +207,7 @@ def swept_points(
     usable = [n for n, depth in enumerate(depths) if depth is not None]
     size = (cameras[0].width, cameras[0].height)
     usable = [n for n in usable if (cameras[n].width, cameras[n].height) == size]
-    images = [_over_white(untiled(views[n].level(level)[1], *size)) for n in usable]
+    images = [_without_masked(views[n], level) for n in usable]
     if len(usable) < 3 or wanted < 1:
         return np.zeros((0, 3)), np.zeros((0, 3), np.uint8), empty
     known = [depth for n in usable if (depth := depths[n]) is not None]
@@ -255,6 +258,16 @@ def spread(distances: NDArray[np.float32]) -> NDArray[np.float32]:
         filled[new], sure[new] = NEARBY * around[new], HEARSAY
         size = 2 * size + 1
     return np.stack([filled, sure])
+
+
+def _without_masked(view: TrainingView, level: int) -> NDArray[np.uint8]:
+    """rgb [H,W,3] of a photo over white; pixels that its mask excludes are gray, without texture."""
+    camera, tiles = view.level(level)
+    pixels = _over_white(untiled(tiles, camera.width, camera.height))
+    valid = view.valid_at(level)
+    if valid is not None:
+        pixels[~untiled(valid[:, None], camera.width, camera.height)[..., 0]] = 127
+    return pixels
 
 
 def _over_white(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -266,9 +266,10 @@ def gradient_tile(state, packed, ids, begin, end, x0, y0, sums):
 
 
 @njit(parallel=True, **FAST)
-def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, veil, sums):
+def gradients(packed, ids, starts, stops, width, height, colour, slopes, weights, empty, veil, sums):
     """The sums of all pairs [pairs, SUMS]: colour [tiles,3,AREA] is the picture, slopes dL/d(picture).
 
+    `weights` [tiles,AREA] scale the slopes; pixels of weight 0 count for nothing, nor does their curvature.
     `empty` [2,h,w], of the picture's shape but maybe smaller, are distances along its rays up to which there
     is nothing, and how sure that is; each alpha of a splat before them costs that times `veil`.
     """
@@ -279,7 +280,8 @@ def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, 
         x0, y0 = (t % across) * TILE, (t // across) * TILE
         for i in range(AREA):
             # Pixels outside the picture let nothing through, so that nothing there counts.
-            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
+            weight = weights[t, i]
+            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height and weight > ZERO else ZERO
             state[i] = inside
             state[7 * AREA + i] = ZERO
             row = min((y0 + i // TILE) * empty.shape[1] // height, empty.shape[1] - 1)
@@ -287,11 +289,12 @@ def gradients(packed, ids, starts, stops, width, height, colour, slopes, empty, 
             state[10 * AREA + i] = inside * empty[0, row, column]
             state[11 * AREA + i] = veil * empty[1, row, column]
             for ch in range(3):
-                state[(1 + ch) * AREA + i] = inside * slopes[t, ch, i]
+                state[(1 + ch) * AREA + i] = inside * weight * slopes[t, ch, i]
                 state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]
         influence_tile(state, packed, ids, starts[t], stops[t], x0, y0)
         for i in range(AREA):
-            inside = ONE if x0 + i % TILE < width and y0 + i // TILE < height else ZERO
+            kept = x0 + i % TILE < width and y0 + i // TILE < height and weights[t, i] > ZERO
+            inside = ONE if kept else ZERO
             state[i] = inside
             for ch in range(3):
                 state[(4 + ch) * AREA + i] = inside * colour[t, ch, i]

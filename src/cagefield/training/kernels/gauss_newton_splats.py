@@ -31,11 +31,12 @@ by would otherwise take steps that are too long for it."""
 
 
 @njit(parallel=True, **FAST)
-def residuals(out, target, width, height, gain, background, colour, slopes, sums):
+def residuals(out, target, width, height, gain, background, weights, colour, slopes, sums):
     """The picture over its background, dL/d(picture) of L = |gain picture - photo|^2 / 2, and sums a tile.
 
     out [tiles, >=4, AREA] is T and colour; target [tiles, 3 or 4, AREA] uint8 with straight alpha. sums
-    [tiles, 7]: squared error; gain-free picture x photo and picture^2, by channel.
+    [tiles, 7]: squared error; gain-free picture x photo and picture^2, by channel; all of them weighted by
+    `weights` [tiles,AREA]. The slopes are not.
     """
     across = (width + TILE - 1) // TILE
     alpha = target.shape[1] == 4
@@ -57,10 +58,10 @@ def residuals(out, target, width, height, gain, background, colour, slopes, sums
                 d = gain[ch] * c - photo if inside else np.float32(0.0)
                 colour[t, ch, i] = c
                 slopes[t, ch, i] = gain[ch] * d
-                error += d * d
+                error += weights[t, i] * d * d
                 if inside:
-                    product += c * photo
-                    square += c * c
+                    product += weights[t, i] * c * photo
+                    square += weights[t, i] * c * c
             sums[t, 0] += error
             sums[t, 1 + ch] = product
             sums[t, 4 + ch] = square

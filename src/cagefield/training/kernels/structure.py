@@ -29,12 +29,14 @@ _C1, _C2 = np.float32(0.01**2), np.float32(0.03**2)
 
 
 @njit(parallel=True, **FAST)
-def structure(colour, target, width, height, gain, background, weight, moments, slopes_of, pixels, slopes):
+def structure(
+    colour, target, width, height, gain, background, weights, weight, moments, slopes_of, pixels, slopes
+):
     """Adds `weight` times the loss's derivative by the picture (before its gain) to `slopes`.
 
     colour and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
-    background; gain and background [3]. moments [3,MOMENTS,H,W], slopes_of [3,3,H,W] and pixels [3,2,H,W] are
-    room to work in.
+    background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal.
+    moments [3,MOMENTS,H,W], slopes_of [3,3,H,W] and pixels [3,2,H,W] are room to work in.
     """
     across = (width + TILE - 1) // TILE
     alpha = target.shape[1] == 4
@@ -51,8 +53,9 @@ def structure(colour, target, width, height, gain, background, weight, moments, 
                 if alpha:
                     share = np.float32(target[first + tile, 3, at]) * np.float32(1 / 255)
                     photo = photo * share + background[ch] * (np.float32(1) - share)
-                x[tile * TILE + i] = gain[ch] * colour[first + tile, ch, at]
-                p[tile * TILE + i] = photo
+                shown = gain[ch] * colour[first + tile, ch, at]
+                x[tile * TILE + i] = shown
+                p[tile * TILE + i] = photo if weights[first + tile, at] > np.float32(0) else shown
         out = moments[ch, :, y]
         out[:] = np.float32(0)
         for k in range(WINDOW):

@@ -1,0 +1,215 @@
+"""Photos by the names that camera files give them, on whatever machine these were written.
+
+A name is looked for as it is, then with another separator, URL-decoded, with another case, Unicode form or
+image extension, and at last by its end: the file below the folder that shares most of the name's last parts.
+A file that one name gives exactly is no other name's photo.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import unicodedata
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from urllib.parse import unquote
+
+from cagefield.datasets.hidden_files import is_hidden
+from cagefield.datasets.notices import warn
+from cagefield.datasets.photos import EXTENSIONS, find_photo
+from cagefield.datasets.raw_photos import OTHER_PHOTOS
+from cagefield.datasets.views import named
+
+MAX_DEPTH = 6
+"""Folders below a data set in which photos are looked for."""
+
+MAX_FILES = 200_000
+
+_LONGEST = 4096  # characters of a name
+_PICTURES = frozenset({*EXTENSIONS, *OTHER_PHOTOS})
+_SECONDARY = ("mask", "depth", "normal", "thumb", "images_", "dynamic_mask")  # beginnings of folders' names
+
+
+def view_name(name: str) -> str:
+    """`name` with forward slashes and no leading ./"""
+    return str(PurePosixPath(name.removeprefix("file://").replace("\\", "/")))
+
+
+def photo_files(folder: Path) -> list[Path]:
+    """The photos of a folder by name, without hidden ones and those of its folders."""
+    return sorted(
+        file for file in folder.iterdir() if file.suffix.lower() in EXTENSIONS and not is_hidden([file.name])
+    )
+
+
+@dataclass
+class FoundPhotos:
+    """Photos by names of a camera file.
+
+    Attributes:
+        photos: the files of the names that were found.
+        moved: those found by the end of their name alone.
+        ambiguous: names whose end several files share, or several names one file.
+    """
+
+    photos: dict[str, Path] = field(default_factory=dict)
+    moved: dict[str, Path] = field(default_factory=dict)
+    ambiguous: list[str] = field(default_factory=list)
+
+    def name_of(self, name: str, base: Path) -> str:
+        """The view's name: the name itself, or of a moved photo its path below `base`."""
+        path = self.moved.get(name)
+        return view_name(name) if path is None else Path(os.path.relpath(path, base)).as_posix()
+
+    def report(self, where: Path, base: Path) -> None:
+        """Warns of photos that are not where the names say, and of names that could be several photos'."""
+        if self.moved:
+            name, path = next(iter(self.moved.items()))
+            warn(
+                f"{where}: {len(self.moved)} of {len(self.photos)} photos are not where it says, found below "
+                f" {base} by the ends of their names ({name} is {path})"
+            )
+        if self.ambiguous:
+            warn(
+                f"{where}: the ends of {len(self.ambiguous)} names fit several photos below {base}, or one "
+                f"photo several of them: {named(self.ambiguous)}; put the photos where the file says"
+            )
+
+
+def find_photos(base: Path, names: Iterable[str]) -> FoundPhotos:
+    """The photos that `names`, relative to the folder `base`, are of."""
+    found, rest = FoundPhotos(), []
+    for name in dict.fromkeys(names):
+        photo = _exact(base, name)
+        if photo is None:
+            rest.append(name)
+        else:
+            found.photos[name] = photo
+    if not rest:
+        return found
+    taken = {os.path.realpath(photo) for photo in found.photos.values()}
+    tree = _Tree(base)
+    wanted: dict[Path, list[tuple[str, bool]]] = defaultdict(list)
+    for name in rest:
+        candidates, moved = tree.like(name)
+        free = [path for path in candidates if os.path.realpath(path) not in taken]
+        if len(free) == 1:
+            wanted[free[0]].append((name, moved))
+        elif free:
+            found.ambiguous.append(name)
+    for path, claims in wanted.items():
+        if len({view_name(name) for name, _ in claims}) > 1:
+            found.ambiguous += [name for name, _ in claims]
+            continue
+        for name, moved in claims:
+            found.photos[name] = path
+            if moved:
+                found.moved[name] = path
+    return found
+
+
+def _exact(base: Path, name: str) -> Path | None:
+    if len(name) > _LONGEST:
+        return None
+    for text in dict.fromkeys((name, view_name(name), unquote(view_name(name)))):
+        with contextlib.suppress(OSError, ValueError):  # a part that is too long, a zero in it
+            photo = find_photo(base / text)
+            if photo is not None and not is_hidden([photo.name]):
+                return photo
+    return None
+
+
+def name_key(part: str) -> str:
+    """A part of a name as parts are compared: composed, without case."""
+    return unicodedata.normalize("NFC", part).casefold()
+
+
+def stem_key(name: str) -> str:
+    """The key of a file's name without its image extension."""
+    stem, extension = os.path.splitext(name)
+    return name_key(stem if extension.lower() in _PICTURES else name)
+
+
+class _Tree:
+    """The photos below a folder."""
+
+    def __init__(self, base: Path) -> None:
+        self._base = base
+
+    @cached_property
+    def _by_stem(self) -> dict[str, list[tuple[str, ...]]]:
+        """Parts of the paths below the folder, by the key of the stem."""
+        index: dict[str, list[tuple[str, ...]]] = defaultdict(list)
+        for count, parts in enumerate(picture_tree(self._base)):
+            if count >= MAX_FILES:
+                break
+            index[stem_key(parts[-1])].append(parts)
+        return index
+
+    @cached_property
+    def _folders(self) -> set[tuple[str, ...]]:
+        return {
+            tuple(map(name_key, parts[:length]))
+            for paths in self._by_stem.values()
+            for parts in paths
+            for length in range(1, len(parts))
+        }
+
+    def like(self, name: str) -> tuple[list[Path], bool]:
+        """Files that may be the photo `name`, and whether they are elsewhere than it says.
+
+        In a folder that the name gives and that is there, a file of its stem; else those of the longest end.
+        """
+        text = unquote(view_name(name)) if "%" in name else view_name(name)
+        parts = tuple(part for part in PurePosixPath(text).parts if part not in ("/", ".."))
+        if not parts:
+            return [], False
+        folder = tuple(map(name_key, parts[:-1]))
+        same = self._by_stem.get(stem_key(parts[-1]), [])
+        here = [one for one in same if tuple(map(name_key, one[:-1])) == folder]
+        if here or (folder and folder in self._folders):
+            return self._paths(_preferred(here, parts[-1])), False
+        lengths = [_common_end(one[:-1], parts[:-1]) for one in same]
+        longest = [one for one, length in zip(same, lengths, strict=True) if length == max(lengths)]
+        return self._paths(_preferred(longest, parts[-1])), True
+
+    def _paths(self, found: Sequence[tuple[str, ...]]) -> list[Path]:
+        return [self._base.joinpath(*parts) for parts in found]
+
+
+def _preferred(found: list[tuple[str, ...]], name: str) -> list[tuple[str, ...]]:
+    """Of several files those of the name's extension, and of these those in no folder of masks or copies."""
+    extension = os.path.splitext(name)[1].lower()
+    for good in (
+        lambda parts: os.path.splitext(parts[-1])[1].lower() == extension,
+        lambda parts: not any(part.lower().startswith(_SECONDARY) for part in parts[:-1]),
+        lambda parts: parts[-1] == name,
+    ):
+        some = [parts for parts in found if good(parts)]
+        found = some if some and len(found) > 1 else found
+    return found
+
+
+def _common_end(one: Sequence[str], other: Sequence[str]) -> int:
+    """How many last parts two paths share."""
+    count = 0
+    for first, second in zip(reversed(one), reversed(other), strict=False):
+        if name_key(first) != name_key(second):
+            break
+        count += 1
+    return count
+
+
+def picture_tree(base: Path) -> Iterator[tuple[str, ...]]:
+    """The parts of the paths of pictures below a folder, in order, without hidden ones."""
+    for folder, folders, files in os.walk(base, followlinks=True):
+        parts = Path(os.path.relpath(folder, base)).parts
+        folders[:] = (
+            sorted(name for name in folders if not is_hidden([name])) if len(parts) < MAX_DEPTH else []
+        )
+        for name in sorted(files):
+            if os.path.splitext(name)[1].lower() in EXTENSIONS and not is_hidden([name]):
+                yield (*parts, name)

@@ -1,0 +1,258 @@
+"""Verification of the poses that come with photos, and their correction.
+
+The poses are measured (`pose_check`, `folds`). Right ones are left as they are. Wrong ones are
+bundle-adjusted (`pose_refinement`); where that does not cure them, structure from motion finds new ones from
+the photos. The data set gets the poses with the least epipolar error, in its given world where they agree
+with the given ones enough to tell where that is.
+
+A correction is kept in the user's cache, under a digest of photos and given cameras.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from cagefield import json_text
+from cagefield.atomic_files import replaced_file
+from cagefield.caches import cache_root
+from cagefield.cameras import Camera
+from cagefield.datasets.folds import Fold, find_fold
+from cagefield.datasets.points import capture_key, read_cached_points, write_cached_points
+from cagefield.datasets.pose_check import PoseError, match_photos, pose_error
+from cagefield.datasets.pose_refinement import PoseSolver, RefinedPoses
+from cagefield.datasets.region import cube_of_interest, depth_range
+from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.errors import CagefieldError
+from cagefield.regular_files import read_text
+from cagefield.temporary_folders import TemporaryFolder
+
+Outcome = Literal["unmeasured", "kept", "adjusted", "rebuilt"]
+OnStage = Callable[[str, float, str], None]
+
+MIN_GAIN = 0.7
+"""Epipolar error after over before, at most, for corrected poses that are still called wrong."""
+
+MAX_SHARED_GAIN = 1.25
+"""The same where only focal lengths are scattered: one lens for all must explain the photos as well."""
+
+_VERSION = b"poses 1"
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """A data set whose poses are verified, and the figures.
+
+    Attributes:
+        dataset: the data set itself where its poses are kept, else one with other cameras and points.
+        before, after: epipolar errors of the given poses and of the data set's; None where too few photos
+            match.
+        fold: photos that contradict each other under the given poses, None without any.
+        outcome: unmeasured and kept leave the poses as they are; adjusted is by bundle adjustment, rebuilt by
+            structure from motion.
+        aligned: whether the cameras are in the given world.
+        left_out: names of views without a new pose.
+    """
+
+    dataset: Dataset
+    before: PoseError | None
+    after: PoseError | None
+    fold: Fold | None
+    outcome: Outcome
+    aligned: bool = True
+    left_out: tuple[str, ...] = ()
+
+
+def all_views(dataset: Dataset) -> list[View]:
+    """All views of a data set once, sorted by name."""
+    everything = {view.name: view for view in (*dataset.val, *dataset.test, *dataset.train)}
+    return [everything[name] for name in sorted(everything)]
+
+
+def verify_poses(
+    dataset: Dataset,
+    *,
+    correct: bool = True,
+    cache: Path | None = None,
+    on_stage: OnStage = lambda stage, done, note: None,
+    seed: int = 0,
+) -> Verification:
+    """The data set with its poses measured and, with `correct`, corrected where they are wrong.
+
+    Corrections are read from and written to the folder `cache`.
+
+    Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails.
+    """
+    views = [view.whole() for view in all_views(dataset)]
+    matches = match_photos(views, partial(on_stage, "Checking poses"))
+    before = pose_error(matches, views)
+    fold = find_fold(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
+    wrong = fold is not None or (before is not None and before.is_wrong)
+    scattered = before is not None and before.has_scattered_focals
+    if not correct or not (wrong or scattered):
+        return Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
+    file = None if cache is None else cache / f"poses-{capture_key(views, seed, _VERSION)}.json"
+    known = None if file is None else _read(file)
+    tried: list[tuple[Outcome, RefinedPoses]] = [] if known is None else [known]
+    best: Verification | None = None
+
+    def judged(outcome: Outcome, found: RefinedPoses) -> Verification | None:
+        """The verification with these poses where they are better than the given ones."""
+        other = with_cameras(dataset, found)
+        after = pose_error(matches, [view.whole() for view in all_views(other)])
+        if not _is_better(before, after, fold):
+            return None
+        if fold is not None and find_fold(other) is not None:
+            return None
+        names = tuple(view.name for view in views if view.name not in found.cameras)
+        return Verification(other, before, after, fold, outcome, found.aligned, names)
+
+    for outcome, found in tried:
+        best = judged(outcome, found)
+    if best is None:
+        for outcome, found in _corrections(views, before, fold, seed, on_stage):
+            judgement = judged(outcome, found)
+            if judgement is not None and (best is None or _error(judgement) < _error(best)):
+                best = judgement
+                if file is not None:
+                    _write(file, outcome, found)
+            if best is not None and best.after is not None and not best.after.is_wrong:
+                break
+    return best or Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
+
+
+def _corrections(
+    views: list[View], before: PoseError | None, fold: Fold | None, seed: int, on_stage: OnStage
+) -> Iterator[tuple[Outcome, RefinedPoses]]:
+    """Corrected poses one after the other, the cheapest first: (outcome, poses)."""
+    with TemporaryFolder("points") as folder:
+        solver = PoseSolver(views, folder, partial(on_stage, "Matching photos"), seed)
+        if before is not None and (before.is_wrong or fold is None):
+            found = solver.refine(before.median / before.size, partial(on_stage, "Adjusting poses"))
+            if found is not None:
+                yield "adjusted", found
+        if fold is not None or (before is not None and before.is_wrong):
+            found = solver.rebuild(partial(on_stage, "Finding poses"))
+            if found is not None:
+                yield "rebuilt", found
+
+
+def _error(one: Verification) -> float:
+    return float("inf") if one.after is None else one.after.median
+
+
+def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | None) -> bool:
+    """Whether poses with the error `after` take the place of those with the error `before`.
+
+    Where neither is known they are judged by the fold alone.
+    """
+    if after is None:
+        return before is None and fold is not None
+    if before is None or fold is not None:
+        return not after.is_wrong
+    if not before.is_wrong:
+        return not after.is_wrong and after.median <= MAX_SHARED_GAIN * before.median
+    if not after.is_wrong:
+        return after.median < before.median
+    return after.median < MIN_GAIN * before.median and after.tenth <= before.tenth
+
+
+def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
+    """The data set with other cameras and points; views without a camera are left out.
+
+    The cube of interest of an unbounded capture is found anew.
+    """
+
+    def moved(views: tuple[View, ...]) -> tuple[View, ...]:
+        return tuple(
+            replace(view.whole(), camera=found.cameras[view.name]).downscaled(view.downscale)
+            for view in views
+            if view.name in found.cameras
+        )
+
+    train, test, val = moved(dataset.train), moved(dataset.test), moved(dataset.val)
+    cameras = [view.camera for view in train]
+    positions = None if found.points is None else found.points.positions
+    bounds = cube_of_interest(cameras, points=positions) if dataset.unbounded else dataset.bounds
+    return replace(
+        dataset,
+        train=train,
+        test=test,
+        val=val,
+        bounds=bounds,
+        depths=depth_range(cameras, positions),
+        points=found.points,
+    )
+
+
+def describe(one: Verification) -> list[str]:
+    """Lines about a verification: the error, the correction, photos left out."""
+    if one.before is None:
+        lines = ["poses: not measured, too few photos have matches with their neighbors"]
+    else:
+        lines = [f"poses: {one.before}"]
+    if one.fold is not None:
+        first, second = one.fold.pair
+        lines.append(
+            f"poses are folded: {one.fold.photos} of {one.fold.compared} photos stand beside others that "
+            f"show something else ({first} and {second}), as where two sides of a thing look alike"
+        )
+    elif one.before is not None and one.before.has_scattered_focals:
+        lines.append(
+            f"focal lengths of photos of one size differ by {100 * one.before.focal_spread:.0f} %, more than "
+            "one lens explains"
+        )
+    if one.outcome in ("adjusted", "rebuilt"):
+        how = {
+            "adjusted": "adjusted (bundle adjustment, intrinsics shared by photos of one size)",
+            "rebuilt": "found anew (structure from motion)",
+        }[one.outcome]
+        world = "in the given world" if one.aligned else "in another world: too few agree with the given ones"
+        lines.append(f"poses are {how}, {world}: {one.after}; --keep-poses leaves them as they are")
+    elif one.fold is not None or (one.before is not None and one.before.is_wrong):
+        lines.append("nothing better was found: the given poses are used")
+    if one.left_out:
+        lines.append(f"{len(one.left_out)} photos found no place and are left out: {', '.join(one.left_out)}")
+    return lines
+
+
+def poses_cache() -> Path:
+    """The folder of corrected poses in the user's cache."""
+    return cache_root() / "poses"
+
+
+def _write(file: Path, outcome: Outcome, found: RefinedPoses) -> None:
+    """Writes corrected poses whole or not at all; where the folder cannot be written to, nothing."""
+    values = {
+        "outcome": outcome,
+        "cameras": {name: camera.to_dict() for name, camera in found.cameras.items()},
+        "reprojection_error": found.reprojection_error,
+        "aligned": found.aligned,
+    }
+    if found.points is not None:
+        write_cached_points(file.with_suffix(".npz"), found.points)
+    try:
+        with replaced_file(file) as draft:
+            draft.write_text(json.dumps(values), encoding="utf-8")
+    except OSError:
+        return
+
+
+def _read(file: Path) -> tuple[Outcome, RefinedPoses] | None:
+    """Corrected poses of a file; None where it is not there or damaged."""
+    try:
+        values = json_text.loads(read_text(file))
+        cameras = {str(name): Camera.from_dict(one) for name, one in values["cameras"].items()}
+        outcome, error, aligned = values["outcome"], float(values["reprojection_error"]), values["aligned"]
+        points: SparsePoints | None = read_cached_points(file.with_suffix(".npz"))
+        if outcome not in ("adjusted", "rebuilt") or not isinstance(aligned, bool) or not np.isfinite(error):
+            return None
+        return outcome, RefinedPoses(cameras, points, error, aligned)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, CagefieldError):
+        return None
