@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from cagefield.errors import CagefieldError
-from cagefield.rendering.metrics import color_corrected, color_fit, mse, psnr, ssim
+from cagefield.rendering.metrics import color_corrected, color_fit, gradient_ratio, mse, psnr, ssim
 
 
 def pair(shape: tuple[int, ...], noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -158,3 +159,18 @@ def test_ssim_of_a_mask_is_the_mean_over_windows_about_its_valid_pixels():
 def test_masks_that_do_not_fit_are_refused(valid, message):
     with pytest.raises(CagefieldError, match=message):
         psnr(np.zeros((4, 3, 3)), np.ones((4, 3, 3)), valid)
+
+
+def test_gradient_ratio_is_the_contrast_of_a_picture_and_falls_as_it_is_blurred():
+    photo, _ = pair((30, 40, 3), 0)
+    assert gradient_ratio(photo, photo) == 1.0
+    assert gradient_ratio(0.2 + 0.5 * photo, photo) == pytest.approx(0.5)
+    # a wave of period 8 keeps the share exp(-(2 pi / 8)^2 sigma^2 / 2) under a Gaussian blur
+    wave = 0.5 + 0.4 * np.sin(2 * np.pi * np.arange(160) / 8) * np.ones((40, 1))
+    blurred = gaussian_filter(wave, 1.5, mode="wrap")
+    assert gradient_ratio(blurred, wave) == pytest.approx(np.exp(-((np.pi / 4 * 1.5) ** 2) / 2), rel=0.01)
+    valid = np.ones((30, 40), bool)
+    valid[10:20, 10:20] = False
+    changed = np.where(valid[..., None], photo, 0.0)
+    assert gradient_ratio(changed, photo, valid) == 1.0 != gradient_ratio(changed, photo)
+    assert np.isnan(gradient_ratio(photo, np.full_like(photo, 0.5)))

@@ -11,11 +11,12 @@ import pytest
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.procedural import CAPTURES, ProceduralScene, capture, make_capture
-from cagefield.datasets.procedural.hand_held import Phone, developed, encoded, exposures, linear, picture
+from cagefield.datasets.procedural.hand_held import Phone, developed, exposures, picture
 from cagefield.datasets.procedural.parts import Part, Primitive, place
 from cagefield.datasets.procedural.room_light import Room
 from cagefield.datasets.procedural.rooms import ROOMS
 from cagefield.datasets.procedural.shapes import Box, Sphere
+from cagefield.datasets.procedural.srgb import encoded, linear
 from cagefield.datasets.procedural.textures import Plain
 from cagefield.datasets.procedural.tracks import NOISE, tracks
 from cagefield.errors import DatasetError, SceneError

@@ -25,7 +25,8 @@ class BenchCaptures:
 
     data: tyro.conf.Positional[tuple[str, ...]]
     """Data sets: folders, their camera files, or names of built-in rooms: room-digger, room-chair,
-    room-microphone, room-plant."""
+    room-microphone, room-plant, with variations after plus signs (room-chair+person): person, backdrop,
+    flash, exposure, balance."""
     out: Output = Path("benchmarks/results/captures.md")
     """Markdown file for the table."""
     fields: tuple[Literal["splat", "voxel"], ...] = ("splat",)
@@ -50,6 +51,9 @@ class BenchCaptures:
     """Folder of masks, NAME.png for the photo NAME; left out, the masks that the data sets have."""
     keep_poses: Flag = False
     """Train on poses as they are, even where they are folded; else those are found anew."""
+    perturb_poses: Flag = False
+    """Disturb every camera first, test views' too: turned by 1 degree, moved by 1 % of its distance, its
+    focal length changed by up to 5 %; --seed decides how."""
     room_size: int | None = None
     """Longer side of the photos of built-in rooms, 640 if left out."""
     room_views: int | None = None
@@ -132,14 +136,15 @@ class BenchCaptures:
 
         A built-in room is photographed where the work folder lacks it.
         """
+        from cagefield.benchmarking.perturbation import perturbed
         from cagefield.benchmarking.workbench import digest
         from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.procedural import CAPTURES, make_capture
+        from cagefield.datasets.procedural import is_capture, make_capture
         from cagefield.datasets.resolution import at_training_resolution
 
         path = Path(name)
-        if name in CAPTURES and not path.exists():
+        if is_capture(name) and not path.exists():
             key = digest([name, self.room_views, self.room_size], ("datasets/procedural", "cameras.py"))
             path = folder / f"photos-{key}" / name
             if not path.is_dir():
@@ -152,6 +157,8 @@ class BenchCaptures:
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
         dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout, masks=self.masks)
+        if self.perturb_poses:
+            dataset = perturbed(dataset, self.seed)
         if self.downscale is None:
             dataset = at_training_resolution(dataset, self.minutes)
         found = verified(dataset, correct=not self.keep_poses)

@@ -22,7 +22,8 @@ class MakeScene:
     a phone takes them, with transforms.json and sparse points."""
 
     name: tyro.conf.Positional[str]
-    """digger, chair, microphone or plant; room-digger, room-chair, room-microphone or room-plant."""
+    """digger, chair, microphone or plant; room-digger, room-chair, room-microphone or room-plant, also with
+    training photos that disagree, by names after plus signs: person, backdrop, flash, exposure, balance."""
     out: Output
     """Folder for the photos."""
     views: int | None = None
@@ -46,9 +47,9 @@ class MakeScene:
         for name, value, high in (("views", self.views, 100_000), ("test-views", self.test_views, 100_000),
                                   ("size", self.size, 8192)):  # fmt: skip
             check_number(f"--{name}", value, 1, high)
-        from cagefield.datasets.procedural import CAPTURES
+        from cagefield.datasets.procedural import is_capture
 
-        parts = self._capture() if self.name in CAPTURES else self._scene()
+        parts = self._capture() if is_capture(self.name) else self._scene()
         print(f"photos of {self.name} (parts: {', '.join(parts)}) in {self.out}")
 
     def _scene(self) -> tuple[str, ...]:
@@ -80,14 +81,14 @@ class MakeScene:
     def _capture(self) -> tuple[str, ...]:
         """Writes the capture of a room; the names of its parts."""
         from cagefield.atomic_files import replaced_folder
-        from cagefield.datasets.procedural import CAPTURES, make_capture
+        from cagefield.datasets.procedural import capture, make_capture
         from cagefield.datasets.procedural.capture_writer import OWN
 
         if self.test_views is not None:
             raise CagefieldError(
                 "--test-views is for scenes alone; of a room's photos `cagefield train` holds out every 8th"
             )
-        scene = CAPTURES[self.name].scene
+        scene = capture(self.name).scene
         check_folder(self.out, self.overwrite, _CAPTURE_MARK)
         with (
             replaced_folder(real_path(self.out), OWN) as draft,

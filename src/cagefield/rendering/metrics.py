@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
+from scipy.ndimage import binary_erosion, correlate1d
 
 from cagefield.errors import CagefieldError
 from cagefield.typing import AnyArray, Mask
@@ -111,6 +111,19 @@ def ssim(first: AnyArray, second: AnyArray, valid: Mask | None = None) -> float:
     structure = (2 * covariance + c2) / (var_a + var_b + c2)
     similarity = luminance * structure
     return float(np.mean(similarity if chosen is None else similarity[chosen]))
+
+
+def gradient_ratio(picture: AnyArray, photo: AnyArray, valid: Mask | None = None) -> float:
+    """Sharpness of a picture [H,W] or [H,W,C] against a photo: mean gradient over that of the photo.
+
+    The gradient is that of the mean of the channels, by central differences; pixels beside excluded ones have
+    none. NaN where the photo has no gradient.
+    """
+    a, b = (image if image.ndim == 2 else image.mean(axis=-1) for image in _pair(picture, photo))
+    chosen = _checked_mask(valid, a.shape)
+    inside: Any = slice(None) if chosen is None else binary_erosion(chosen, border_value=1)
+    first, second = (float(np.hypot(*np.gradient(image))[inside].sum()) for image in (a, b))
+    return first / second if second > 0 else float("nan")
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Built-in scenes whose parts can be really moved: the embedded default and the ground truth of edits."""
 
 from cagefield.datasets.procedural.capture_writer import make_capture
-from cagefield.datasets.procedural.captures import CAPTURES, Capture, capture
+from cagefield.datasets.procedural.captures import CAPTURES, Capture, capture, is_capture
 from cagefield.datasets.procedural.catalogue import SCENES, procedural_scene
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.writer import DepthViews, make_scene, viewpoints
@@ -13,6 +13,7 @@ __all__ = [
     "DepthViews",
     "ProceduralScene",
     "capture",
+    "is_capture",
     "make_capture",
     "make_scene",
     "procedural_scene",

@@ -6,6 +6,8 @@ sparse_pc.ply                the sparse points
 colmap/sparse/0/*.txt        the same as a COLMAP model, with the photos that see each point
 depth/frame_00001.npy ...    float32 [H,W]: true distance along the ray in world units, of every HOLDOUT-th
                              photo from the first on (those that `load_dataset` holds out), or of all
+distractors/frame_00002.png  of photos with a person or a backdrop: white where it is seen. Training does not
+                             read them; depths are those of the room without
 """
 
 from __future__ import annotations
@@ -23,18 +25,22 @@ from scipy.spatial.transform import Rotation
 from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.captures import capture
+from cagefield.datasets.procedural.distractors import with_distractors
+from cagefield.datasets.procedural.flash import FlashLight
 from cagefield.datasets.procedural.hand_held import developed, exposures, picture
 from cagefield.datasets.procedural.scene import ProceduralScene
 from cagefield.datasets.procedural.tracks import Tracks, tracks
+from cagefield.datasets.procedural.variations import Changes, changes_of
 from cagefield.datasets.procedural.writer import DepthViews
 from cagefield.errors import DatasetError
 from cagefield.regular_files import real_path
+from cagefield.typing import Float32, Mask
 
 HOLDOUT = 8
 QUALITY = 95
 """Of the photos' JPEG files."""
 
-OWN = ("images", "transforms.json", "sparse_pc.ply", "colmap", "depth")
+OWN = ("images", "transforms.json", "sparse_pc.ply", "colmap", "depth", "distractors")
 """What a capture's folder holds."""
 
 LEAST_SIDE = 32
@@ -54,6 +60,8 @@ def make_capture(
 ) -> Path:
     """Folder with a capture of a built-in room (or of `scene` from where that capture is taken).
 
+    name      a built-in room, with variations after plus signs (`variations.VARIATIONS`): every HOLDOUT-th
+              photo from the first on is as without them
     views     photos in all; size: the longer side in pixels; each as the capture says where left out
     seed      of the cameras, the exposures and the noise
     depth     the photos whose true depth is written: all, those held out, or none
@@ -79,14 +87,20 @@ def make_capture(
     cameras = plan.cameras(phone, count, seed)
     scene = plan.scene if scene is None else scene
     names = [f"frame_{index:05d}.jpg" for index in range(1, count + 1)]
-    shots = []
-    for camera in cameras:
+    training = [index % HOLDOUT != 0 for index in range(count)]
+    changes = changes_of(plan.variations, scene, cameras, plan.target, training, seed)
+    shots, shown = [], []
+    for camera, change in zip(cameras, changes, strict=True):
         shots.append(picture(scene, camera))
+        shown.append(_changed(scene, camera, change, *shots[-1]))
         if progress is not None:
             progress(len(shots), count)
     rng = np.random.RandomState([seed, 7])
     gains = exposures([rgb for rgb, _ in shots], phone.adapts, rng)
-    photos = [developed(rgb, gain, rng) for (rgb, _), gain in zip(shots, gains, strict=True)]
+    photos = [
+        developed(rgb, gain * change.gains, rng)
+        for (rgb, _, _), gain, change in zip(shown, gains, changes, strict=True)
+    ]
     depths = [distance for _, distance in shots]
     with replaced_folder(target, ()) as draft:
         (draft / "images").mkdir()
@@ -96,14 +110,30 @@ def make_capture(
             (draft / "depth").mkdir()
             for index in range(0, count, HOLDOUT if depth == "test" else 1):
                 np.save(draft / "depth" / f"{Path(names[index]).stem}.npy", depths[index])
+        for file, (_, _, distractor) in zip(names, shown, strict=True):
+            if distractor is not None:
+                (draft / "distractors").mkdir(exist_ok=True)
+                Image.fromarray(distractor).save(draft / "distractors" / f"{Path(file).stem}.png")
         values = _transforms(cameras, names)
         if points:
-            found = tracks(photos, depths, cameras, seed=seed)
+            found = tracks(photos, [distance for _, distance, _ in shown], cameras, seed=seed)
             values["ply_file_path"] = "sparse_pc.ply"
             _write_ply(found, draft / "sparse_pc.ply")
             _write_colmap(found, cameras, names, draft / "colmap/sparse/0")
         (draft / "transforms.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
     return target
+
+
+def _changed(
+    scene: ProceduralScene, camera: Camera, change: Changes, rgb: Float32, distance: Float32
+) -> tuple[Float32, Float32, Mask | None]:
+    """(rgb, distance, pixels of distractors or None for none) of a picture of the scene after its changes."""
+    if change.flash:
+        scene = scene.lit_by(FlashLight(scene.light, camera.origin))
+        rgb, distance = picture(scene, camera)
+    if not change.parts:
+        return rgb, distance, None
+    return with_distractors(scene, change.parts, camera, rgb, distance)
 
 
 def _transforms(cameras: Sequence[Camera], names: Sequence[str]) -> dict[str, object]:

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras import Camera
 from cagefield.datasets.procedural.parts import apply
 from cagefield.datasets.procedural.scene import ProceduralScene
+from cagefield.datasets.procedural.srgb import encoded, linear
 from cagefield.typing import Array, Float32
 
 EDGE = 0.03
@@ -129,19 +130,32 @@ def picture(scene: ProceduralScene, camera: Camera) -> tuple[Float32, Float32]:
     One ray a pixel, and the mean of four where the picture has an edge. rgb may exceed 1.
     """
     shape = (camera.height, camera.width)
-    directions = apply(camera.c2w[:3, :3], camera.local_directions().T)
-    rgb, _, hits = scene.shoot(camera.origin, directions)
+    rgb, _, hits = scene.shoot(camera.origin, pixel_directions(camera))
     image = rgb.reshape(*shape, 3)
-    size = (3, 3, 1)
-    contrast = (maximum_filter(image, size) - minimum_filter(image, size)).max(axis=-1)
-    rows, columns = np.nonzero(contrast > EDGE)
+    rows, columns = np.nonzero(contrast(image) > EDGE)
     if len(rows):
-        fine = camera.resized(2 * camera.width, 2 * camera.height).local_directions()
-        fine = fine.reshape(shape[0], 2, shape[1], 2, 3)
-        chosen = fine[rows, :, columns].reshape(-1, 3)
-        sharp, _, _ = scene.shoot(camera.origin, apply(camera.c2w[:3, :3], chosen.T))
+        sharp, _, _ = scene.shoot(camera.origin, fine_directions(camera, rows, columns))
         image[rows, columns] = sharp.reshape(len(rows), 4, 3).mean(axis=1)
     return image, hits.t.reshape(shape)
+
+
+def pixel_directions(camera: Camera) -> Float32:
+    """Unit world directions [3,H*W] of the rays through the pixels' centres."""
+    return apply(camera.c2w[:3, :3], camera.local_directions().T)
+
+
+def fine_directions(camera: Camera, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Float32:
+    """Unit world directions [3,4K] of four rays through each of K pixels."""
+    fine = camera.resized(2 * camera.width, 2 * camera.height).local_directions()
+    fine = fine.reshape(camera.height, 2, camera.width, 2, 3)
+    return apply(camera.c2w[:3, :3], fine[rows, :, columns].reshape(-1, 3).T)
+
+
+def contrast(image: Float32) -> Float32:
+    """Largest difference [H,W] of a channel within 3x3 pixels."""
+    size = (3, 3, 1)
+    difference: Float32 = (maximum_filter(image, size) - minimum_filter(image, size)).max(axis=-1)
+    return difference
 
 
 def exposures(pictures: Sequence[Float32], adapts: float, rng: np.random.RandomState) -> Float32:
@@ -158,15 +172,3 @@ def developed(rgb: Float32, gains: Float32, rng: np.random.RandomState) -> NDArr
     light = linear(rgb) * gains
     light = light + rng.standard_normal(light.shape) * np.sqrt(SHOT_NOISE * light + READ_NOISE**2)
     return (encoded(np.clip(light, 0, 1)) * 255 + 0.5).astype(np.uint8)
-
-
-def linear(rgb: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Linear light of sRGB-encoded values >= 0. Source: IEC 61966-2-1."""
-    return np.where(rgb <= 0.04045, rgb / 12.92, ((np.maximum(rgb, 0.04045) + 0.055) / 1.055) ** 2.4)
-
-
-def encoded(light: NDArray[np.floating]) -> NDArray[np.floating]:
-    """sRGB-encoded values of linear light >= 0. Source: IEC 61966-2-1."""
-    return np.where(
-        light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055
-    )

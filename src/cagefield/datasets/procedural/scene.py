@@ -118,6 +118,16 @@ class ProceduralScene:
         ]
         return self._with((*self.parts, *copies))
 
+    def with_parts(self, parts: Sequence[Part]) -> ProceduralScene:
+        """Other parts alone, in the light of this scene, whose shadows and occlusion stay as modelled."""
+        return self._with(parts)
+
+    def lit_by(self, light: Light) -> ProceduralScene:
+        """This scene in another light."""
+        scene = self._lit_alike(replace(self))
+        scene.__dict__["light"] = light
+        return scene
+
     def carrying_light(self) -> ProceduralScene:
         """This scene with `relit` False: moved parts keep the colours they had as modelled."""
         return self._lit_alike(replace(self, relit=False))

@@ -1,0 +1,130 @@
+"""Renderings at the full size of test photos of a scene that was trained on reduced ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from cagefield.benchmarking.perceptual import Distance
+from cagefield.benchmarking.tables import Table, number
+from cagefield.cameras import Camera
+from cagefield.datasets import View
+from cagefield.errors import CagefieldError
+from cagefield.rendering.metrics import color_corrected, gradient_ratio
+from cagefield.training.evaluation import Evaluation, ViewFigures, composited, view_figures
+from cagefield.typing import Float32
+
+Show = Callable[[Camera], Float32]
+"""Picture [H,W,3] of a camera."""
+
+_COLUMNS = ("view", "size", "trained at", "PSNR", "corrected", "SSIM", "sharpness", "LPIPS")
+
+
+@dataclass(frozen=True)
+class FullSizeFigures:
+    """Figures of a rendering at a photo's full size.
+
+    sharpness  mean gradient of the color-corrected rendering over that of the photo; 1 is as sharp
+    lpips      of the color-corrected rendering; NaN where LPIPS is not installed
+    """
+
+    figures: ViewFigures
+    size: tuple[int, int]
+    trained_size: tuple[int, int]
+    sharpness: float
+    lpips: float = float("nan")
+
+
+def full_camera(trained: Camera, view: View) -> Camera:
+    """The camera of a scene's test view at the size of its photo; `view` is the photo, not shrunk.
+
+    The pose and the lens are the scene's; intrinsics in pixels grow by the whole factor by which the photo
+    was shrunk, whose left-over columns and rows come back.
+
+    Raises CagefieldError where no whole factor takes the photo's size to that of the scene's camera.
+    """
+    width, height = view.camera.width, view.camera.height
+    small = (trained.width, trained.height)
+    factors = range(1, width // trained.width + 1)
+    factor = next((f for f in factors if (width // f, height // f) == small), None)
+    if factor is None:
+        raise CagefieldError(
+            f"photo {view.name} is {width}x{height}, the scene's camera {trained.width}x{trained.height}: no "
+            "whole factor; give the data set that the scene was trained on"
+        )
+    return replace(
+        trained,
+        width=width,
+        height=height,
+        fx=factor * trained.fx,
+        fy=factor * trained.fy,
+        cx=factor * trained.cx,
+        cy=factor * trained.cy,
+    )
+
+
+def measure(
+    show: Show, cameras: Sequence[Camera], views: Sequence[View], distance: Distance | None = None
+) -> Iterator[FullSizeFigures]:
+    """Figures of each test view: its camera in the scene, and its photo at full size.
+
+    Raises CagefieldError where there are not as many cameras as photos, or none.
+    """
+    if not views or len(cameras) != len(views):
+        raise CagefieldError(
+            f"the scene has {len(cameras)} test cameras, the data set {len(views)} test photos; give the "
+            "data set and the --holdout that the scene was trained with"
+        )
+    for trained, view in zip(cameras, views, strict=True):
+        photo, valid = composited(view.load()), view.valid_pixels()
+        picture = np.clip(show(full_camera(trained, view)), 0, 1)
+        figures = view_figures(view.name, picture, photo, valid)
+        if figures is None:
+            continue
+        fitted = color_corrected(picture, photo, valid)
+        if valid is not None:
+            photo = np.where(valid[..., None], photo, fitted)
+        yield FullSizeFigures(
+            figures,
+            (photo.shape[1], photo.shape[0]),
+            (trained.width, trained.height),
+            gradient_ratio(fitted, photo, valid),
+            float("nan") if distance is None else distance(fitted[None], photo[None]),
+        )
+
+
+def table(scores: Sequence[FullSizeFigures], notes: Sequence[str] = ()) -> Table:
+    """Each view, their mean, and the worst of each column."""
+    total = Evaluation(tuple(score.figures for score in scores))
+    rows: list[tuple[str, ...]] = [
+        (
+            PurePosixPath(score.figures.name).name,
+            "x".join(map(str, score.size)),
+            "x".join(map(str, score.trained_size)),
+            number(score.figures.psnr),
+            number(score.figures.corrected),
+            number(score.figures.ssim, 4),
+            number(score.sharpness, 3),
+            number(score.lpips, 4),
+        )
+        for score in scores
+    ]
+    sharpness, perceptual = [s.sharpness for s in scores], [s.lpips for s in scores]
+    rows.append(
+        ("mean", "", "", number(total.psnr), number(total.corrected), number(total.ssim, 4),
+         number(float(np.mean(sharpness)), 3), number(float(np.mean(perceptual)), 4))
+    )  # fmt: skip
+    rows.append(
+        ("worst", "", "", *(number(min(getattr(v, name) for v in total.views), digits)
+                            for name, digits in (("psnr", 2), ("corrected", 2), ("ssim", 4))),
+         number(min(sharpness), 3), number(max(perceptual), 4))
+    )  # fmt: skip
+    explained = (
+        "Renderings at the full size of test photos against those. Corrected: after the affine map of each "
+        "color channel that is fitted to the photo. Sharpness: mean gradient of the corrected rendering over "
+        "that of the photo, whose noise counts as sharpness. Worst: of each column by itself.",
+    )
+    return Table("Renderings at full resolution", _COLUMNS, tuple(rows), (*explained, *notes))
