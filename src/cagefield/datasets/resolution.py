@@ -18,7 +18,7 @@ SIDE_PIXELS = 640
 
 MINUTES = 5.0
 
-SIDE_RANGE_PIXELS = (400.0, 1600.0)
+SIDE_RANGE_PIXELS = (600.0, 1600.0)
 """Least and largest side that is aimed at."""
 
 USUAL_PHOTOS = 80
