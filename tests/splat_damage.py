@@ -71,6 +71,16 @@ def ksplat_of(field: SplatField) -> bytes:
     return bytes(head) + bytes(section) + np.concatenate(rows, axis=1).tobytes()
 
 
+def old_spz(version: int, count: int) -> bytes:
+    """A file of SPZ 1 or 2 with harmonics of degree 1."""
+    chance = np.random.default_rng(0)
+    widths = (6 if version == 1 else 9, 1, 3, 3, 3, 9)
+    head = struct.pack("<4sIIBBBB", b"NGSP", version, count, 1, 12, 0, 0)
+    streams = [chance.integers(0, 60, count * width, np.uint8) for width in widths]
+    streams[1][:] = 200
+    return gzip.compress(head + b"".join(stream.tobytes() for stream in streams))
+
+
 def text_ply_of(binary: bytes) -> bytes:
     """A binary file of floats as text."""
     head, body = binary.split(b"end_header\n", 1)

@@ -476,10 +476,15 @@ def test_archives_that_cannot_be_unpacked_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("a.obj", "no format of splats that is known"), ("b.ply", "no such file; give a file of splats")],
+    [
+        ("a.obj", "an OBJ mesh: a mesh of triangles, no field; render photos of it and train"),
+        ("b.ply", "no such file; give a file of splats"),
+        ("c.dat", r"no format of splats that is known \(a text\); these are: .ply"),
+    ],
 )
 def test_other_files_are_refused(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / "a.obj").write_text("v 0 0 0")
+    (tmp_path / "c.dat").write_text("what is this")
     with pytest.raises(FieldError, match=message):
         read_splats(tmp_path / name)
     with pytest.raises(FieldError, match="no format of splats that is written"):

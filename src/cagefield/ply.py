@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -46,13 +46,14 @@ class Ply:
 class PlyTable:
     """An element of an open file: `rows(first, last)` reads some of its rows, column by column.
 
-    `end` is the first byte of the file after it.
+    `end` is the first byte of the file after it; `types` are the columns' by name, as NumPy names them.
     """
 
     count: int
     columns: tuple[str, ...]
     rows: Callable[[int, int], Columns]
     end: int = 0
+    types: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -95,8 +96,19 @@ def open_ply(path: str | Path) -> tuple[tuple[str, ...], dict[str, PlyTable]]:
             row = np.dtype([(name, _ORDERS[kind] + code) for name, code in element.properties])
             names = tuple(name for name, _ in element.properties)
             reader = _text(path, file, element) if kind == "ascii" else _binary(path, file, element, row)
-            tables[element.name] = PlyTable(element.count, names, reader, file.tell())
+            types = dict(element.properties)
+            tables[element.name] = PlyTable(element.count, names, reader, file.tell(), types)
     return tuple(comments), tables
+
+
+def ply_elements(path: str | Path) -> dict[str, int]:
+    """Numbers of rows of all elements that a file's header declares, those with lists among them.
+
+    Raises:
+        FieldError: as `read_ply`.
+    """
+    with open_regular(path) as file:
+        return {element.name: element.count for element in _header(Path(path), file)[2]}
 
 
 def _header(path: Path, file: BinaryIO) -> tuple[str, list[str], list[_Element]]:

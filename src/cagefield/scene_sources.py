@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from cagefield.fields.voxel import VoxelField
     from cagefield.formats.splat_import import ImportedSplats
 
-META = "meta.json"
-"""The file that a folder of splats, an unpacked .sog, is known by."""
+_SOG = ("meta.json", "lod-meta.json")
+"""The files that a folder of splats, an unpacked .sog or a streamed one, is known by."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class SceneSources:
             )
         if not path.exists():
             raise EditError(f"nothing is at {path}; {_CURE}")
-        if path.is_dir() and not (is_scene(path) or (path / META).is_file()):
+        if path.is_dir() and not (is_scene(path) or any((path / name).is_file() for name in _SOG)):
             raise EditError(f"{path} is a folder without a scene; {_CURE}")
         return path
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from reader_seeds import Reader
 
-from cagefield.formats.splat_files import read_splats
+from cagefield.formats.splat_files import read_splats, write_splats
 from cagefield.formats.splat_import import import_splats
-from splat_damage import sample_file
+from gltf_assets import Asset
+from splat_damage import old_spz, sample_file
 from splat_scenes import random_splats
 
 
@@ -30,19 +33,11 @@ def _splat_reader(ending: str, kind: str, count: int) -> Reader:
 
 
 def _make_old_spz(version: int, count: int) -> Callable[[Path], None]:
-    def make(folder: Path) -> None:
-        import gzip
-        import struct
+    return lambda folder: _write(folder / "a.spz", old_spz(version, count))
 
-        chance = np.random.default_rng(0)
-        widths = (6 if version == 1 else 9, 1, 3, 3, 3, 9)
-        head = struct.pack("<4sIIBBBB", b"NGSP", version, count, 1, 12, 0, 0)
-        streams = [chance.integers(0, 60, count * width, np.uint8) for width in widths]
-        streams[1][:] = 200
-        body = b"".join(stream.tobytes() for stream in streams)
-        (folder / "a.spz").write_bytes(gzip.compress(head + body))
 
-    return make
+def _write(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
 
 
 def _make_sog_folder(count: int, folder: Path) -> None:
@@ -51,6 +46,67 @@ def _make_sog_folder(count: int, folder: Path) -> None:
     content = sample_file(random_splats(count), folder, ".sog")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         archive.extractall(folder / "sog")
+
+
+def _scene_of(count: int) -> Asset:
+    """Two primitives below turned and stretched nodes, instances, sparse values."""
+    asset = Asset()
+    first, second = asset.splats(random_splats(count)), asset.splats(random_splats(count, degree=0))
+    child = asset.node(mesh=asset.mesh(first, second), scale=[1.0, 2.0, -1.0])
+    root = asset.node(children=[child], rotation=[0.0, 0.6, 0.0, 0.8], translation=[0.0, 1.0, 2.0])
+    shifts = {"TRANSLATION": asset.accessor(np.eye(3))}
+    shown = asset.node(mesh=0, matrix=[float(n % 5 == 0) for n in range(16)])
+    asset.json["nodes"][shown]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": shifts}}
+    asset.scene(root, shown)
+    opacity = asset.json["accessors"][first["attributes"]["KHR_gaussian_splatting:OPACITY"]]
+    indices = {"bufferView": asset.view(np.array([1, 7], "<u2").tobytes()), "componentType": 5123}
+    values = {"bufferView": asset.view(np.array([0.25, 0.75], "<f4").tobytes())}
+    opacity["sparse"] = {"count": 2, "indices": indices, "values": values}
+    return asset
+
+
+def _make_glb_scene(count: int, folder: Path) -> None:
+    _scene_of(count).write(folder / "a.glb")
+
+
+def _make_gltf_scene(count: int, folder: Path) -> None:
+    _scene_of(count).write(folder / "a.gltf", "a.bin")
+
+
+def _make_gltf_spz(count: int, folder: Path) -> None:
+    asset = Asset()
+    content = asset.view(sample_file(random_splats(count), folder, ".spz"))
+    said = {"KHR_spz_gaussian_splats_compression": {"bufferView": content}}
+    primitive = {"mode": 0, "attributes": {"POSITION": 0}, "extensions": said}
+    asset.scene(asset.node(mesh=asset.mesh(primitive)))
+    asset.write(folder / "a.gltf")
+
+
+def _make_gltf_draft(count: int, folder: Path) -> None:
+    field, asset = random_splats(count, degree=0), Asset()
+    attributes = {
+        "POSITION": asset.accessor(field.means),
+        "COLOR_0": asset.accessor(np.full((count, 4), 200), "u1", normalized=True),
+        "_SCALE": asset.accessor(field.log_scales),
+        "_ROTATION": asset.accessor(field.quaternions[:, [1, 2, 3, 0]]),
+    }
+    asset.scene(asset.node(mesh=asset.mesh({"mode": 0, "attributes": attributes})))
+    asset.write(folder / "a.glb")
+
+
+def _make_far_ply(count: int, folder: Path) -> None:
+    write_splats(replace(random_splats(count), offset=(5e5, 5e6, 300.0)), folder / "a.ply")
+
+
+def _make_streamed_sog(count: int, folder: Path) -> None:
+    _make_sog_folder(count, folder)
+    (folder / "sog").rename(folder / "0_0")
+    (folder / "sog").mkdir()
+    (folder / "0_0").rename(folder / "sog" / "0_0")
+    rows = [{"file": 0, "offset": at, "count": count // 2} for at in (0, count // 2)]
+    tree = {"children": [{"lods": {"0": part, "1": {**part, "count": 0}}} for part in rows]}
+    meta = {"lodLevels": 2, "environment": None, "filenames": ["0_0/meta.json"], "tree": tree}
+    (folder / "sog" / "lod-meta.json").write_text(json.dumps(meta))
 
 
 def _make_old_checkpoint(count: int, folder: Path) -> None:
@@ -80,6 +136,18 @@ def splat_readers(count: int = 120, old_spz: int = 100) -> dict[str, Reader]:
             {"sog/meta.json": "json", "sog/means_l.webp": "bytes", "sog/shN_labels.webp": "bytes"},
         ),
         "glb": _splat_reader(".glb", "glb", count),
+        "glb scene": Reader(partial(_make_glb_scene, count), partial(_read, "a.glb"), {"a.glb": "glb"}),
+        "gltf scene": Reader(
+            partial(_make_gltf_scene, count), partial(_read, "a.gltf"), {"a.gltf": "json", "a.bin": "bytes"}
+        ),
+        "gltf spz": Reader(partial(_make_gltf_spz, count), partial(_read, "a.gltf"), {"a.gltf": "json"}),
+        "gltf draft": Reader(partial(_make_gltf_draft, count), partial(_read, "a.glb"), {"a.glb": "glb"}),
+        "far ply": Reader(partial(_make_far_ply, count), partial(_read, "a.ply"), {"a.ply": "ply"}),
+        "streamed sog": Reader(
+            partial(_make_streamed_sog, count),
+            lambda folder: read_splats(folder / "sog"),
+            {"sog/lod-meta.json": "json", "sog/0_0/meta.json": "json", "sog/0_0/means_l.webp": "bytes"},
+        ),
         "splatfacto .ckpt, old": Reader(
             partial(_make_old_checkpoint, count), partial(_read, "a.ckpt"), {"a.ckpt": "bytes"}
         ),

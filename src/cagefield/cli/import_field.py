@@ -21,7 +21,7 @@ Unbounded = Literal["auto", "on", "off"]
 
 @dataclass(frozen=True)
 class ImportField:
-    """Read a splat file (.ply, .spz, .sog, .splat, .ksplat, .glb) or a checkpoint (.tar, .ckpt): a scene.
+    """Read a splat file (.ply, .spz, .sog, .splat, .ksplat, .glb, .gltf) or a checkpoint: a scene.
 
     Splats stay splats and keep the file's coordinates, in the axes of PLY; a NeRF is baked into voxels.
     """
@@ -51,7 +51,7 @@ class ImportField:
 
     def run(self) -> None:
         """Reads, bakes where it must, and writes; prints what it found."""
-        from cagefield.formats.splat_files import holds_splats
+        from cagefield.formats.splat_opening import holds_splats
         from cagefield.scene_files import check_destination
 
         check_destination(self.out, self.overwrite)
@@ -84,6 +84,8 @@ class ImportField:
         trained = ", discs" if splats.discs else ", trained antialiased" if splats.antialiased else ""
         count = sum(len(group) for group in imported.cameras.values())
         cameras = f"{count} cameras" + ("" if self.data else f" all around, {self.up}")
+        if any(splats.offset):
+            around += ", without the offset " + ", ".join(f"{value:.15g}" for value in splats.offset)
         line = f"{len(splats)} splats, SH degree {splats.sh_degree}{trained}; box {size}{around}; {cameras}"
         return Scene(splats, cameras=imported.cameras, background=imported.background), line
 

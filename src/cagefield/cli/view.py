@@ -20,7 +20,7 @@ class View:
     """Edit a scene by hand, in the browser: set cages, move them, and the field follows."""
 
     scene: tyro.conf.Positional[Path]
-    """Scene folder, or a file of splats: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb."""
+    """Scene folder, or a file of splats: .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb, .gltf."""
     port: int = 8741
     """Port to listen on; 0 takes any that is free."""
     host: str = "localhost"

@@ -4,8 +4,11 @@ Matches are verified without the given poses. Points are triangulated with the g
 bound of the reprojection error; then bundle adjustments of poses, intrinsics and points, each with a tighter
 bound, and a triangulation anew between them.
 
-Photos of one size share their intrinsics, unless the given ones group them otherwise (`camera_groups`). A
-robust similarity takes the result back to the given world (`pose_alignment`).
+Photos of one size share their intrinsics, unless the given ones group them otherwise (`camera_groups`). The
+photos are resampled to square pixels and have one focal length: cameras that are all held level do not
+tell a wrong aspect of the pixels from a stretched scene. Tangential distortion, where the given lens has it,
+is fitted last, with the focal length held. A robust similarity takes the result back to the given world
+(`pose_alignment`).
 
 Source: Schönberger and Frahm, "Structure-from-Motion Revisited" (2016); Cauchy's loss as in Triggs et al.,
 "Bundle Adjustment, A Modern Synthesis" (2000).
@@ -37,8 +40,8 @@ FloatArray = npt.NDArray[np.float64]
 
 MAX_FEATURES = 4096
 
-MIN_OPENCV_PHOTOS = 12
-"""Photos that share a camera, from which on its lens has tangential distortion and two radial terms."""
+MIN_RADIAL_PHOTOS = 12
+"""Photos that share a camera, from which on its lens has a second radial term."""
 
 FIRST_BOUNDS_PIXELS = (12.0, 80.0)
 """Least and largest bound of the reprojection error in the first round, pixels of the shrunk photos."""
@@ -84,8 +87,12 @@ class PoseSolver:
         """Finds features of all photos, and matches of neighbors in pose and in order."""
         pycolmap = features.engine()
         self._views, self._folder, self._seed = views, folder, seed
-        self._shrunk, self._names = triangulation.shrink_views(views, folder, on_progress)
+        self._shrunk, self._names = triangulation.shrink_views(views, folder, on_progress, square=True)
         self._numbers, self._cameras = shared_cameras(pycolmap, [one.camera for one in self._shrunk])
+        self._tangential = [
+            bool(np.any(np.median([(*c.distortion, 0.0, 0.0, 0.0, 0.0)[2:4] for c in group], axis=0)))
+            for group in _groups([one.camera for one in self._shrunk], self._numbers)
+        ]
         self._database = folder / "database.db"
         photos = [Photo(n, c) for n, c in zip(self._names, self._numbers, strict=True)]
         features.create_database(self._database, self._cameras, photos)
@@ -114,7 +121,9 @@ class PoseSolver:
             )  # fmt: skip
             if not model.num_points3D():
                 return None
-            _adjust(pycolmap, model, float(bound))
+            if number == ROUNDS - 1:
+                _add_tangential(pycolmap, model, self._tangential)
+            _adjust(pycolmap, model, float(bound), refine_focal=number < ROUNDS - 1)
             note = f"bundle adjustment {number + 1} of {ROUNDS}"
             features.share(on_progress, 0.0, 1.0)((number + 1) / ROUNDS, note)
         return self._collected(model, Similarity(scale, np.eye(3), center))
@@ -174,14 +183,13 @@ def shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int],
     """(camera number of each photo, COLMAP cameras with the groups' median intrinsics)."""
     numbers = camera_groups(cameras)
     shared = []
-    for number in range(max(numbers) + 1):
-        group = [camera for camera, n in zip(cameras, numbers, strict=True) if n == number]
+    for group in _groups(cameras, numbers):
         middle = np.median([[c.fx, c.fy, c.cx, c.cy] for c in group], axis=0)
         lens = np.median([(*c.distortion, 0.0, 0.0, 0.0, 0.0)[:4] for c in group], axis=0)
         if group[0].model == "opencv_fisheye":
             model, params = "OPENCV_FISHEYE", [*middle, *lens]
-        elif len(group) >= MIN_OPENCV_PHOTOS or np.any(lens[1:]):
-            model, params = "OPENCV", [*middle, *lens]
+        elif len(group) >= MIN_RADIAL_PHOTOS or lens[1]:
+            model, params = "RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0], lens[1]]
         else:
             model, params = "SIMPLE_RADIAL", [middle[:2].mean(), middle[2], middle[3], lens[0]]
         made = pycolmap.Camera(model=model, width=group[0].width, height=group[0].height, params=params)
@@ -190,9 +198,26 @@ def shared_cameras(pycolmap: Any, cameras: Sequence[Camera]) -> tuple[list[int],
     return numbers, shared
 
 
-def _adjust(pycolmap: Any, model: Any, bound: float) -> None:
+def _groups(cameras: Sequence[Camera], numbers: Sequence[int]) -> list[list[Camera]]:
+    """Cameras by the number of their shared camera."""
+    return [
+        [camera for camera, n in zip(cameras, numbers, strict=True) if n == number]
+        for number in range(max(numbers) + 1)
+    ]
+
+
+def _add_tangential(pycolmap: Any, model: Any, wanted: Sequence[bool]) -> None:
+    """Turns radial cameras of which tangential distortion is wanted into OPENCV ones without any yet."""
+    for camera_id, camera in model.cameras.items():
+        if wanted[camera_id - 1] and camera.model.name in ("RADIAL", "SIMPLE_RADIAL"):
+            focal, cx, cy, k1, k2 = (*camera.params, 0.0)[:5]
+            camera.model = pycolmap.CameraModelId.OPENCV
+            camera.params = [focal, focal, cx, cy, k1, k2, 0.0, 0.0]
+
+
+def _adjust(pycolmap: Any, model: Any, bound: float, refine_focal: bool) -> None:
     """Bundle adjustment of everything, after which observations with more than half the bound are removed."""
-    options = pycolmap.BundleAdjustmentOptions(print_summary=False)
+    options = pycolmap.BundleAdjustmentOptions(print_summary=False, refine_focal_length=refine_focal)
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = max(1.0, 0.1 * bound)
     options.ceres.solver_options.max_num_iterations = 50

@@ -136,15 +136,18 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
 
 
 def shrink_views(
-    views: Sequence[View], folder: Path, on_progress: OnProgress | None
+    views: Sequence[View], folder: Path, on_progress: OnProgress | None, square: bool = False
 ) -> tuple[list[ShrunkPhoto], list[str]]:
-    """Photos shrunk into `folder`/colmap, masks in `folder`/masks, and the names of their files."""
+    """Photos shrunk into `folder`/colmap, masks in `folder`/masks, and the names of their files.
+
+    With `square` their height is changed so that both focal lengths are equal.
+    """
     (folder / "colmap").mkdir()
     (folder / "masks").mkdir()
     names = [f"{index:06}.png" for index in range(len(views))]
     shrunk = []
     for index, (view, name) in enumerate(zip(views, names, strict=True)):
-        shrunk.append(_shrink(view, folder, name))
+        shrunk.append(_shrink(view, folder, name, square))
         features.share(on_progress, 0.0, 0.05)((index + 1) / len(views), "photos")
     return shrunk, names
 
@@ -165,13 +168,14 @@ def extract_features(
     )
 
 
-def _shrink(view: View, folder: Path, name: str) -> ShrunkPhoto:
+def _shrink(view: View, folder: Path, name: str, square: bool) -> ShrunkPhoto:
     """The photo, shrunk, in `folder`/colmap; its mask in `folder`/masks where it is a cut-out or masked."""
     whole = view.whole()
     pixels, valid = whole.load(), whole.valid_pixels()
     height, width = pixels.shape[:2]
     scale = min(1.0, LONGER_SIDE / max(width, height))
-    size = max(1, round(width * scale)), max(1, round(height * scale))
+    aspect = whole.camera.fx / whole.camera.fy if square else 1.0
+    size = max(1, round(width * scale)), max(1, round(height * scale * aspect))
     used = np.ones((height, width), bool) if valid is None else valid
     if pixels.shape[2] == 4:
         used = used & (pixels[..., 3] > 127)

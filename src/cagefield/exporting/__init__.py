@@ -119,6 +119,7 @@ def upright(splats: SplatField, up: ArrayLike) -> SplatField:
         quaternions=splats.quaternions @ product.T.astype(np.float32),
         sh=turned_sh(splats.sh, turn),
         bounds=np.stack([corners.min(axis=0), corners.max(axis=0)]),
+        offset=tuple((turn @ np.array(splats.offset)).tolist()),
     )
 
 

@@ -12,15 +12,17 @@ Source: Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Render
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cagefield import json_text
 from cagefield.errors import FieldError
 from cagefield.fields.files import read_tensors, write_tensors
 from cagefield.sh import MAX_DEGREE
@@ -31,6 +33,9 @@ if TYPE_CHECKING:
 
 
 FORMAT_VERSION = "1"
+
+Offset: TypeAlias = tuple[float, float, float]
+NO_OFFSET: Offset = (0.0, 0.0, 0.0)
 
 BLOCK = 1 << 16
 """Splats that are checked at a time."""
@@ -54,6 +59,8 @@ class SplatField:
             rays meet it (`cagefield.rendering.splat_disc_reference`).
         bounds: [2,3] float64: the box of interest; left out, the box of the middle 98 % of the means.
         unbounded: True where splats beyond `bounds` are the background.
+        offset: coordinates of the file that the splats are from, less those of the field: what float32 could
+            not hold of them. Exports add it.
 
     Raises:
         FieldError: shapes that do not fit, NaN or infinity, opacities outside [0, 1].
@@ -68,6 +75,7 @@ class SplatField:
     bounds: NDArray[np.float64] = None  # type: ignore[assignment]
     unbounded: bool = False
     discs: bool = False
+    offset: Offset = NO_OFFSET
 
     def __post_init__(self) -> None:
         fix = object.__setattr__
@@ -111,6 +119,10 @@ class SplatField:
         if bounds.shape != (2, 3) or not np.isfinite(bounds).all() or not (bounds[0] < bounds[1]).all():
             raise FieldError(f"bounds must be 2 finite corners [2,3], lower < upper, got {bounds.tolist()}")
         fix(self, "bounds", _frozen(bounds, np.float64))
+        offset = tuple(float(value) for value in self.offset)
+        if len(offset) != 3 or not np.isfinite(offset).all():
+            raise FieldError(f"offset must be 3 finite numbers, got {list(offset)}")
+        fix(self, "offset", offset)
 
     def __len__(self) -> int:
         return len(self.means)
@@ -184,6 +196,7 @@ class SplatField:
             self.bounds,
             self.unbounded,
             self.discs,
+            self.offset,
         )
 
     def save(self, path: str | Path) -> None:
@@ -196,6 +209,8 @@ class SplatField:
             "unbounded": str(int(self.unbounded)),
             "discs": str(int(self.discs)),
         }
+        if any(self.offset):
+            header["offset"] = json.dumps(self.offset)
         write_tensors(path, tensors, header)
 
     @classmethod
@@ -217,9 +232,12 @@ class SplatField:
                 bounds=tensors["bounds"],
                 unbounded=metadata.get("unbounded") == "1",
                 discs=metadata.get("discs") == "1",
+                offset=json_text.loads(metadata.get("offset", "[0, 0, 0]")),
             )
-        except FieldError as error:
+        except (FieldError, TypeError) as error:
             raise FieldError(f"{path}: {error}") from error
+        except ValueError:
+            raise FieldError(f"{path}: its offset is {metadata['offset']!r:.60}; write it again") from None
 
 
 _TENSORS = ("means", "log_scales", "quaternions", "opacities", "sh")

@@ -22,7 +22,15 @@ from cagefield import sh as spherical_harmonics
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
-from cagefield.formats.splat_ply import degree_of, harmonics_of, mode_comment, names_of, said_of, stack_of
+from cagefield.formats.splat_ply import (
+    degree_of,
+    harmonics_of,
+    mode_comment,
+    names_of,
+    said_of,
+    stack_of,
+    warn_of_ignored,
+)
 from cagefield.formats.splat_table import (
     BATCH,
     LEAST_LOG_SCALE,
@@ -64,6 +72,7 @@ def open_compressed_ply(path: Path) -> SplatSource:
     if harmonics.columns and harmonics.count != vertex.count:
         raise FieldError(f"{path}: its harmonics are not those of {vertex.count} splats; export it again")
     degree = degree_of(path, harmonics.columns)
+    warn_of_ignored(path, vertex, _PACKED, ("chunk", "sh"))
 
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, vertex.count, BATCH):

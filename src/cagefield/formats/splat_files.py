@@ -1,16 +1,4 @@
-"""Splat files by their names: one way to read, write and convert all of them.
-
-| ending | format | read | written |
-| --- | --- | --- | --- |
-| .ply | 3DGS, and what follows it | yes | yes |
-| .compressed.ply | PlayCanvas | yes | yes |
-| .spz | Niantic, versions 1 to 4 | yes | 3, or 4 |
-| .sog, a folder with meta.json | PlayCanvas, versions 1 and 2 | yes | 2, as one file |
-| .splat | antimatter15 | yes | yes |
-| .ksplat | mkkellogg | yes | no |
-| .glb | KHR_gaussian_splatting | yes | yes |
-| .ckpt | nerfstudio's splatfacto | yes | no |
-"""
+"""Splats read from files, written to them and converted: one way for all formats of `splat_opening`."""
 
 from __future__ import annotations
 
@@ -27,17 +15,16 @@ import numpy as np
 from cagefield import sh as spherical_harmonics
 from cagefield.devices import lacking_memory
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_axes import PLY, Axes, with_axes
-from cagefield.formats.splat_compressed_ply import open_compressed_ply, write_compressed_ply
-from cagefield.formats.splat_gltf import GLTF_AXES, open_splat_gltf, write_splat_gltf
-from cagefield.formats.splat_ksplat import open_ksplat
-from cagefield.formats.splat_nerfstudio import is_splatfacto, open_splatfacto
-from cagefield.formats.splat_ply import open_splat_ply, write_splat_ply
-from cagefield.formats.splat_rows import open_splat_rows, write_splat_rows
-from cagefield.formats.splat_sog import META, open_sog
+from cagefield.fields.splat import NO_OFFSET, Offset, SplatField
+from cagefield.formats.splat_axes import PLY, Axes, signs, with_axes
+from cagefield.formats.splat_compressed_ply import write_compressed_ply
+from cagefield.formats.splat_gltf import GLTF_AXES
+from cagefield.formats.splat_gltf_writer import write_splat_gltf
+from cagefield.formats.splat_opening import ending_of, open_splats
+from cagefield.formats.splat_ply import write_splat_ply
+from cagefield.formats.splat_rows import write_splat_rows
 from cagefield.formats.splat_sog_writer import write_sog
-from cagefield.formats.splat_spz import SPZ_AXES, open_spz
+from cagefield.formats.splat_spz import SPZ_AXES
 from cagefield.formats.splat_spz_writer import Version as SpzVersion
 from cagefield.formats.splat_spz_writer import write_spz
 from cagefield.formats.splat_table import (
@@ -50,20 +37,9 @@ from cagefield.formats.splat_table import (
     cleaned,
     spooled,
 )
-from cagefield.ply import open_ply
-from cagefield.regular_files import check_regular
 
-READABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".ckpt", META)
 WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
 
-_OPEN: dict[str, Callable[[Path], SplatSource]] = {
-    ".spz": open_spz,
-    ".sog": open_sog,
-    ".splat": open_splat_rows,
-    ".ksplat": open_ksplat,
-    ".glb": open_splat_gltf,
-    ".ckpt": open_splatfacto,
-}
 _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] = {
     ".ply": (write_splat_ply, PLY),
     ".compressed.ply": (write_compressed_ply, PLY),
@@ -73,16 +49,14 @@ _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] =
     ".glb": (write_splat_gltf, GLTF_AXES),
 }
 
+_HOLD_OFFSET = (".ply", ".glb")
+"""Formats whose coordinates are double, or have a translation that is."""
+
+MAX_ROUNDING = 0.01
+"""Rounding of coordinates to float32, in sizes of the splats, that is let be."""
+
 _MOST_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
 """Degree of the harmonics that a format can hold, where it is less than what a field can."""
-
-
-def ending_of(path: Path) -> str:
-    """The ending that says a file's format, such as ".compressed.ply"; "" where it is none of them."""
-    name = path.name.lower()
-    if path.is_dir() or name == META:
-        return META
-    return max((ending for ending in READABLE if name.endswith(ending)), key=len, default="")
 
 
 def read_splats(
@@ -123,7 +97,8 @@ def read_opened(
     found = _with_visible(source)  # before memory is taken for all of them
     arrays = [np.empty((count, *shape), np.float32) for shape in _shapes(source)]
     done = 0
-    for batch in _batches(source, found, axes):
+    offset, shifted = _near_origin(source, _batches(source, found, axes))
+    for batch in shifted:
         parts = (batch.means, batch.log_scales, batch.quaternions, batch.opacities, batch.sh)
         for array, part in zip(arrays, parts, strict=True):
             array[done : done + len(batch)] = part
@@ -133,7 +108,14 @@ def read_opened(
         array.setflags(write=False)  # a field copies what may be written to
     means, log_scales, quaternions, opacities, sh = (array[:done] for array in arrays)
     return SplatField(
-        means, log_scales, quaternions, opacities, sh, antialiased=source.antialiased, discs=source.discs
+        means,
+        log_scales,
+        quaternions,
+        opacities,
+        sh,
+        antialiased=source.antialiased,
+        discs=source.discs,
+        offset=offset,
     )
 
 
@@ -175,41 +157,10 @@ def convert_splats(
     writer_of(Path(target), spz_version)
     found = open_splats(Path(source))
     degree = min(found.sh_degree, spherical_harmonics.MAX_DEGREE)
-    with spooled(
-        found, _batches(found, found.batches(), axes), degree, lambda share: on_progress(0.4 * share)
-    ) as table:
+    offset, batches = _near_origin(found, _batches(found, found.batches(), axes))
+    with spooled(found, batches, degree, lambda share: on_progress(0.4 * share), offset) as table:
         rest: OnProgress = lambda share: on_progress(0.4 + 0.6 * share)  # noqa: E731
         return table.count, _write(table, Path(target), target_axes, rest, spz_version)
-
-
-def open_splats(path: Path) -> SplatSource:
-    """The open file of splats; its values are read when its batches are.
-
-    Raises:
-        FieldError: no such file, a format that is not known, a file that is damaged.
-    """
-    if not path.exists():
-        raise FieldError(f"{path}: no such file; give a file of splats ({', '.join(READABLE[:-1])})")
-    ending = ending_of(path)
-    if ending == META:
-        return open_sog(path)
-    try:
-        check_regular(path)
-    except OSError as error:
-        raise FieldError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if ending.endswith(".ply"):
-        _, tables = open_ply(path)
-        packed = "vertex" in tables and "packed_position" in tables["vertex"].columns
-        return (open_compressed_ply if packed else open_splat_ply)(path)
-    if ending not in _OPEN:
-        raise FieldError(f"{path}: no format of splats that is known; these are: {', '.join(READABLE)}")
-    return _OPEN[ending](path)
-
-
-def holds_splats(path: Path) -> bool:
-    """Whether a file is one of splats, by its ending; a checkpoint, by what it holds."""
-    ending = ending_of(path)
-    return is_splatfacto(path) if ending == ".ckpt" else bool(ending)
 
 
 def writer_of(
@@ -263,6 +214,36 @@ def _batches(source: SplatSource, batches: Iterator[SplatBatch], axes: Axes | No
         yield with_axes(cut, axes or source.axes, PLY)
 
 
+def _near_origin(source: SplatSource, batches: Iterator[SplatBatch]) -> tuple[Offset, Iterator[SplatBatch]]:
+    """(offset, the splats less it): none, unless float32 would round coordinates that are doubles too much.
+
+    Too much is MAX_ROUNDING of the size of most splats, in the first batch.
+    """
+    first = next(batches, None)
+    if first is None or not source.is_double or not len(first):
+        return NO_OFFSET, itertools.chain(() if first is None else (first,), batches)
+    means = first.means.astype(np.float64)
+    rounding = np.quantile(np.abs(means - means.astype(np.float32)).max(axis=1), 0.99)
+    size = np.exp(np.median(np.median(first.log_scales, axis=1)))
+    middle = np.round(np.median(means, axis=0)) + 0.0
+    if rounding <= MAX_ROUNDING * size or not middle.any():
+        return NO_OFFSET, itertools.chain((first,), batches)
+    x, y, z = middle.tolist()
+    warnings.warn(
+        f"{source.path}: its coordinates are far from the origin; {_shown((x, y, z))} is taken off, kept, "
+        "and added where a .ply or .glb is exported",
+        stacklevel=3,
+    )
+    shifted = (
+        dataclasses.replace(batch, means=batch.means - middle) for batch in itertools.chain((first,), batches)
+    )
+    return (x, y, z), shifted
+
+
+def _shown(offset: Offset) -> str:
+    return "(" + ", ".join(f"{value:.15g}" for value in offset) + ")"
+
+
 def _write(
     table: SplatTable,
     path: Path,
@@ -281,6 +262,12 @@ def _write(
     if table.discs and not ending_of(path).endswith(".ply"):
         warnings.warn(
             f"{path}: {ending_of(path)} cannot say that splats are discs (2DGS): they are written flat",
+            stacklevel=3,
+        )
+    if any(table.offset) and ending_of(path) not in _HOLD_OFFSET:
+        warnings.warn(
+            f"{path}: {ending_of(path)} holds coordinates as float32: they are without the offset "
+            f"{_shown(table.offset)}, in PLY's axes; .ply and .glb have it",
             stacklevel=3,
         )
     write(path, _Written(table, axes or own, degree), on_progress)
@@ -306,6 +293,11 @@ class _Written:
     @property
     def discs(self) -> bool:
         return self.table.discs
+
+    @property
+    def offset(self) -> Offset:
+        x, y, z = (signs(PLY, self.axes) * np.array(self.table.offset) + 0.0).tolist()
+        return x, y, z
 
     def batches(self) -> Iterator[SplatBatch]:
         return (self._of(batch) for batch in self.table.batches())

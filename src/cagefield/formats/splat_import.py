@@ -81,7 +81,7 @@ def import_splats(
     else:
         bounds = _whole(means)
     field = replace(field, bounds=bounds, unbounded=unbounded)
-    cameras = _rings(field, up) if dataset is None else _cameras(dataset)
+    cameras = _rings(field, up) if dataset is None else _cameras(dataset, np.array(field.offset))
     return ImportedSplats(field, cameras, (0.0,) * 3 if unbounded else (1.0,) * 3)
 
 
@@ -123,8 +123,10 @@ def _rings(field: SplatField, up: Up) -> Cameras:
     return {"train": tuple(camera for part in RINGS for camera in ring(*part)), "test": ring(*TEST_RING)}
 
 
-def _cameras(dataset: Dataset) -> Cameras:
+def _cameras(dataset: Dataset, offset: Array) -> Cameras:
+    """The cameras of a data set in the coordinates of its reconstruction less the field's offset [3]."""
     back = np.linalg.inv(dataset.source_to_world)
+    back[:3] -= offset[:, None] * back[3]
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     return {
         name: tuple(view.camera.with_c2w(back @ view.camera.c2w) for view in views)

@@ -2,15 +2,16 @@
 
 An element "vertex" with the columns x y z, f_dc_0..2, f_rest_0..(3K-1) (all of red, then green, then blue, K
 = 0, 3, 8, 15 or 24), opacity (logit), scale_0..2 (natural logarithms), rot_0..3 (w x y z, of any length), in
-any order, beside others. A file of 2DGS has no scale_2: its splats are flat. red, green, blue (0 to 255)
-stand in for f_dc. A comment says where the splats were trained with the antialiased filter: "SplatRenderMode:
-mip" (Brush) or "antialiased 1" (Postshot).
+any order, beside others. A file of 2DGS has no scale_2: its splats are flat. red, green, blue stand in for
+f_dc: whole numbers up to the largest of their type, or floats from 0 to 1 or 255. A comment says where the
+splats were trained with the antialiased filter: "SplatRenderMode: mip" (Brush) or "antialiased 1" (Postshot).
 
 Source: graphdeco-inria/gaussian-splatting, scene/gaussian_model.py; the PlayCanvas manual, "PLY".
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
-from cagefield.ply import Columns, PlyTable, open_ply
+from cagefield.ply import Columns, PlyTable, open_ply, ply_elements
 from cagefield.typing import AnyArray
 
 FLAT = 1e-3
@@ -29,6 +30,14 @@ FLAT = 1e-3
 
 REST = {3 * ((degree + 1) ** 2 - 1): degree for degree in range(5)}
 """Degree of the harmonics by the number of columns f_rest_*."""
+
+_NORMALS = ("nx", "ny", "nz")
+"""Columns of 3DGS' own files, 0 throughout: nothing is lost with them."""
+
+MESH = "a mesh of triangles, no field; render photos of it and train on them (`cagefield train`)"
+POINT_CLOUD_CURE = (
+    "it serves `cagefield train` as the sparse points of a capture: its ply_file_path in transforms.json"
+)
 
 _SHAPE = ("x", "y", "z", "opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3")
 
@@ -44,37 +53,42 @@ def open_splat_ply(path: Path) -> SplatSource:
     dc = names_of("f_dc_", 3) if "f_dc_0" in vertex.columns else ("red", "green", "blue")
     missing = [name for name in (*_SHAPE, *dc) if name not in vertex.columns]
     if missing:
-        raise FieldError(
-            f"{path}: no file of splats, its vertices lack {', '.join(missing)}; a mesh or a point cloud "
-            "cannot be imported"
-        )
+        raise FieldError(f"{path}: {_without_splats(path, vertex, missing)}")
     degree = degree_of(path, vertex.columns)
+    whole = _largest_color(vertex, dc) if dc[0] == "red" else 0.0
+    warn_of_ignored(
+        path, vertex, {*_SHAPE, "scale_2", *dc, *names_of("f_rest_", 3 * ((degree + 1) ** 2 - 1))}
+    )
 
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, vertex.count, BATCH):
-            yield _batch(vertex.rows(first, first + BATCH), dc, degree)
+            yield _batch(vertex.rows(first, first + BATCH), dc, whole, degree)
 
     antialiased, discs = said_of(comments)
     if vertex.count and "scale_2" not in vertex.columns:
         antialiased, discs = False, True
-    return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs, end=vertex.end)
+    is_double = any(vertex.types[axis] in ("f8", "i4", "u4") for axis in "xyz")
+    end = vertex.end
+    return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs, end, is_double)
 
 
 def write_splat_ply(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
-    """Writes the splats in 3DGS' layout, complete or not at all."""
+    """Writes the splats in 3DGS' layout, complete or not at all; coordinates with an offset as doubles."""
     above = (table.sh_degree + 1) ** 2 - 1
     names = [*"xyz", "nx", "ny", "nz", *names_of("f_dc_", 3), *names_of("f_rest_", 3 * above), "opacity"]
     names += [*names_of("scale_", 3), *names_of("rot_", 4)]
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
     header += mode_comment(table)
-    header += [f"element vertex {table.count}", *(f"property float {name}" for name in names), "end_header"]
+    offset, place = np.array(table.offset), "double" if any(table.offset) else "float"
+    header += [f"element vertex {table.count}", *(f"property {place} {name}" for name in names[:3])]
+    header += [*(f"property float {name}" for name in names[3:]), "end_header"]
+    row = np.dtype([("mean", "<f8" if any(table.offset) else "<f4", 3), ("rest", "<f4", len(names) - 3)])
     with replaced_file(path) as temporary, temporary.open("wb") as out:
         out.write("\n".join([*header, ""]).encode())
         done = 0
         for batch in table.batches():
             opacity = np.clip(batch.opacities.astype(np.float64), 1e-7, 1.0 - 1e-7)
             groups: Sequence[AnyArray] = (
-                batch.means,
                 np.zeros((len(batch), 3), np.float32),
                 batch.sh[:, 0],
                 batch.sh[:, 1:].transpose(0, 2, 1).reshape(len(batch), 3 * above),
@@ -82,7 +96,9 @@ def write_splat_ply(path: Path, table: SplatTable, on_progress: OnProgress = lam
                 batch.log_scales,
                 batch.quaternions,
             )
-            out.write(np.concatenate(groups, axis=1).astype("<f4").tobytes())
+            rows = np.zeros(len(batch), row)
+            rows["mean"], rows["rest"] = batch.means + offset, np.concatenate(groups, axis=1)
+            out.write(rows.tobytes())
             done += len(batch)
             on_progress(done / table.count)
 
@@ -129,10 +145,56 @@ def mode_comment(table: SplatTable) -> list[str]:
     return [f"comment SplatRenderMode: {mode}"] if mode else []
 
 
-def _batch(columns: Columns, dc: Sequence[str], degree: int) -> SplatBatch:
+def warn_of_ignored(path: Path, vertex: PlyTable, used: Iterable[str], elements: Iterable[str] = ()) -> None:
+    """Warns of the columns and elements of a file that are not read, with their number."""
+    columns = [name for name in vertex.columns if name not in {*used, *_NORMALS}]
+    said = []
+    if columns:
+        shown = ", ".join(columns[:6]) + ", ..." * (len(columns) > 6)
+        said += [f"{_counted(len(columns), 'column')} ({shown})"]
+    others = {name: count for name, count in ply_elements(path).items() if name not in {"vertex", *elements}}
+    if others:
+        shown = ", ".join(f"{name} {count}" for name, count in list(others.items())[:8])
+        said += [f"{_counted(len(others), 'element')} (rows: {shown}{', ...' * (len(others) > 8)})"]
+    if said:
+        warnings.warn(f"{path}: left out: {' and '.join(said)[:300]}", stacklevel=3)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def _without_splats(path: Path, vertex: PlyTable, missing: Sequence[str]) -> str:
+    """A line about a PLY file without splats: a mesh, a point cloud, or splats that lack columns."""
+    elements = ply_elements(path)
+    lacking = f"its vertices lack {', '.join(missing)}"
+    if elements.get("face") or elements.get("tristrips"):
+        return f"{MESH}; {lacking}"
+    if set("xyz") <= set(vertex.columns) and not {"opacity", "scale_0", "rot_0"} & set(vertex.columns):
+        return f"a point cloud of {vertex.count} points, no splats ({lacking}); {POINT_CLOUD_CURE}"
+    return f"no file of splats, {lacking}; export it again with them"
+
+
+def _largest_color(vertex: PlyTable, names: Sequence[str]) -> float:
+    """The value of red, green and blue that is full brightness.
+
+    Of whole numbers that of their type. Of floats, which have no such, the least of 1, 255 and 65535 that all
+    of the file's values fit in.
+    """
+    code = vertex.types[names[0]]
+    if code[0] != "f":
+        return float(np.iinfo(code).max)
+    most = 0.0
+    for first in range(0, vertex.count, BATCH):
+        values = stack_of(vertex.rows(first, first + BATCH), names)
+        most = max(most, float(np.max(values, where=np.isfinite(values), initial=0.0)))
+    return next((full for full in (1.0, 255.0) if most <= full * (1.0 + 1e-3)), 65535.0)
+
+
+def _batch(columns: Columns, dc: Sequence[str], whole: float, degree: int) -> SplatBatch:
     colour = stack_of(columns, dc)
     if dc[0] == "red":
-        colour = (colour / 255.0 - 0.5) / spherical_harmonics.C0
+        colour = (colour / whole - 0.5) / spherical_harmonics.C0
     log_scales = stack_of(columns, ("scale_0", "scale_1"))
     flat = log_scales.min(axis=1, initial=np.inf)[:, None] + np.log(FLAT)
     third = stack_of(columns, ("scale_2",)) if "scale_2" in columns else flat

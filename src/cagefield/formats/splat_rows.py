@@ -17,8 +17,14 @@ from cagefield import sh as spherical_harmonics
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
+from cagefield.formats.splat_detection import is_text
 from cagefield.formats.splat_table import BATCH, OnProgress, SplatBatch, SplatSource, SplatTable
 from cagefield.regular_files import check_regular, read_array
+
+_SAMPLE = 4096
+_MAX_COORDINATE = 1e12
+_LENGTH_ERROR = 0.1
+"""Error of a rotation's length: 4 numbers of 8 bits, and 1 that is cut to 127/128."""
 
 _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rotation", "u1", 4)])
 
@@ -33,6 +39,11 @@ def open_splat_rows(path: Path) -> SplatSource:
     if not size or size % _ROW.itemsize:
         raise FieldError(f"{path}: {size} bytes are no whole number of splats of 32; copy the file again")
     count = size // _ROW.itemsize
+    if not _plausible(path, count):
+        raise FieldError(
+            f"{path}: no .splat, most of its rows of 32 bytes are no splats (scales below 0, rotations that "
+            "are not of length 1); it is another kind of file"
+        )
 
     def batches() -> Iterator[SplatBatch]:
         for first in range(0, count, BATCH):
@@ -40,6 +51,23 @@ def open_splat_rows(path: Path) -> SplatSource:
             yield of_rows(rows["mean"], rows["scale"], rows["rgba"], rows["rotation"])
 
     return SplatSource(path, count, 0, PLY, batches)
+
+
+def _plausible(path: Path, count: int) -> bool:
+    """Whether at least half of some rows are splats, as about one in a hundred of random bytes is.
+
+    Rows from the beginning, the middle and the end: finite means and scales, no scale below 0, a rotation of
+    length 1 or 0 to within its 8 bits. Text is none, whatever its numbers.
+    """
+    taken = min(_SAMPLE, count)
+    places = {0, (count - taken) // 2, count - taken}
+    rows = np.concatenate([read_array(path, _ROW, taken, offset=at * _ROW.itemsize) for at in places])
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.linalg.norm((rows["rotation"].astype(np.float64) - 128.0) / 128.0, axis=1)
+        good = np.isfinite(rows["mean"]).all(axis=1) & (np.abs(rows["mean"]) < _MAX_COORDINATE).all(axis=1)
+        good &= ((rows["scale"] >= 0.0) & (rows["scale"] < _MAX_COORDINATE)).all(axis=1)
+    good &= (np.abs(length - 1.0) < _LENGTH_ERROR) | (length < _LENGTH_ERROR)
+    return bool(2 * good.sum() >= len(rows)) and not is_text(rows.tobytes()[:4096])
 
 
 def of_rows(mean, scale, rgba, rotation) -> SplatBatch:  # type: ignore[no-untyped-def]

@@ -30,12 +30,12 @@ from PIL import Image
 from cagefield import json_text
 from cagefield.errors import FieldError
 from cagefield.formats.splat_axes import PLY
+from cagefield.formats.splat_detection import META
 from cagefield.formats.splat_table import BATCH, SplatBatch, SplatSource
 from cagefield.regular_files import UnreadableError, check_regular, read_bytes
 from cagefield.rendering.images import check_pixels
 from cagefield.typing import AnyArray
 
-META = "meta.json"
 PALETTE_WIDTH = 64
 """Centroids side by side."""
 
@@ -60,9 +60,9 @@ def open_sog(path: Path) -> SplatSource:
     Raises:
         FieldError: files that are missing, damaged, or do not fit each other.
     """
-    if path.is_dir() or path.name == META:
-        folder = path if path.is_dir() else path.parent
-        return _open(path, lambda name: _from_folder(folder, name))
+    if path.is_dir() or path.suffix.lower() == ".json":
+        folder, meta = (path, META) if path.is_dir() else (path.parent, path.name)
+        return _open(path, lambda name: _from_folder(folder, meta if name == META else name))
     try:
         check_regular(path)
         archive = zipfile.ZipFile(path)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from cagefield.atomic_files import replaced_file
-from cagefield.formats.splat_sog import META, PALETTE_WIDTH
+from cagefield.formats.splat_detection import META
+from cagefield.formats.splat_sog import PALETTE_WIDTH
 from cagefield.formats.splat_table import OnProgress, SplatTable
 from cagefield.typing import AnyArray, Float32
 

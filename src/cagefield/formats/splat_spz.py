@@ -68,25 +68,34 @@ def open_spz(path: Path) -> SplatSource:
         FieldError: a file that is no SPZ, of a version that is not known, or damaged.
     """
     with open_regular(path) as file:
-        start = file.read(NEW_HEADER.size)
-        if start[:4] == MAGIC:
-            return _open_new(path, file, start)
-        file.seek(0)
-        try:
-            with gzip.open(file) as stream:
-                return _open_old(path, stream)
-        except (OSError, EOFError, zlib.error):
-            raise _damaged(path, "it is no gzip that can be read to its end") from None
+        return open_spz_stream(path, file, path.stat().st_size)
 
 
-def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
+def open_spz_stream(path: Path, file: BinaryIO, size: int) -> SplatSource:
+    """The splats of the content of a .spz file, `size` bytes of an open `file`; `path` names it in messages.
+
+    Raises:
+        FieldError: as `open_spz`.
+    """
+    start = file.read(NEW_HEADER.size)
+    if start[:4] == MAGIC:
+        return _open_new(path, file, start, size)
+    file.seek(0)
+    try:
+        with gzip.open(file) as stream:
+            return _open_old(path, stream, size)
+    except (OSError, EOFError, zlib.error):
+        raise _damaged(path, "it is no gzip that can be read to its end") from None
+
+
+def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile, size: int) -> SplatSource:
     header = stream.read(OLD_HEADER.size)
     if len(header) < OLD_HEADER.size or header[:4] != MAGIC:
         raise _damaged(path, "it does not begin as SPZ does")
     _, version, count, degree, fraction, flags, _ = OLD_HEADER.unpack(header)
     if not 1 <= version <= 3:
         raise FieldError(f"{path}: SPZ of version {version}; 1 to 4 are read")
-    widths = _widths(path, version, count, degree)
+    widths = _widths(path, version, count, degree, size)
     spool = _spool()
     left = sum(widths) * count
     while left:
@@ -101,15 +110,15 @@ def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile) -> SplatSource:
     return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
 
 
-def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
+def _open_new(path: Path, file: BinaryIO, start: bytes, whole: int) -> SplatSource:
     if len(start) < NEW_HEADER.size:
         raise _damaged(path, "its header is cut off")
     _, version, count, degree, fraction, flags, streams, contents, _ = NEW_HEADER.unpack(start)
     if version != 4:
         # Files of versions 1 to 3 that were left uncompressed.
         file.seek(0)
-        return _open_old(path, file)
-    widths = _widths(path, version, count, degree)
+        return _open_old(path, file, whole)
+    widths = _widths(path, version, count, degree, whole)
     axes = SPZ_AXES
     if flags & _EXTENSIONS:
         axes = _axes_said(file.read(min(max(0, contents - NEW_HEADER.size), _MOST_EXTENSIONS)), axes)
@@ -132,7 +141,7 @@ def _open_new(path: Path, file: BinaryIO, start: bytes) -> SplatSource:
         if left:
             raise _damaged(path, "one of its streams cannot be decompressed")
         at += packed
-        if at > path.stat().st_size:
+        if at > whole:
             raise _damaged(path, "its streams end after the file")
     return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
 
@@ -164,13 +173,13 @@ def _axes_said(extensions: bytes, axes: Axes) -> Axes:
     return axes
 
 
-def _widths(path: Path, version: int, count: int, degree: int) -> tuple[int, ...]:
+def _widths(path: Path, version: int, count: int, degree: int, size: int) -> tuple[int, ...]:
     """Bytes of a splat in each stream. Raises FieldError where the file cannot hold so many."""
     if degree > 4:
         raise _damaged(path, f"harmonics of degree {degree}; at most 4 exist")
     rotation = 3 if version < 3 else 4
     widths = (6 if version == 1 else 9, 1, 3, 3, rotation, 3 * ((degree + 1) ** 2 - 1))
-    total, size = sum(widths) * count, path.stat().st_size
+    total = sum(widths) * count
     if not count or total > _MOST_RATIO * size or (total > _SMALL and total > _USUAL_RATIO * size):
         raise _damaged(path, f"it says that it holds {count} splats")
     return widths

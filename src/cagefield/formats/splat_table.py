@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat import NO_OFFSET, Offset, SplatField
 from cagefield.formats.morton import morton_codes
 from cagefield.temporary_folders import TemporaryFolder
 from cagefield.typing import AnyArray, Float32
@@ -68,13 +68,19 @@ class SplatBatch:
         """Those of an index or a mask."""
         return SplatBatch(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
+    def padded(self, sh_degree: int) -> SplatBatch:
+        """The splats with harmonics up to a degree, those that they lack 0."""
+        lacking = (sh_degree + 1) ** 2 - self.sh.shape[1]
+        return replace(self, sh=np.pad(self.sh, ((0, 0), (0, lacking), (0, 0)))) if lacking else self
+
 
 @dataclass(frozen=True)
 class SplatSource:
     """An open file of splats: `batches` hands them out from the first on, each time it is called.
 
     `axes` are the file's own where it says so, or those its format prescribes. `end` is the first byte that
-    is not read any more, None where the file does not say.
+    is not read any more, None where the file does not say. `is_double`: coordinates have more digits than
+    float32 holds.
     """
 
     path: Path
@@ -85,6 +91,7 @@ class SplatSource:
     antialiased: bool = False
     discs: bool = False
     end: int | None = None
+    is_double: bool = False
 
 
 class SplatTable(Protocol):
@@ -98,6 +105,9 @@ class SplatTable(Protocol):
     def antialiased(self) -> bool: ...
     @property
     def discs(self) -> bool: ...
+    @property
+    def offset(self) -> Offset:
+        """Coordinates of the file that the splats are from, less those of `batches`."""
 
     def batches(self) -> Iterator[SplatBatch]:
         """The splats in their order."""
@@ -128,6 +138,10 @@ class FieldTable:
     def discs(self) -> bool:
         return self.field.discs
 
+    @property
+    def offset(self) -> Offset:
+        return self.field.offset
+
     def batches(self) -> Iterator[SplatBatch]:
         return self._in_order(None)
 
@@ -146,8 +160,11 @@ class FieldTable:
 class Spool:
     """Splats in a temporary file, row by row: memory does not grow with them."""
 
-    def __init__(self, folder: Path, sh_degree: int, antialiased: bool, discs: bool = False) -> None:
+    def __init__(
+        self, folder: Path, sh_degree: int, antialiased: bool, discs: bool = False, offset: Offset = NO_OFFSET
+    ) -> None:
         self.sh_degree, self.antialiased, self.discs = sh_degree, antialiased, discs
+        self.offset = offset
         self.count = 0
         self._folder, self._path = folder, folder / "splats"
         self._width = _SHAPE + 3 * (sh_degree + 1) ** 2
@@ -206,11 +223,15 @@ class Spool:
 
 @contextmanager
 def spooled(
-    source: SplatSource, batches: Iterable[SplatBatch], sh_degree: int, on_progress: OnProgress
+    source: SplatSource,
+    batches: Iterable[SplatBatch],
+    sh_degree: int,
+    on_progress: OnProgress,
+    offset: Offset = NO_OFFSET,
 ) -> Iterator[Spool]:
     """What a source's batches became in a temporary file, which is removed at the end."""
     with TemporaryFolder("splats") as folder:
-        spool = Spool(folder, sh_degree, source.antialiased, source.discs)
+        spool = Spool(folder, sh_degree, source.antialiased, source.discs, offset)
         try:
             for batch in batches:
                 spool.append(batch)
@@ -226,7 +247,7 @@ def cleaned(source: SplatSource, batches: Iterable[SplatBatch]) -> Iterator[Spla
     Raises:
         FieldError: none can be shown.
     """
-    bad = good = 0
+    bad = good = clipped = 0
     for batch in batches:
         log_scales = np.maximum(batch.log_scales, LEAST_LOG_SCALE)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -240,6 +261,7 @@ def cleaned(source: SplatSource, batches: Iterable[SplatBatch]) -> Iterator[Spla
                 finite = np.isfinite(values.astype(np.float32))
                 keep &= finite.all(axis=tuple(range(1, values.ndim)))
         opacities = np.clip(batch.opacities, 0.0, 1.0)
+        clipped += int((keep & (opacities != batch.opacities)).sum())
         shown = SplatBatch(batch.means, log_scales, quaternions, opacities, batch.sh)
         bad, good = bad + int((~keep).sum()), good + int(keep.sum())
         yield shown if keep.all() else shown.take(keep)
@@ -248,4 +270,8 @@ def cleaned(source: SplatSource, batches: Iterable[SplatBatch]) -> Iterator[Spla
     if bad:
         warnings.warn(
             f"{source.path}: {bad} of {bad + good} splats hold no numbers and are left out", stacklevel=2
+        )
+    if clipped:
+        warnings.warn(
+            f"{source.path}: {clipped} of {good} opacities lie outside [0, 1] and are clipped", stacklevel=2
         )

@@ -17,7 +17,7 @@ from cagefield.fields.files import kind_of
 from cagefield.regular_files import real_path
 from cagefield.scene_files import FIELD, is_scene
 
-SPLATS = (".ply", ".splat", ".ksplat", ".spz", ".sog", ".glb")
+SPLATS = (".ply", ".splat", ".ksplat", ".spz", ".sog", ".glb", ".gltf")
 """Suffixes of files of splats."""
 
 DEEP, MOST, LOOKED_AT = 3, 200, 5000

@@ -23,8 +23,8 @@ from cagefield.cameras import Camera
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat import SplatField
 from cagefield.formats.page_field import VERSION as FIELD_VERSION
-from cagefield.formats.splat_sog import META
-from cagefield.regular_files import MOST_TEXT, FileState, check_regular, real_path
+from cagefield.formats.splat_detection import LOD_META, META, splat_folder
+from cagefield.regular_files import MOST_TEXT, FileState, check_regular, read_text, real_path
 from cagefield.scene import Scene
 from cagefield.scene_files import field_states, is_scene, recover
 from cagefield.server.editor.pasted_sources import source_problem
@@ -35,7 +35,7 @@ from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
-from cagefield.server.web.opening import scene_of_file
+from cagefield.server.web.opening import LEFT_OUT, scene_of_file
 from cagefield.server.web.patience import PatientHttp
 from cagefield.server.web.patient_socket import PatientSocket
 from cagefield.server.web.security import Guard
@@ -57,8 +57,8 @@ def open_scene(
     scene is in. Raises CagefieldError for a folder that is no scene, a file without splats, and a scene that
     another program edits.
     """
-    path = path.parent if path.name == META else path
-    if path.is_file() or ((path / META).is_file() and not is_scene(path)):
+    path = path.parent if path.name in (META, LOD_META) else path
+    if path.is_file() or (splat_folder(path) and not is_scene(path)):
         return open_cached(scene_of_file(path), path, device, root)
     return open_cached(path, None, device, root)
 
@@ -95,6 +95,8 @@ def _greeted(
         coordinator.greeting = "changes that had not been saved were restored; undo takes them back"
     elif store.damaged is not None:
         coordinator.greeting = store.damaged
+    elif (store.origin / LEFT_OUT).is_file():
+        coordinator.greeting = read_text(store.origin / LEFT_OUT)
     return coordinator, hello_of(scene, shown.name, str(real_path(store.path)), field)
 
 

@@ -10,6 +10,7 @@ import hashlib
 import os
 import shutil
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 KEPT_DAYS = 30
 """Cached scenes that were not opened for longer are removed, but those with an autosave."""
+
+LEFT_OUT = "left-out.txt"
+"""In the scene's folder: a line of what its file has and the scene has not, for the pages."""
 
 _LONGEST = 100
 """Bytes of a file's name in its scene's: names have 255 at most, with what autosaves and drafts add."""
@@ -59,10 +63,17 @@ def scene_of_file(file: Path) -> Path:
     if is_scene(folder):
         os.utime(folder)
     else:
-        found = import_splats(read_opened(source or open_fitting(file)))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", UserWarning)
+            found = import_splats(read_opened(source or open_fitting(file)))
+        lines = [str(warning.message) for warning in said if issubclass(warning.category, UserWarning)]
+        for line in lines:
+            warnings.warn(line, stacklevel=2)
         folder.parent.mkdir(parents=True, exist_ok=True)
         _tidy(folder.parent)
-        Scene(found.field, cameras=found.cameras, background=found.background).save(folder)
+        Scene(found.field, cameras=found.cameras, background=found.background).save(
+            folder, beside={LEFT_OUT: "; ".join(lines).replace(f"{file.parent}{os.sep}", "")} if lines else {}
+        )
     return folder
 
 
@@ -83,8 +94,10 @@ def _end(source: SplatSource) -> int:
 
 def _digest(file: Path, end: int | None) -> str:
     """A name for the content of a file, up to its byte `end`."""
+    from cagefield.formats.splat_opening import files_of
+
     content = hashlib.blake2b(digest_size=8)
-    for part in sorted(file.iterdir()) if file.is_dir() else [file]:
+    for part in files_of(file):
         with open_regular(part) as stream:
             while block := stream.read(_BLOCK if end is None else min(_BLOCK, end - stream.tell())):
                 content.update(block)
