@@ -177,8 +177,10 @@ def test_photos_that_are_in_no_split_are_counted(room, tmp_path):
     ]
     data = dataclasses.replace(load_dataset(room), train=(views[0],), test=(views[1],), val=())
     assert captures.left_out_photos(data) == 1
-    for name in (f"{views[0].image_path.stem}_depth_0001.png", ".hidden.jpg", "notes.txt"):
+    for name in ("r_0_depth_0001.png", "dynamic_mask_0.png", ".hidden.jpg", "notes.txt", "hidden-part.png"):
         (tmp_path / name).write_bytes(b"")
+    hidden = dataclasses.replace(views[0], mask=PhotoMask(tmp_path / "hidden-part.png"))
+    data = dataclasses.replace(data, train=(hidden,))
     assert captures.left_out_photos(data) == 1
     (tmp_path / "frame_00099.JPG").write_bytes(b"")
     assert captures.left_out_photos(data) == 2

@@ -39,6 +39,9 @@ TRAIN_VIEWS = 10
 TRUE_RAYS = 2000
 """Rays of a photo, evenly spread, on which the true depth is compared."""
 
+DERIVED = ("depth", "normal", "mask", "confidence")
+"""Words in names of pictures beside photos that are no photos."""
+
 _COLUMNS = (
     "capture", "field", "photos", "held out", "left out", "size", "seconds", "elements", "train PSNR",
     "train, corrected", "PSNR", "corrected", "SSIM", "worst view", "pose error", "points", "depth error",
@@ -121,19 +124,17 @@ def measure(dataset: Dataset, learnt: Learnt, points: SparsePoints | None = None
 def left_out_photos(dataset: Dataset) -> int:
     """Number of photos that lie beside those of the data set, in the same folders, and belong to no split.
 
-    Pictures that are named as one of the photos with an addition (NeRF-synthetic's r_0_depth_0001.png) and
-    hidden files are none.
+    Masks, pictures named as one of DERIVED (NeRF-synthetic's r_0_depth_0001.png) and hidden files are none.
     """
-    used = {view.image_path for view in (*dataset.train, *dataset.test, *dataset.val)}
-    count = 0
-    for folder in {path.parent for path in used}:
-        stems = {path.stem for path in used if path.parent == folder}
-        for path in folder.iterdir():
-            if path in used or path.suffix.lower() not in EXTENSIONS or path.name.startswith("."):
-                continue
-            pieces = path.stem.split("_")
-            count += not any("_".join(pieces[:n]) in stems for n in range(1, len(pieces)))
-    return count
+    views = (*dataset.train, *dataset.test, *dataset.val)
+    known = {view.image_path for view in views} | {view.mask.path for view in views if view.mask is not None}
+    beside = {path for folder in {view.image_path.parent for view in views} for path in folder.iterdir()}
+    return sum(
+        path.suffix.lower() in EXTENSIONS
+        and not path.name.startswith(".")
+        and not any(word in path.stem.lower() for word in DERIVED)
+        for path in beside - known
+    )
 
 
 def sighted_points(dataset: Dataset) -> SparsePoints | None:

@@ -22,9 +22,10 @@ import numpy as np
 from cagefield.datasets.views import Dataset, View
 from cagefield.fields.nerf import NerfField
 from cagefield.rendering.nerf import Rays, trace
+from cagefield.training.evaluation import composited
 from cagefield.training.loop import run_to_end
 from cagefield.training.nerf_config import NerfConfig
-from cagefield.training.nerf_run import NerfProgress, NerfRun, composited
+from cagefield.training.nerf_run import NerfProgress, NerfRun
 from cagefield.training.nerf_space import Space
 
 
@@ -75,7 +76,7 @@ def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500)
     """Mean PSNR in dB over views, on about so many pixels of each; alpha is composited on white."""
     scores = []
     for view in views:
-        colours, camera = composited(view), view.camera
+        colours, camera = composited(view.load()), view.camera
         step = max(1, round((camera.width * camera.height / pixels) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
         chosen = np.stack([i.ravel(), j.ravel()], axis=1)

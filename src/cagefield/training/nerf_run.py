@@ -24,6 +24,7 @@ from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.formats.torch_files import read_tensors_of
 from cagefield.rendering.nerf import Jitter, Rays, march
 from cagefield.training.checkpoint_checks import check_run
+from cagefield.training.evaluation import composited
 from cagefield.training.nerf_config import NerfConfig
 from cagefield.training.nerf_space import space_of
 
@@ -85,7 +86,7 @@ class NerfRun:
         )
         self.torch = TorchNerf(self.start, self.device, trainable=True)
         self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)
-        self.photos = [torch.from_numpy(composited(view)).to(self.device) for view in dataset.train]
+        self.photos = [torch.from_numpy(composited(view.load())).to(self.device) for view in dataset.train]
         self.drawn = [_drawn_pixels(view) for view in dataset.train]
         self.white = dataset.train[0].load().shape[2] == 4
         self.step, self.seconds, self.loss = 0, 0.0, float("nan")
@@ -273,14 +274,6 @@ def _drawn_pixels(view: View) -> NDArray[np.int64] | None:
     """(column, row) [N,2] of the pixels that the mask of a photo leaves; None where they are all."""
     valid = view.valid_pixels()
     return None if valid is None else np.argwhere(valid)[:, ::-1]
-
-
-def composited(view: View) -> NDArray[np.float32]:
-    """The photo [H,W,3] in [0,1], alpha composited on white."""
-    photo = view.load().astype(np.float32) / 255.0
-    if photo.shape[2] == 4:
-        return np.asarray(photo[..., :3] * photo[..., 3:] + (1.0 - photo[..., 3:]), np.float32)
-    return photo
 
 
 def _as_mlp(network: TorchMlp) -> Mlp:
