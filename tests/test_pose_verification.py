@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset, pose_verification
+from cagefield.datasets.photo_names import natural_key
 from cagefield.datasets.pose_alignment import align_poses
 from cagefield.datasets.pose_check import PoseError, epipolar_errors, focal_spread, match_photos, pose_error
 from cagefield.datasets.pose_refinement import camera_groups
@@ -175,9 +176,19 @@ def test_scattered_focals_of_one_lens_are_shared_only_where_that_fits_as_well():
     assert right.has_scattered_focals and not right.is_wrong
     assert pose_verification._is_better(right, replace(right, median=0.45, focal_spread=0.0), None)
     assert not pose_verification._is_better(right, replace(right, median=0.7, focal_spread=0.0), None)
-    wrong = replace(right, median=5.0)
-    assert pose_verification._is_better(wrong, replace(right, median=3.0, tenth=0.6), None)
-    assert not pose_verification._is_better(wrong, replace(right, median=4.0), None)
+    wrong = replace(right, median=5.0, capped=5.0)
+    assert pose_verification._is_better(wrong, replace(right, median=3.0, capped=3.0), None)
+    assert not pose_verification._is_better(wrong, replace(right, median=4.0, capped=4.0), None)
+
+
+def test_names_are_in_the_order_of_their_numbers():
+    assert sorted(["a10b2", "a9", "a10b10", "b1", "a"], key=natural_key) == [
+        "a",
+        "a9",
+        "a10b2",
+        "a10b10",
+        "b1",
+    ]
 
 
 def test_masked_features_do_not_count(capture, tmp_path):

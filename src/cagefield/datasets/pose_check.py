@@ -10,7 +10,7 @@ Source: Hartley and Zisserman, "Multiple View Geometry" (2004), chapters 9 and 1
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,6 +21,7 @@ from PIL import Image
 from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.datasets import features
+from cagefield.datasets.photo_names import natural_key
 from cagefield.datasets.views import View
 
 FloatArray = npt.NDArray[np.float64]
@@ -58,6 +59,12 @@ MAX_MEDIAN_PIXELS = 0.9
 
 MAX_TENTH_PIXELS = 4.0
 """The same of the 90 % quantile; right ones have up to 1."""
+
+MAX_PAIR_PIXELS = 8.0
+"""Error at which that of a pair is capped in the mean over pairs: false matches count no more than others."""
+
+CONTRADICTED_PIXELS = 3.0
+"""Error of a pair from which on its photos contradict the poses."""
 
 MIN_MATCHED_SHARE = 0.3
 """Share of the photos that must have a pair, for anything to be said."""
@@ -98,6 +105,8 @@ class PoseError:
         pairs: pairs of photos that were measured.
         size: longer side of the compared photos, in pixels.
         worst: name and error of the worst photo.
+        capped: mean of the pairs' errors, each capped at MAX_PAIR_PIXELS: what corrections are compared by.
+        contradicted: share of the pairs above CONTRADICTED_PIXELS.
         focal_spread: largest spread of focal lengths among photos of one size that have one camera each, 0
             where cameras are shared.
     """
@@ -109,6 +118,8 @@ class PoseError:
     size: int
     worst: tuple[str, float]
     focal_spread: float = 0.0
+    capped: float = 0.0
+    contradicted: float = 0.0
 
     @property
     def is_wrong(self) -> bool:
@@ -142,7 +153,7 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
 
     Raises DatasetError where a photo cannot be read.
     """
-    ordered = sorted(views, key=lambda view: view.name)
+    ordered = in_order(views)
     ordered = ordered[:: max(1, -(-len(ordered) // MAX_PHOTOS))]
     pycolmap = features.engine()
     options = pycolmap.FeatureExtractionOptions(use_gpu=False, num_threads=1)
@@ -172,6 +183,11 @@ def match_photos(views: Sequence[View], on_progress: OnProgress | None = None) -
     )
 
 
+def in_order(views: Iterable[View]) -> list[View]:
+    """Views in the order of their names, numbers in these by value."""
+    return sorted(views, key=lambda view: natural_key(view.name))
+
+
 def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None:
     """Epipolar error of the views' cameras at the matches; None where too few photos have matches."""
     by_name = {view.name: view for view in views}
@@ -179,8 +195,10 @@ def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None
         by_name[name].camera.resized(*size) for name, size in zip(matches.names, matches.sizes, strict=True)
     ]
     errors: list[list[float]] = [[] for _ in cameras]
+    every = []
     for (i, j), (first, second) in zip(matches.pairs, matches.pixels, strict=True):
         error = float(np.median(epipolar_errors(cameras[i], cameras[j], first, second)))
+        every.append(error)
         errors[i].append(error)
         errors[j].append(error)
     measured = [n for n, found in enumerate(errors) if found]
@@ -196,6 +214,8 @@ def pose_error(matches: PhotoMatches, views: Sequence[View]) -> PoseError | None
         size=max(map(max, matches.sizes)),
         worst=(matches.names[measured[worst]], float(values[worst])),
         focal_spread=focal_spread([view.camera for view in views]),
+        capped=float(np.mean(np.minimum(every, MAX_PAIR_PIXELS))),
+        contradicted=float(np.mean(np.array(every) > CONTRADICTED_PIXELS)),
     )
 
 

@@ -25,7 +25,7 @@ from cagefield.caches import cache_root
 from cagefield.cameras import Camera
 from cagefield.datasets.folds import Fold, find_fold
 from cagefield.datasets.points import capture_key, read_cached_points, write_cached_points
-from cagefield.datasets.pose_check import PoseError, match_photos, pose_error
+from cagefield.datasets.pose_check import PoseError, in_order, match_photos, pose_error
 from cagefield.datasets.pose_refinement import PoseSolver, RefinedPoses
 from cagefield.datasets.region import cube_of_interest, depth_range
 from cagefield.datasets.views import Dataset, SparsePoints, View
@@ -36,8 +36,11 @@ from cagefield.temporary_folders import TemporaryFolder
 Outcome = Literal["unmeasured", "kept", "adjusted", "rebuilt"]
 OnStage = Callable[[str, float, str], None]
 
-MIN_GAIN = 0.7
+MAX_GAIN = 0.7
 """Epipolar error after over before, at most, for corrected poses that are still called wrong."""
+
+MAX_CONTRADICTED = 0.05
+"""Share of pairs that contradict adjusted poses, above which structure from motion is tried too."""
 
 MAX_SHARED_GAIN = 1.25
 """The same where only focal lengths are scattered: one lens for all must explain the photos as well."""
@@ -70,9 +73,9 @@ class Verification:
 
 
 def all_views(dataset: Dataset) -> list[View]:
-    """All views of a data set once, sorted by name."""
+    """All views of a data set once, in the order of their names."""
     everything = {view.name: view for view in (*dataset.val, *dataset.test, *dataset.train)}
-    return [everything[name] for name in sorted(everything)]
+    return in_order(everything.values())
 
 
 def verify_poses(
@@ -122,7 +125,8 @@ def verify_poses(
                 best = judgement
                 if file is not None:
                     _write(file, outcome, found)
-            if best is not None and best.after is not None and not best.after.is_wrong:
+            after = None if best is None else best.after
+            if after is not None and not after.is_wrong and after.contradicted <= MAX_CONTRADICTED:
                 break
     return best or Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
 
@@ -144,7 +148,7 @@ def _corrections(
 
 
 def _error(one: Verification) -> float:
-    return float("inf") if one.after is None else one.after.median
+    return float("inf") if one.after is None else one.after.capped
 
 
 def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | None) -> bool:
@@ -159,8 +163,8 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
     if not before.is_wrong:
         return not after.is_wrong and after.median <= MAX_SHARED_GAIN * before.median
     if not after.is_wrong:
-        return after.median < before.median
-    return after.median < MIN_GAIN * before.median and after.tenth <= before.tenth
+        return after.capped < before.capped
+    return after.median < MAX_GAIN * before.median and after.capped < MAX_GAIN * before.capped
 
 
 def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:

@@ -15,6 +15,7 @@ from PIL import Image, ImageOps
 from scipy.ndimage import laplace
 
 from cagefield.datasets.hidden_files import MASK_FOLDER, is_hidden
+from cagefield.datasets.photo_names import natural_key
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
 from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
@@ -66,7 +67,7 @@ def find_raw_photos(folder: Path) -> list[Path]:
         and not is_hidden(file.relative_to(folder).parts)
         and not any(MASK_FOLDER.fullmatch(part) for part in file.relative_to(folder).parts[:-1])
     ]
-    return sorted(found, key=lambda file: file.relative_to(folder).as_posix())
+    return sorted(found, key=lambda file: natural_key(file.relative_to(folder).as_posix()))
 
 
 def upright(source: Path, name: str, folder: Path) -> RawPhoto:
