@@ -107,6 +107,9 @@ def _source(path: Path, asset: GltfAsset) -> SplatSource:
     for name in ("animations", "skins", "cameras"):
         _count(ignored, name, len(asset.items(name)))
     _count(ignored, "meshes of nodes that the default scene does not show", hidden)
+    if asset.items("nodes"):
+        named = {node.get("mesh") for node in asset.items("nodes")}
+        _count(ignored, "meshes that no node shows", len(set(range(len(asset.items("meshes")))) - named))
     for name in asset.json.get("extensionsRequired", []):
         if name not in (EXTENSION, INSTANCING, QUANTIZATION) and "spz" not in name.lower():
             _count(ignored, f"required extension {name:.60}", 1)
