@@ -215,6 +215,8 @@ def far_ply(path: Path, count: int = 500, is_text: bool = False) -> np.ndarray:
     for axis, far in zip("xyz", FAR, strict=True):
         columns[axis] = columns[axis] + far
     write_ply(path, columns, dict.fromkeys("xyz", "f8"), is_text=is_text)
+    if is_text:  # some programs write more digits than the type that they name
+        path.write_bytes(path.read_bytes().replace(b"property double", b"property float"))
     return np.stack([columns[axis] for axis in "xyz"], axis=1)
 
 
