@@ -259,6 +259,7 @@ def test_what_else_a_file_holds_is_named(tmp_path: Path) -> None:
     triangles = {"attributes": {"POSITION": asset.accessor(np.eye(3))}}
     shown = asset.node(mesh=asset.mesh(splats, triangles))
     other = asset.node(mesh=asset.mesh(asset.splats(field)))
+    asset.mesh(asset.splats(field))
     asset.scene(shown)
     asset.scene(other)
     asset.json["animations"], asset.json["cameras"] = [{}], [{}, {}]
@@ -272,6 +273,7 @@ def test_what_else_a_file_holds_is_named(tmp_path: Path) -> None:
         "1 animations",
         "2 cameras",
         "1 meshes of nodes that the default scene does not show",
+        "1 meshes that no node shows",
     ):
         assert part in line
 

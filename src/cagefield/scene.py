@@ -21,6 +21,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache, cached_property, partial
@@ -42,7 +43,7 @@ from cagefield.errors import SceneError
 from cagefield.fields.frusta import in_frusta
 from cagefield.fields.nerf import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat import NO_OFFSET, Offset, SplatField
 from cagefield.fields.voxel import VoxelField
 from cagefield.patches.pasting import content_box
 from cagefield.regular_files import real_path
@@ -162,6 +163,11 @@ class Scene:
             )
         from cagefield.fields.baking import bake
 
+        if isinstance(original, SplatField) and any(original.offset):
+            warnings.warn(
+                f"voxels keep no offset: {list(original.offset)} is to be added to their coordinates",
+                stacklevel=2,
+            )
         every = [camera for group in cameras.values() for camera in group]
         near = original.near if isinstance(original, NerfField) and original.ndc is None else 0.0
         voxels = bake(
@@ -303,6 +309,11 @@ class Scene:
             at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
         found = real_path(source).stem if name is None else name
         return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
+
+    @property
+    def offset(self) -> Offset:
+        """Coordinates of the file that the scene's splats are from, less the scene's; 0 of voxels."""
+        return self.field.offset if isinstance(self.field, SplatField) else NO_OFFSET
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
         """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.

@@ -1,7 +1,7 @@
 /** Files of splats that are sent to the server, to be opened there. */
 
 /** What the server reads, by the ends of names. */
-export const SPLATS = [".ply", ".spz", ".sog", ".splat", ".ksplat", ".glb"];
+export const SPLATS = [".ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".gltf"];
 
 export function isSplats(name: string): boolean {
   return SPLATS.some((end) => name.toLowerCase().endsWith(end));

@@ -221,7 +221,7 @@ class Export:
             mesh = scene_mesh(scene, self.resolution, lambda done: move(done, 1.0, ""))
         if cages:
             mesh = mesh.kept(inside(cages, mesh.positions))
-        write_mesh(self.out, mesh, scene.up)
+        write_mesh(self.out, mesh, scene.up, offset=scene.offset)
         return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours"
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
@@ -235,7 +235,7 @@ class Export:
             import numpy as np
 
             points = points.take(np.flatnonzero(inside(cages, points.positions)))
-        write_points(self.out, points.positions, points.rgb, points.normals)
+        write_points(self.out, points.positions, points.rgb, points.normals, offset=scene.offset)
         return f"{len(points)} points with normals and colours"
 
 

@@ -68,9 +68,10 @@ def _splats(field: SplatField) -> tuple[str, str]:
     """What a splat field holds, and how fine it is."""
     arrays = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
     megabytes = sum(array.nbytes for array in arrays) / 1e6
+    offset = f", without the offset {', '.join(f'{v:.15g}' for v in field.offset)}" * any(field.offset)
     filtered = ", discs" if field.discs else ", antialiased" if field.antialiased else ""
     return (
-        f"{len(field)} splats ({megabytes:.1f} MB in memory){filtered}",
+        f"{len(field)} splats ({megabytes:.1f} MB in memory){filtered}{offset}",
         f"splat width {field.sample_spacing:.4g}",
     )
 

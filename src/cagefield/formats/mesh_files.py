@@ -17,35 +17,50 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.fields.meshing import Mesh
+from cagefield.fields.splat import NO_OFFSET, Offset
 from cagefield.rendering.render_result import to_uint8
 
 MESH_SUFFIXES = (".ply", ".glb")
+_PLY_TYPES = {"u1": "uchar", "<f4": "float", "<f8": "double"}
 _FLOAT, _UINT, _USHORT = 5126, 5125, 5123
 _ARRAY, _ELEMENTS = 34962, 34963
 
 
 def write_points(
-    path: str | Path, positions: NDArray[Any], rgb: NDArray[Any], normals: NDArray[Any] | None = None
+    path: str | Path,
+    positions: NDArray[Any],
+    rgb: NDArray[Any],
+    normals: NDArray[Any] | None = None,
+    *,
+    offset: Offset = NO_OFFSET,
 ) -> None:
-    """Writes positions [M,3], colours [M,3] in [0,1] and normals [M,3] as a PLY, complete or not at all."""
-    _write_ply(Path(path), positions, normals, rgb, None)
+    """Writes positions [M,3], colours [M,3] in [0,1] and normals [M,3] as a PLY, complete or not at all.
+
+    An `offset` is added to positions, which are doubles then.
+    """
+    _write_ply(Path(path), positions, normals, rgb, None, offset)
 
 
-def write_mesh(path: str | Path, mesh: Mesh, up: ArrayLike = (0.0, 0.0, 1.0)) -> None:
+def write_mesh(
+    path: str | Path, mesh: Mesh, up: ArrayLike = (0.0, 0.0, 1.0), *, offset: Offset = NO_OFFSET
+) -> None:
     """Writes a mesh as .ply or .glb, complete or not at all; `up` [3] is the scene's, for glTF.
+
+    An `offset` is added to a .ply's positions, doubles then, and to the translation of a .glb's node.
 
     Raises:
         FieldError: another suffix.
     """
     path = Path(path)
     if path.suffix.lower() == ".ply":
-        _write_ply(path, mesh.positions, mesh.normals, mesh.rgb, mesh.faces)
+        _write_ply(path, mesh.positions, mesh.normals, mesh.rgb, mesh.faces, offset)
     elif path.suffix.lower() == ".glb":
-        _write_glb(path, mesh, np.asarray(up, np.float64))
+        _write_glb(path, mesh, np.asarray(up, np.float64), np.array(offset))
     else:
         raise FieldError(f"{path}: a mesh is written as {' or '.join(MESH_SUFFIXES)}; give such a name")
 
@@ -56,17 +71,19 @@ def _write_ply(
     normals: NDArray[Any] | None,
     rgb: NDArray[Any],
     faces: NDArray[np.int32] | None,
+    offset: Offset,
 ) -> None:
-    columns = [(name, "<f4") for name in ("x", "y", "z")]
+    columns = [(name, "<f8" if any(offset) else "<f4") for name in ("x", "y", "z")]
     columns += [(name, "<f4") for name in ("nx", "ny", "nz")] if normals is not None else []
     columns += [(name, "u1") for name in ("red", "green", "blue")]
     table = np.empty(len(positions), columns)
-    parts = [positions, *([] if normals is None else [normals]), to_uint8(np.asarray(rgb))]
+    places = positions.astype(np.float64) + offset if any(offset) else positions
+    parts = [places, *([] if normals is None else [normals]), to_uint8(np.asarray(rgb))]
     for name, values in zip(table.dtype.names or (), np.concatenate(parts, axis=1).T, strict=True):
         table[name] = values
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
     header += [f"element vertex {len(table)}"]
-    header += [f"property {'uchar' if kind == 'u1' else 'float'} {name}" for name, kind in columns]
+    header += [f"property {_PLY_TYPES[kind]} {name}" for name, kind in columns]
     if faces is not None:
         header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
     with replaced_file(path) as temporary, temporary.open("wb") as file:
@@ -78,7 +95,11 @@ def _write_ply(
             file.write(rows.tobytes())
 
 
-def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64]) -> None:
+def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
+    turn = _to_y(up)
+    node: dict[str, Any] = {"mesh": 0, "rotation": turn.as_quat().tolist()}
+    if shift.any():
+        node["translation"] = turn.apply(shift).tolist()
     colours = np.full((len(mesh.rgb), 4), 65535, "<u2")
     colours[:, :3] = np.rint(65535.0 * linear(mesh.rgb))
     parts: list[tuple[NDArray[Any], int, str, int]] = [
@@ -100,7 +121,7 @@ def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64]) -> None:
         "asset": {"version": "2.0", "generator": "cagefield"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "rotation": _to_y(up)}],
+        "nodes": [node],
         "meshes": [
             {
                 "primitives": [
@@ -131,9 +152,7 @@ def linear(rgb: NDArray[Any]) -> NDArray[np.float64]:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def _to_y(up: NDArray[np.float64]) -> list[float]:
-    """The quaternion (x, y, z, w) of a rotation that takes `up` [3] to y."""
-    from scipy.spatial.transform import Rotation
-
+def _to_y(up: NDArray[np.float64]) -> Rotation:
+    """A rotation that takes `up` [3] to y."""
     rotation, _ = Rotation.align_vectors([[0.0, 1.0, 0.0]], [up / np.linalg.norm(up)])
-    return [float(part) for part in rotation.as_quat()]
+    return rotation

@@ -17,6 +17,9 @@ from cagefield.regular_files import open_regular, read_bytes
 
 META, LOD_META = "meta.json", "lod-meta.json"
 
+ZIP_ARCHIVE = "a zip archive without meta.json; unpack it"
+"""Of another kind; checkpoints of PyTorch are such archives too."""
+
 _START_BYTES = 4096
 _MAX_JSON_BYTES = 64 << 20
 _KSPLAT_HEADER, _KSPLAT_SECTION = 4096, 1024
@@ -82,7 +85,7 @@ def other_kind(path: Path) -> str | None:
     if found is None and start.startswith(b"\x1f\x8b"):
         return "a gzip archive of something else than SPZ; unpack it"
     if found is None and start.startswith(b"PK\x03\x04"):
-        return "a zip archive without meta.json; unpack it"
+        return ZIP_ARCHIVE
     if found is None and is_text(start):
         words = {line.split()[0] for line in start.splitlines() if line.split()}
         return "an OBJ mesh" if b"v" in words and words <= _OBJ_WORDS | {b"#", b"s"} else "a text"

@@ -29,7 +29,7 @@ import numpy as np
 from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
 from cagefield.formats.gltf_buffers import Accessor, GltfAsset
-from cagefield.formats.gltf_nodes import MeshInstances, scene_meshes
+from cagefield.formats.gltf_nodes import INSTANCING, MeshInstances, scene_meshes
 from cagefield.formats.splat_axes import Axes
 from cagefield.formats.splat_colour_space import srgb_harmonics
 from cagefield.formats.splat_ply import MESH, POINT_CLOUD_CURE
@@ -40,6 +40,7 @@ from cagefield.typing import Array
 
 GLTF_AXES: Axes = "rub"
 EXTENSION = "KHR_gaussian_splatting"
+QUANTIZATION = "KHR_mesh_quantization"
 SRGB, LINEAR = "srgb_rec709_display", "lin_rec709_display"
 MAX_SPLATS = 1 << 31
 """Splats of all instances of a file: few bytes can say any number of them."""
@@ -106,6 +107,12 @@ def _source(path: Path, asset: GltfAsset) -> SplatSource:
     for name in ("animations", "skins", "cameras"):
         _count(ignored, name, len(asset.items(name)))
     _count(ignored, "meshes of nodes that the default scene does not show", hidden)
+    if asset.items("nodes"):
+        named = {node.get("mesh") for node in asset.items("nodes")}
+        _count(ignored, "meshes that no node shows", len(set(range(len(asset.items("meshes")))) - named))
+    for name in asset.json.get("extensionsRequired", []):
+        if name not in (EXTENSION, INSTANCING, QUANTIZATION) and "spz" not in name.lower():
+            _count(ignored, f"required extension {name:.60}", 1)
     if ignored:
         said = ", ".join(f"{count} {name}" for name, count in ignored.items())
         warnings.warn(f"{path}: left out: {said:.300}", stacklevel=2)

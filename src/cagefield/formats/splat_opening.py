@@ -22,7 +22,7 @@ from pathlib import Path
 from cagefield.errors import FieldError
 from cagefield.formats.gltf_buffers import GltfAsset
 from cagefield.formats.splat_compressed_ply import open_compressed_ply
-from cagefield.formats.splat_detection import LOD_META, META, detected_format, other_kind
+from cagefield.formats.splat_detection import LOD_META, META, ZIP_ARCHIVE, detected_format, other_kind
 from cagefield.formats.splat_gltf import open_splat_gltf
 from cagefield.formats.splat_ksplat import open_ksplat
 from cagefield.formats.splat_nerfstudio import is_splatfacto, open_splatfacto
@@ -40,7 +40,6 @@ READABLE = (
     *(META, LOD_META),
 )
 
-_CHECKPOINTS = (".ckpt", ".tar", ".pt", ".pth")
 _MESHES = ("an OBJ mesh", "an STL mesh", "an FBX mesh", "an OFF mesh")
 _CLOUDS = ("a LAS point cloud", "a PCD point cloud")
 _NAMES = {
@@ -107,15 +106,19 @@ def open_splats(path: Path) -> SplatSource:
 
 
 def holds_splats(path: Path) -> bool:
-    """Whether a file is one of splats, by its content or its ending; a checkpoint, by its tensors."""
-    if path.name.lower().endswith(_CHECKPOINTS):
-        return is_splatfacto(path)
-    if path.is_dir() or ending_of(path):
-        return True
+    """Whether a file is to be read as one of splats, by its content or its ending.
+
+    A checkpoint is, where its tensors are splats; a mesh or a picture is, whose error says what it is.
+    """
     try:
-        return path.is_file() and (detected_format(path) is not None or other_kind(path) is not None)
+        if path.is_dir() or (path.is_file() and detected_format(path) is not None):
+            return True
+        ending = ending_of(path)
+        if ending == ".ckpt":
+            return is_splatfacto(path)
+        return bool(ending) or (path.is_file() and other_kind(path) not in (None, ZIP_ARCHIVE))
     except OSError:
-        return False
+        return bool(ending_of(path))
 
 
 def files_of(path: Path) -> list[Path]:

@@ -67,7 +67,8 @@ def open_splat_ply(path: Path) -> SplatSource:
     antialiased, discs = said_of(comments)
     if vertex.count and "scale_2" not in vertex.columns:
         antialiased, discs = False, True
-    is_double = any(vertex.types[axis] in ("f8", "i4", "u4") for axis in "xyz")
+    places = [values.dtype for name, values in vertex.rows(0, 1).items() if name in set("xyz")]
+    is_double = any(dtype.itemsize > 4 or dtype.kind in "iu" for dtype in places)  # as all text is
     end = vertex.end
     return SplatSource(path, vertex.count, degree, PLY, batches, antialiased, discs, end, is_double)
 

@@ -67,6 +67,8 @@ def _source(path: Path, folder: Path, meta: dict[str, Any]) -> SplatSource:
     files = [
         _File(_inside(folder, names[number]), _disjoint(found)) for number, found in sorted(ranges.items())
     ]
+    if len({file.path for file in files}) < len(files):
+        raise ValueError("two of its files have one name")
     degree, antialiased = 0, False
     for file in files:
         source = open_sog(file.path)

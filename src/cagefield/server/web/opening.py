@@ -11,6 +11,8 @@ import os
 import shutil
 import time
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,24 +59,34 @@ def scene_of_file(file: Path) -> Path:
 
     stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
     # What memory cannot hold is refused before minutes go into its digest.
-    source = open_fitting(file) if file.is_file() and check_regular(file) > _LARGE else None
+    with _recorded_warnings() as lines:
+        source = open_fitting(file) if file.is_file() and check_regular(file) > _LARGE else None
     end = None if source is None else _end(source)
     folder = opened_folder() / f"{stem}-{_digest(file, end)}"
     if is_scene(folder):
         os.utime(folder)
     else:
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always", UserWarning)
+        with _recorded_warnings() as more:
             found = import_splats(read_opened(source or open_fitting(file)))
-        lines = [str(warning.message) for warning in said if issubclass(warning.category, UserWarning)]
-        for line in lines:
-            warnings.warn(line, stacklevel=2)
+        lines += more
         folder.parent.mkdir(parents=True, exist_ok=True)
         _tidy(folder.parent)
         Scene(found.field, cameras=found.cameras, background=found.background).save(
             folder, beside={LEFT_OUT: "; ".join(lines).replace(f"{file.parent}{os.sep}", "")} if lines else {}
         )
     return folder
+
+
+@contextmanager
+def _recorded_warnings() -> Iterator[list[str]]:
+    """The lines of the context's warnings, in the list once it has ended; they are given all the same."""
+    lines = list[str]()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", UserWarning)
+        yield lines
+    lines += [str(warning.message) for warning in said if issubclass(warning.category, UserWarning)]
+    for line in lines:
+        warnings.warn(line, stacklevel=4)
 
 
 def _end(source: SplatSource) -> int:
@@ -93,13 +105,14 @@ def _end(source: SplatSource) -> int:
 
 
 def _digest(file: Path, end: int | None) -> str:
-    """A name for the content of a file, up to its byte `end`."""
+    """A name for the content of a file, up to its byte `end`, and of those that it is read with."""
     from cagefield.formats.splat_opening import files_of
 
     content = hashlib.blake2b(digest_size=8)
     for part in files_of(file):
+        last = end if part == file else None
         with open_regular(part) as stream:
-            while block := stream.read(_BLOCK if end is None else min(_BLOCK, end - stream.tell())):
+            while block := stream.read(_BLOCK if last is None else min(_BLOCK, last - stream.tell())):
                 content.update(block)
     return content.hexdigest()
 
