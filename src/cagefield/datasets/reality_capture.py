@@ -265,7 +265,10 @@ def _division_as_brown(where: str, k1: float, f: float, width: int, height: int)
         raise DatasetError(f"{where}: FocalLength35mm must be positive, got {f:g}")
     corner = 0.5 * float(np.hypot(width, height)) / focal
     radius = _undistorted(k1, corner) * np.sqrt(np.linspace(0.0, 1.0, 400)[1:])
-    wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
+    with np.errstate(all="ignore"):
+        wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
+    if not np.isfinite(wanted).all() or not radius[-1] > 0:
+        raise DatasetError(f"{where}: its division model (k1 = {k1:g}) makes no sense; export it again")
     powers = (radius / radius[-1])[:, None] ** (2, 4, 6, 8)
     found = np.linalg.lstsq(powers * radius[:, None], wanted * radius, rcond=None)[0]
     error = focal * float(np.abs((powers @ found - wanted) * radius).max())
