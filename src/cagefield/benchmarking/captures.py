@@ -185,9 +185,12 @@ def exposed(picture: NDArray[Any], photo: Float32) -> Float32:
 
 
 def _likeness(view: View, frame: RenderResult) -> tuple[float, float, float]:
-    """(PSNR, PSNR with the exposure fitted, SSIM) of a picture of a photo's view."""
-    photo, picture = _photo(view), np.clip(frame.rgb, 0, 1)
-    return psnr(picture, photo), psnr(exposed(picture, photo), photo), ssim(picture, photo)
+    """(PSNR, PSNR with the exposure fitted, SSIM) of a picture of a photo's view, over its valid pixels."""
+    photo, picture, valid = _photo(view), np.clip(frame.rgb, 0, 1), view.valid_pixels()
+    weight = np.ones(photo.shape[:2], np.float32) if valid is None else valid.astype(np.float32)
+    gains = gains_to(picture * weight[..., None], photo)
+    fitted = np.clip(picture * gains, 0, 1).astype(np.float32)
+    return psnr(picture, photo, valid), psnr(fitted, photo, valid), ssim(picture, photo, valid)
 
 
 def _point_rays(view: View, points: SparsePoints) -> tuple[NDArray[np.int64], Array]:

@@ -46,6 +46,8 @@ class BenchCaptures:
     """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views."""
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME; left out, the masks that the data sets have."""
     keep_poses: Flag = False
     """Train on poses as they are, even where they are folded; else those are found anew."""
     room_size: int | None = None
@@ -144,7 +146,7 @@ class BenchCaptures:
                         size=self.room_size,
                         progress=lambda i, n: move(i, n, f"{i}/{n}"),
                     )
-        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout)
+        dataset = load_dataset(path, downscale=self.downscale, holdout=self.holdout, masks=self.masks)
         if not self.keep_poses and name not in CAPTURES:
             anew = folder / f"{dataset.name}-{digest([str(real_path(dataset.path))], ())}.poses"
             dataset = unfolded(dataset, anew, self.downscale)

@@ -26,6 +26,10 @@ class PhotoOptions:
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
 
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME: black pixels are excluded from features, training and
+    figures; left out, the masks that the data set has."""
+
     def load(self, posed_in: Path | None = None, keep_poses: bool = True) -> Dataset:
         """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
 
@@ -33,8 +37,9 @@ class PhotoOptions:
         """
         from cagefield.datasets import load_dataset
 
-        data = self.data if posed_in is None else posed(self.data, posed_in)
-        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout)
+        data = self.data if posed_in is None else posed(self.data, posed_in, self.masks)
+        masks = self.masks if data.expanduser() == self.data.expanduser() else None
+        dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout, masks=masks)
         if posed_in is None or keep_poses or data != self.data.expanduser():
             return dataset
         return unfolded(dataset, posed_in, self.downscale)

@@ -38,6 +38,9 @@ class Poses:
     """Folder of the data set."""
     frames: int = 80
     """How many frames of a video to take: the sharpest, evenly along it."""
+    masks: Path | None = None
+    """Folder of masks, NAME.png for the photo NAME: no features where they are black, no training later; left
+    out, a folder masks beside the photos."""
     overwrite: Flag = False
     """Replace the data set that is there."""
 
@@ -47,7 +50,7 @@ class Poses:
 
         check_number("--frames", self.frames, 3, 10_000)
         check_folder(self.out, self.overwrite, RECORD)
-        print(make(self.photos, self.out, self.frames))
+        print(make(self.photos, self.out, self.frames, self.masks))
         self._warn_of_fold()
         print(f"data set written to {self.out}; next: cagefield train {self.out} -o SCENE")
 
@@ -63,7 +66,7 @@ class Poses:
             )
 
 
-def make(photos: Path, target: Path, frames: int = 80) -> str:
+def make(photos: Path, target: Path, frames: int = 80, masks: Path | None = None) -> str:
     """Writes the data set `target` of photos or a video, with a progress bar; returns lines about it."""
     from cagefield.datasets.poses_work import work_folder
     from cagefield.datasets.structure_from_motion import make_poses
@@ -75,6 +78,7 @@ def make(photos: Path, target: Path, frames: int = 80) -> str:
                 photos.expanduser(),
                 target,
                 frames=frames,
+                masks=masks,
                 on_progress=lambda done, note: move(done, 1.0, note),
             )
     except KeyboardInterrupt:
@@ -84,7 +88,7 @@ def make(photos: Path, target: Path, frames: int = 80) -> str:
     return summary(report, time.monotonic() - start)
 
 
-def posed(photos: Path, target: Path) -> Path:
+def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
     """The data set to be trained on: `photos` itself where it has poses, else made of it in `target`.
 
     A data set that was made of the same photos before is used again.
@@ -96,12 +100,12 @@ def posed(photos: Path, target: Path) -> Path:
     if not has_photos_alone(photos):
         return photos
     recover_folder(real_path(target), lambda folder: (folder / RECORD).is_file())
-    if is_made_of(target, photos):
+    if is_made_of(target, photos, masks=masks):
         print(f"{photos} has no poses; those in {target} were found before")
         return target
     check_folder(target, True, RECORD)
     print(f"{photos} has no poses; finding them first, into {target}", flush=True)
-    print(make(photos, target), flush=True)
+    print(make(photos, target, masks=masks), flush=True)
     return target
 
 

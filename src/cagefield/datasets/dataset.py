@@ -11,6 +11,7 @@ import numpy as np
 from cagefield.datasets.capture_programs import LAYOUTS, Reader, program_of_file, program_of_folder
 from cagefield.datasets.colmap import MODEL_FILES, find_model, load_colmap
 from cagefield.datasets.llff import POSES_FILE, load_llff
+from cagefield.datasets.mask_files import with_masks
 from cagefield.datasets.photos import report_conversions
 from cagefield.datasets.raw_photos import find_raw_photos, is_video
 from cagefield.datasets.transforms import camera_file, load_transforms
@@ -22,7 +23,9 @@ __all__ = ["Dataset", "View", "has_photos_alone", "load_dataset"]
 _LOOKED_FOR = ("transforms.json", "transforms_train.json")
 
 
-def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int = 8) -> Dataset:
+def load_dataset(
+    path: str | Path, *, downscale: int | None = None, holdout: int = 8, masks: Path | None = None
+) -> Dataset:
     """The data set at `path`: a folder, or the file in it that describes the cameras.
 
     The first of these that a folder has is read: transforms_train.json (NeRF-synthetic), transforms.json
@@ -33,12 +36,18 @@ def load_dataset(path: str | Path, *, downscale: int | None = None, holdout: int
     `downscale` shrinks the photos by that factor; None takes the smallest power of two that brings the longer
     side to 800 pixels or less. Test views are those that the files give, else every `holdout`-th, sorted by
     name, from the first on; 0 holds none out. Frames whose photo is missing are left out with one warning.
+    Masks are those of the folder `masks`, else those beside the photos (see `mask_files`).
 
     Raises DatasetError, with file, key and cure, for anything that cannot be read, and for a `holdout` of
     1 or below 0, whether there is a test split or not.
     """
     check_holdout(holdout)
     path = Path(path).expanduser()
+    return with_masks(_load(path, downscale, holdout), masks)
+
+
+def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
+    """The data set without masks beside its photos."""
     with _sensible_poses(path):
         read, place = _reader_of(path)
         dataset = read(place, downscale, holdout)

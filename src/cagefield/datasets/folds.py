@@ -19,6 +19,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from cagefield.cameras import Camera
+from cagefield.datasets.masks import shrink_mask
 from cagefield.datasets.views import Dataset, View
 
 FloatArray = npt.NDArray[np.float64]
@@ -110,20 +111,32 @@ def contradicting(pairs: Sequence[tuple[int, int]], alike: FloatArray, count: in
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """A small grey picture [H,W] of a photo, its camera, and the least and the usual depth in it."""
+    """A small grey picture [H,W] of a photo, its camera, and the least and the usual depth in it.
+
+    `valid` [H,W]: pixels in whose window no mask excludes one.
+    """
 
     grey: FloatArray
     camera: Camera
     near: float
     middle: float
+    valid: npt.NDArray[np.bool_]
 
     @classmethod
     def of(cls, view: View, near: float, middle: float) -> _Picture:
         pixels = view.load()[..., :3].mean(axis=2) / 255.0
         factor = max(1, max(pixels.shape) // SIDE)
         height, width = pixels.shape[0] // factor, pixels.shape[1] // factor
+        mask = view.valid_pixels()
+        valid = shrink_mask(np.ones(pixels.shape, bool) if mask is None else mask, factor)
         blocks = pixels[: height * factor, : width * factor].reshape(height, factor, width, factor)
-        return cls(blocks.mean(axis=(1, 3)), view.camera.downscaled(factor), near, middle)
+        return cls(
+            blocks.mean(axis=(1, 3)),
+            view.camera.downscaled(factor),
+            near,
+            middle,
+            ndimage.minimum_filter(valid, _WINDOW),
+        )
 
 
 def _depths(dataset: Dataset, camera: Camera) -> tuple[float, float]:
@@ -168,6 +181,8 @@ def likeness(one: _Picture, other: _Picture) -> float:
         pixels, depth = other.camera.project(camera.origin + directions / inverse)
         with np.errstate(invalid="ignore"):
             inside = (pixels >= 0).all(axis=1) & (pixels < other.grey.shape[::-1]).all(axis=1) & (depth > 0)
+        columns, rows = np.where(inside[:, None], pixels, 0.0).astype(np.intp).T
+        inside &= other.valid[rows, columns]
         at = np.where(inside[:, None], pixels, 0.0) - 0.5
         whole = ndimage.minimum_filter(inside.reshape(height, width), _WINDOW)
         for k, grey in enumerate(pictures):
@@ -177,7 +192,7 @@ def likeness(one: _Picture, other: _Picture) -> float:
             product = variance * np.maximum(_mean(seen**2) - its_mean**2, 0.0)
             correlation = (_mean(one.grey * seen) - mean * its_mean) / np.sqrt(np.maximum(product, 1e-10))
             best[k] = np.maximum(best[k], np.where(whole, correlation, -1.0))
-    textured = (best[0] > -1.0) & (variance > _CONTRAST**2)
+    textured = one.valid & (best[0] > -1.0) & (variance > _CONTRAST**2)
     if textured.sum() < _LEAST_PIXELS:
         return float("nan")
     found, chance = (best[:, textured] > _CORRELATED).mean(axis=1)

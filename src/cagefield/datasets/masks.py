@@ -35,11 +35,20 @@ def read_mask(path: Path, excluded: Excluded) -> BoolArray:
 def resample_mask(valid: BoolArray, width: int, height: int, path: Path) -> BoolArray:
     """The mask [height,width] by nearest neighbors.
 
-    Raises DatasetError where its aspect differs by more than rounding of the smaller size to whole pixels.
+    Raises DatasetError where its aspect differs; see `check_aspect`.
     """
+    check_aspect(valid, width, height, path)
     mask_height, mask_width = valid.shape
     if (mask_width, mask_height) == (width, height):
         return valid
+    rows = ((np.arange(height) + 0.5) * mask_height / height).astype(np.intp)
+    columns = ((np.arange(width) + 0.5) * mask_width / width).astype(np.intp)
+    return valid[rows[:, None], columns]
+
+
+def check_aspect(valid: BoolArray, width: int, height: int, path: Path) -> None:
+    """Raises DatasetError where the mask has another aspect than its photo, by more than rounding."""
+    mask_height, mask_width = valid.shape
     across, down = width / mask_width, height / mask_height
     if abs(width - down * mask_width) > max(1.0, down) and abs(height - across * mask_height) > max(
         1.0, across
@@ -48,9 +57,6 @@ def resample_mask(valid: BoolArray, width: int, height: int, path: Path) -> Bool
             f"{path}: the mask is {mask_width}x{mask_height}, its photo {width}x{height}; make a mask of the "
             "photo's size or aspect"
         )
-    rows = ((np.arange(height) + 0.5) * mask_height / height).astype(np.intp)
-    columns = ((np.arange(width) + 0.5) * mask_width / width).astype(np.intp)
-    return valid[rows[:, None], columns]
 
 
 def shrink_mask(valid: BoolArray, factor: int) -> BoolArray:

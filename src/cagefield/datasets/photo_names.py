@@ -17,13 +17,11 @@ from functools import cached_property
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
+from cagefield.datasets.hidden_files import is_hidden
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import EXTENSIONS, find_photo
 from cagefield.datasets.raw_photos import OTHER_PHOTOS
 from cagefield.datasets.views import named
-
-SYSTEM_NAMES = frozenset({"__macosx", "@eadir", "thumbs.db", "desktop.ini"})
-"""Files and folders, in lower case, that systems put beside photos; those with a leading dot are too."""
 
 MAX_DEPTH = 6
 """Folders below a data set in which photos are looked for."""
@@ -33,11 +31,6 @@ MAX_FILES = 200_000
 _LONGEST = 4096  # characters of a name
 _PICTURES = frozenset({*EXTENSIONS, *OTHER_PHOTOS})
 _SECONDARY = ("mask", "depth", "normal", "thumb", "images_", "dynamic_mask")  # beginnings of folders' names
-
-
-def is_hidden(parts: Iterable[str]) -> bool:
-    """Whether one of these names of files and folders is hidden or the system's."""
-    return any((part.startswith(".") and part != "..") or part.lower() in SYSTEM_NAMES for part in parts)
 
 
 def view_name(name: str) -> str:
@@ -129,15 +122,15 @@ def _exact(base: Path, name: str) -> Path | None:
     return None
 
 
-def _key(part: str) -> str:
+def name_key(part: str) -> str:
     """A part of a name as parts are compared: composed, without case."""
     return unicodedata.normalize("NFC", part).casefold()
 
 
-def _stem_key(name: str) -> str:
+def stem_key(name: str) -> str:
     """The key of a file's name without its image extension."""
     stem, extension = os.path.splitext(name)
-    return _key(stem if extension.lower() in _PICTURES else name)
+    return name_key(stem if extension.lower() in _PICTURES else name)
 
 
 class _Tree:
@@ -150,16 +143,16 @@ class _Tree:
     def _by_stem(self) -> dict[str, list[tuple[str, ...]]]:
         """Parts of the paths below the folder, by the key of the stem."""
         index: dict[str, list[tuple[str, ...]]] = defaultdict(list)
-        for count, parts in enumerate(_walk(self._base)):
+        for count, parts in enumerate(picture_tree(self._base)):
             if count >= MAX_FILES:
                 break
-            index[_stem_key(parts[-1])].append(parts)
+            index[stem_key(parts[-1])].append(parts)
         return index
 
     @cached_property
     def _folders(self) -> set[tuple[str, ...]]:
         return {
-            tuple(map(_key, parts[:length]))
+            tuple(map(name_key, parts[:length]))
             for paths in self._by_stem.values()
             for parts in paths
             for length in range(1, len(parts))
@@ -174,9 +167,9 @@ class _Tree:
         parts = tuple(part for part in PurePosixPath(text).parts if part not in ("/", ".."))
         if not parts:
             return [], False
-        folder = tuple(map(_key, parts[:-1]))
-        same = self._by_stem.get(_stem_key(parts[-1]), [])
-        here = [one for one in same if tuple(map(_key, one[:-1])) == folder]
+        folder = tuple(map(name_key, parts[:-1]))
+        same = self._by_stem.get(stem_key(parts[-1]), [])
+        here = [one for one in same if tuple(map(name_key, one[:-1])) == folder]
         if here or (folder and folder in self._folders):
             return self._paths(_preferred(here, parts[-1])), False
         lengths = [_common_end(one[:-1], parts[:-1]) for one in same]
@@ -204,14 +197,14 @@ def _common_end(one: Sequence[str], other: Sequence[str]) -> int:
     """How many last parts two paths share."""
     count = 0
     for first, second in zip(reversed(one), reversed(other), strict=False):
-        if _key(first) != _key(second):
+        if name_key(first) != name_key(second):
             break
         count += 1
     return count
 
 
-def _walk(base: Path) -> Iterator[tuple[str, ...]]:
-    """The parts of the paths of photos below a folder, in order."""
+def picture_tree(base: Path) -> Iterator[tuple[str, ...]]:
+    """The parts of the paths of pictures below a folder, in order, without hidden ones."""
     for folder, folders, files in os.walk(base, followlinks=True):
         parts = Path(os.path.relpath(folder, base)).parts
         folders[:] = (

@@ -24,7 +24,8 @@ from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import DatasetError
 from cagefield.leftovers import remove_unfinished
 from cagefield.npz import read_arrays
-from cagefield.regular_files import open_regular
+from cagefield.regular_files import open_regular, read_bytes
+from cagefield.rendering.images import MOST_BYTES
 
 FloatArray = npt.NDArray[np.float64]
 Views = Literal["train", "all"]
@@ -162,20 +163,23 @@ class _Photos:
 
     def __init__(self, dataset: Dataset) -> None:
         step = max(1, -(-len(dataset.train) // _PHOTOS))
-        self._views = [(view.camera, view.load()) for view in dataset.train[::step]]
+        self._views = [(view.camera, view.load(), view.valid_pixels()) for view in dataset.train[::step]]
 
     def look(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
         """How many photos see each point, 0 where one shows it as empty, and their mean colour [N,3]."""
         seen = np.zeros(len(points), dtype=np.intp)
         empty = np.zeros(len(points), dtype=bool)
         summed = np.zeros((len(points), 3))
-        for camera, pixels in self._views:
+        for camera, pixels, valid in self._views:
             positions, depth = camera.project(points)
             with np.errstate(invalid="ignore"):
                 inside = np.all((positions >= 0) & (positions < (camera.width, camera.height)), axis=1)
             inside &= depth > 0 if camera.model != "opencv_fisheye" else np.isfinite(depth)
             rows = np.flatnonzero(inside)
             columns, lines = positions[rows].astype(np.intp).T
+            if valid is not None:
+                usable = valid[lines, columns]
+                rows, columns, lines = rows[usable], columns[usable], lines[usable]
             found = pixels[lines, columns]
             if found.shape[1] == 4:
                 empty[rows] |= found[:, 3] < _LEAST_OPAQUE
@@ -197,6 +201,10 @@ def _key(views: tuple[View, ...], seed: int) -> str:
         header = read_header(view.image_path)
         camera = repr((view.name, view.camera.to_dict(), view.downscale, header))
         digest.update(camera.encode())
+        if view.source is not None:
+            digest.update(repr(view.source).encode())
+        if view.mask is not None:
+            digest.update(view.mask.excluded.encode() + read_bytes(view.mask.path, MOST_BYTES))
         with open_regular(view.image_path) as stream:
             digest.update(stream.read(_SAMPLE))
             size = stream.seek(0, os.SEEK_END)

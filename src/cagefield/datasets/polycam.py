@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from cagefield.datasets.hidden_files import is_hidden
 from cagefield.datasets.notices import warn
 from cagefield.datasets.numbers_read import as_number, as_numbers, as_size
-from cagefield.datasets.photo_names import is_hidden
 from cagefield.datasets.program_captures import Frame, ProgramCapture, brown_lens, program_dataset
 from cagefield.datasets.program_json import read_object
 from cagefield.datasets.views import Dataset

@@ -16,12 +16,13 @@ from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from PIL import Image
+from PIL import Image, ImageChops
 
 from cagefield import json_text
 from cagefield.atomic_files import replaced_file, replaced_folder
 from cagefield.datasets.colmap_process import StoppedError
 from cagefield.datasets.features import OnProgress
+from cagefield.datasets.raw_masks import VALID_FOLDER, RawMasks
 from cagefield.datasets.raw_photos import RawPhoto, find_raw_photos, is_video, upright, video_frames
 from cagefield.errors import DatasetError, line_of
 from cagefield.leftovers import hidden_name, remove_leftovers
@@ -115,18 +116,20 @@ def kept_work(work: Path) -> Iterator[None]:
 
 
 def work_photos(
-    source: Path, work: Path, frames: int, on_progress: OnProgress
+    source: Path, work: Path, frames: int, on_progress: OnProgress, masks: Path | None = None
 ) -> tuple[list[RawPhoto], dict[str, str]]:
     """The upright photos in the work folder, and those that cannot be read with the reason.
 
-    Where the list of them is damaged they are read again; features and matches stay if there are as many.
+    Masks of them are written there too, upright (see `raw_masks`). Where the list of photos is damaged they
+    are read again; features and matches stay if there are as many.
     """
     note = work / "photos.json"
     if note.is_file():
         known = _known_photos(note, work / "images")
         if known is not None:
             return known
-    shutil.rmtree(work / "images", ignore_errors=True)
+    for name in ("images", VALID_FOLDER):
+        shutil.rmtree(work / name, ignore_errors=True)
     if source.is_file():
         base = work / "frames"
         shutil.rmtree(base, ignore_errors=True)
@@ -135,10 +138,13 @@ def work_photos(
         base = _base(source)
         files = find_raw_photos(base)
     photos, unreadable = [], {}
+    valid = RawMasks.of(base, [file.relative_to(base).as_posix() for file in files], masks)
     for index, file in enumerate(files, start=1):
         name = file.relative_to(base).as_posix()
         try:
-            photos.append(upright(file, name, work / "images"))
+            photo = upright(file, name, work / "images")
+            valid.write(name, file, photo, work / VALID_FOLDER)
+            photos.append(photo)
         except DatasetError as error:
             unreadable[name] = str(error).removeprefix(f"{file}: ")
         on_progress(index / len(files), f"{index} of {len(files)} photos read")
@@ -185,7 +191,7 @@ def _remove_features(work: Path) -> None:
 
 
 def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
-    """Plain names of the photos for COLMAP, in the folder `colmap`; masks of cut-outs in `masks`.
+    """Plain names of the photos for COLMAP, in the folder `colmap`; masks in `masks`, of cut-outs too.
 
     COLMAP's lists of pairs hold no names with spaces, and it does not read every format.
     """
@@ -198,6 +204,10 @@ def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
         names.append(name)
         if (folder / name).exists():
             continue
+        valid = work / VALID_FOLDER / f"{photo.name}.png"
+        if valid.is_file() and not photo.alpha:
+            (work / "masks").mkdir(exist_ok=True)
+            shutil.copyfile(valid, work / "masks" / f"{name}.png")
         if simple:
             try:
                 os.link(photo.path, folder / name)
@@ -209,6 +219,9 @@ def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
             pixels = image.convert("RGBA")
         if photo.alpha:
             mask = pixels.getchannel("A").point(lambda value: 255 if value > 127 else 0)
+            if valid.is_file():
+                with Image.open(valid) as used:
+                    mask = ImageChops.darker(mask, used.convert("L"))
             (work / "masks").mkdir(exist_ok=True)
             mask.save(work / "masks" / f"{name}.png")
         grey = Image.new("RGBA", pixels.size, (127, 127, 127, 255))
@@ -217,8 +230,8 @@ def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
     return names
 
 
-def record_of(source: Path, frames: int) -> dict[str, Any]:
-    """What tells one set of photos from another: names, sizes in bytes, times of change."""
+def record_of(source: Path, frames: int, masks: Path | None = None) -> dict[str, Any]:
+    """What tells one set of photos from another: names, sizes in bytes, times of change; digest of masks."""
     if not source.exists():
         raise DatasetError(f"{source} does not exist; give a folder of photos or a video")
     if source.is_file() and not is_video(source):
@@ -230,7 +243,9 @@ def record_of(source: Path, frames: int) -> dict[str, Any]:
     if not files:
         raise DatasetError(f"{base}: no photos in it; give a folder of photos or a video")
     listing = [[f.relative_to(base).as_posix(), f.stat().st_size, f.stat().st_mtime_ns] for f in files]
-    return {"version": _VERSION, "files": listing, **({"frames": frames} if source.is_file() else {})}
+    record = {"version": _VERSION, "files": listing, **({"frames": frames} if source.is_file() else {})}
+    digest = RawMasks.of(base, [str(name) for name, *_ in listing], masks, quiet=True).digest()
+    return {**record, "masks": digest} if digest else record
 
 
 def _base(source: Path) -> Path:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from PIL import Image, ImageOps
 from scipy.ndimage import laplace
 
+from cagefield.datasets.hidden_files import MASK_FOLDER, is_hidden
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
 from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
@@ -55,14 +56,15 @@ def is_video(path: Path) -> bool:
 
 
 def find_raw_photos(folder: Path) -> list[Path]:
-    """The photos in a folder and below, by name; hidden files and folders are left out."""
+    """The photos in a folder and below, by name; hidden files and folders and masks are left out."""
     known = {*EXTENSIONS, *OTHER_PHOTOS}
     found = [
         file
         for file in folder.rglob("*")
         if file.suffix.lower() in known
         and file.is_file()
-        and not any(part.startswith(".") for part in file.relative_to(folder).parts)
+        and not is_hidden(file.relative_to(folder).parts)
+        and not any(MASK_FOLDER.fullmatch(part) for part in file.relative_to(folder).parts[:-1])
     ]
     return sorted(found, key=lambda file: file.relative_to(folder).as_posix())
 

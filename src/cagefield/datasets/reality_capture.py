@@ -25,9 +25,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from cagefield.datasets.hidden_files import is_hidden
 from cagefield.datasets.notices import warn
 from cagefield.datasets.numbers_read import as_number, as_numbers
-from cagefield.datasets.photo_names import is_hidden
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.datasets.program_captures import (
     OPENCV_AXES,

@@ -1,7 +1,8 @@
 """A data set of photos alone, or of a video: COLMAP's structure from motion, by pycolmap, on the CPU.
 
 The result is a folder in COLMAP's layout, which `load_dataset` reads: `images`, the photos that found their
-place, turned upright; `sparse/0`, the model; `poses.json`, what it was made of, and why photos were left out.
+place, turned upright, and their `masks`; `sparse/0`, the model; `poses.json`, what it was made of, and why
+photos were left out.
 
 Everything on the way is in a work folder beside it (`NAME.work`: photos, and the database of features and
 matches), from which an interrupted run continues; it is removed at the end.
@@ -35,6 +36,7 @@ from cagefield.datasets.poses_work import (
     work_folder,
     work_photos,
 )
+from cagefield.datasets.raw_masks import VALID_FOLDER
 from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.errors import DatasetError
 from cagefield.regular_files import read_text
@@ -79,22 +81,25 @@ def make_poses(
     target: Path,
     *,
     frames: int = 80,
+    masks: Path | None = None,
     seed: int = 0,
     on_progress: OnProgress | None = None,
 ) -> PosesReport:
     """Writes the data set `target` of a folder of photos or a video; replaces what is there.
 
     An interrupted run of the same photos continues from its work folder. `frames` are taken of a video.
+    Where masks exclude (those of the folder `masks`, else those beside the photos) there are no features; the
+    data set has them too.
 
     Raises DatasetError where pycolmap is missing, where fewer than three photos find their place, and where
     the disk is full: `target` is what it was, and the work folder stays.
     """
     features.engine()
-    record = record_of(source, frames)
+    record = record_of(source, frames, masks)
     recover_folder(target, lambda folder: (folder / RECORD).is_file())
     work = work_folder(target)
     with kept_work(work):
-        report = _made(source, target, record, frames, seed, on_progress)
+        report = _made(source, target, record, frames, masks, seed, on_progress)
     remove_work(work)
     features.share(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
     return report
@@ -105,12 +110,13 @@ def _made(
     target: Path,
     record: Mapping[str, Any],
     frames: int,
+    masks: Path | None,
     seed: int,
     on_progress: OnProgress | None,
 ) -> PosesReport:
     work = work_folder(target)
     prepare_work(work, record)
-    photos, unreadable = work_photos(source, work, frames, features.share(on_progress, 0.0, 0.1))
+    photos, unreadable = work_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
     total = len(photos) + len(unreadable)
     if len(photos) < 3:
         reasons = "".join(f"; {name}: {reason}" for name, reason in list(unreadable.items())[:3])
@@ -122,14 +128,14 @@ def _made(
     check_database(database, cameras, listed)
     if not database.is_file():
         features.create_database(database, cameras, listed)
-    masks = work / "masks"
+    plain_masks = work / "masks"
     features.extract(
         database,
         work / "colmap",
         names,
         features=8192 if len(photos) <= 60 else 4096,
         longer_side=LONGER_SIDE,
-        masks=masks if masks.is_dir() else None,
+        masks=plain_masks if plain_masks.is_dir() else None,
         on_progress=features.share(on_progress, 0.1, 0.3),
     )
     few = len(photos) <= MOST_FOR_ALL_PAIRS
@@ -156,13 +162,13 @@ def _made(
     return report
 
 
-def is_made_of(target: Path, source: Path, frames: int = 80) -> bool:
+def is_made_of(target: Path, source: Path, frames: int = 80, masks: Path | None = None) -> bool:
     """Whether the data set `target` was made of these photos, none of them changed since."""
     try:
         known = json_text.loads(read_text(target / RECORD))
     except (OSError, ValueError):
         return False
-    return isinstance(known, dict) and known.get("made_of") == record_of(source, frames)
+    return isinstance(known, dict) and known.get("made_of") == record_of(source, frames, masks)
 
 
 def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
@@ -261,15 +267,13 @@ def _write(
         model.image(index + 1).name = photos[index].name
     for image_id in [number for number in model.images if number - 1 not in placed]:
         del model.images[image_id]
-    with replaced_folder(target, ("images", "sparse", RECORD)) as draft:
+    with replaced_folder(target, ("images", "masks", "sparse", RECORD)) as draft:
         for index in sorted(placed):
             photo = photos[index]
-            place = draft / "images" / photo.name
-            place.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                os.link(photo.path, place)
-            except OSError:
-                shutil.copy2(photo.path, place)
+            _link(photo.path, draft / "images" / photo.name)
+            mask = work_folder(target) / VALID_FOLDER / f"{photo.name}.png"
+            if mask.is_file():
+                _link(mask, draft / "masks" / f"{photo.name}.png")
         (draft / "sparse/0").mkdir(parents=True)
         _write_model(model, draft / "sparse/0")
         summary = {
@@ -281,6 +285,15 @@ def _write(
             "left_out": dict(report.left_out),
         }
         (draft / RECORD).write_text(json.dumps(summary, indent=1), encoding="utf-8")
+
+
+def _link(file: Path, place: Path) -> None:
+    """Puts a file at another place too."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, place)
+    except OSError:
+        shutil.copy2(file, place)
 
 
 def _write_model(model: Any, folder: Path) -> None:

@@ -26,7 +26,6 @@ from cagefield.cameras import Camera
 from cagefield.datasets import features
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.matching import match
-from cagefield.datasets.photos import read_photo
 from cagefield.datasets.views import SparsePoints, View
 from cagefield.temporary_folders import TemporaryFolder
 
@@ -145,41 +144,27 @@ def nearest_pairs(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
 
 
 def _shrink(view: View, folder: Path, name: str) -> _Shrunk:
-    """The photo, shrunk, in `folder`/images; its mask in `folder`/masks where it is a cut-out."""
-    pixels = read_photo(view.image_path)
+    """The photo, shrunk, in `folder`/images; its mask in `folder`/masks where it is a cut-out or masked."""
+    whole = view.whole()
+    pixels, valid = whole.load(), whole.valid_pixels()
     height, width = pixels.shape[:2]
-    whole = _whole_camera(view, width, height)
     scale = min(1.0, LONGER_SIDE / max(width, height))
     size = max(1, round(width * scale)), max(1, round(height * scale))
+    used = np.ones((height, width), bool) if valid is None else valid
     if pixels.shape[2] == 4:
-        opaque = pixels[..., 3] > 127
-        if not opaque.all():
-            mask = Image.fromarray(opaque).convert("L").resize(size, Image.Resampling.BOX)
-            inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE, border_value=True)
-            Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(folder / "masks" / f"{name}.png")
+        used = used & (pixels[..., 3] > 127)
+    if not used.all():
+        mask = Image.fromarray(used).convert("L").resize(size, Image.Resampling.BOX)
+        inside = binary_erosion(np.asarray(mask) > 127, iterations=_EDGE, border_value=True)
+        Image.fromarray(np.where(inside, 255, 0).astype(np.uint8)).save(folder / "masks" / f"{name}.png")
+    if pixels.shape[2] == 4:
         alpha = pixels[..., 3:].astype(np.float32) / 255.0
         pixels = np.rint(pixels[..., :3] * alpha + 127.0 * (1.0 - alpha)).astype(np.uint8)
     picture = Image.fromarray(pixels)
     if picture.size != size:
         picture = picture.resize(size, Image.Resampling.BOX)
     picture.save(folder / "images" / name, compress_level=1)
-    return _Shrunk(view, whole.resized(*size), size[0] / width, np.asarray(picture))
-
-
-def _whole_camera(view: View, width: int, height: int) -> Camera:
-    """The camera of the whole photo of `width` x `height` pixels, of which `view` is a shrunk one."""
-    camera, factor = view.camera, view.downscale
-    return Camera(
-        camera.c2w,
-        width,
-        height,
-        camera.fx * factor,
-        camera.fy * factor,
-        camera.cx * factor,
-        camera.cy * factor,
-        camera.model,
-        camera.distortion,
-    )
+    return _Shrunk(view, whole.camera.resized(*size), size[0] / width, np.asarray(picture))
 
 
 def _normalisation(cameras: Sequence[Camera]) -> tuple[FloatArray, float]:

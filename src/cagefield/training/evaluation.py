@@ -13,6 +13,7 @@ from cagefield.rendering.metrics import WINDOW, psnr, ssim
 def evaluate_views(field: VoxelField | SplatField, views: tuple[View, ...]) -> tuple[float, float]:
     """(PSNR, SSIM) of the field's pictures against photos, means over views; alpha is composited on white.
 
+    Of photos with masks over the valid pixels.
     SSIM is of the photos that its window fits in; NaN where it fits in none.
     """
     from cagefield.rendering.renderers import renderer_of
@@ -28,7 +29,14 @@ def evaluate_views(field: VoxelField | SplatField, views: tuple[View, ...]) -> t
             frame = renderer.render(view.camera, background="black")
         if frame is not None:
             rgb = np.clip(frame.rgb, 0.0, 1.0)
-            ratios.append(psnr(rgb, photo))
+            valid = view.valid_pixels()
+            ratios.append(psnr(rgb, photo, valid))
             if min(photo.shape[:2]) >= WINDOW:
-                similarities.append(ssim(rgb, photo))
-    return float(np.mean(ratios)), float(np.mean(similarities)) if similarities else float("nan")
+                similarities.append(ssim(rgb, photo, valid))
+    return _mean(ratios), _mean(similarities)
+
+
+def _mean(figures: list[float]) -> float:
+    """The mean of the figures that are numbers; NaN of none."""
+    known = [figure for figure in figures if figure == figure]
+    return float(np.mean(known)) if known else float("nan")

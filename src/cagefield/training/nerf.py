@@ -79,9 +79,14 @@ def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500)
         step = max(1, round((camera.width * camera.height / pixels) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
         chosen = np.stack([i.ravel(), j.ravel()], axis=1)
+        valid = view.valid_pixels()
+        if valid is not None:
+            chosen = chosen[valid[chosen[:, 1], chosen[:, 0]]]
+        if not len(chosen):
+            continue
         rgb, opacity, _ = trace(field.torch, Rays.of(camera, field.torch.device, chosen))
         behind = 1.0 if view.load().shape[2] == 4 else 0.0
         picture = rgb.cpu().numpy() + behind * (1.0 - opacity.cpu().numpy()[:, None])
-        error = np.mean((np.clip(picture, 0, 1) - colours[j.ravel(), i.ravel()]) ** 2)
+        error = np.mean((np.clip(picture, 0, 1) - colours[chosen[:, 1], chosen[:, 0]]) ** 2)
         scores.append(-10.0 * np.log10(max(float(error), 1e-10)))
     return float(np.mean(scores)) if scores else float("nan")

@@ -86,6 +86,7 @@ class NerfRun:
         self.torch = TorchNerf(self.start, self.device, trainable=True)
         self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)
         self.photos = [torch.from_numpy(composited(view)).to(self.device) for view in dataset.train]
+        self.drawn = [_drawn_pixels(view) for view in dataset.train]
         self.white = dataset.train[0].load().shape[2] == 4
         self.step, self.seconds, self.loss = 0, 0.0, float("nan")
 
@@ -136,8 +137,16 @@ class NerfRun:
         camera: Camera = self.dataset.train[number].camera
         columns, rows = camera.width, camera.height
         low_i, low_j = (columns // 4, rows // 4) if middle else (0, 0)
-        i = chance.integers(low_i, columns - low_i, count)
-        j = chance.integers(low_j, rows - low_j, count)
+        drawn = self.drawn[number]
+        if drawn is None:
+            i = chance.integers(low_i, columns - low_i, count)
+            j = chance.integers(low_j, rows - low_j, count)
+        else:
+            within = (np.abs(drawn - (0.5 * columns, 0.5 * rows)) <= (0.25 * columns, 0.25 * rows)).all(
+                axis=1
+            )
+            some = drawn[within] if middle and within.any() else drawn
+            i, j = some[chance.integers(0, len(some), count)].T
         target = self.photos[number][torch.from_numpy(j).to(self.device), torch.from_numpy(i).to(self.device)]
         return Rays.of(camera, self.device, np.stack([i, j], axis=1)), target
 
@@ -258,6 +267,12 @@ def initial_network(config: NerfConfig, chance: np.random.Generator, box: NDArra
     fog = FOG / float(np.mean(box[1] - box[0]))
     weight, bias = drawn.density.weight, drawn.density.bias
     return dataclasses.replace(drawn, density=Linear(weight, bias + np.float32(fog - float(median))))
+
+
+def _drawn_pixels(view: View) -> NDArray[np.int64] | None:
+    """(column, row) [N,2] of the pixels that the mask of a photo leaves; None where they are all."""
+    valid = view.valid_pixels()
+    return None if valid is None else np.argwhere(valid)[:, ::-1]
 
 
 def composited(view: View) -> NDArray[np.float32]:

@@ -31,6 +31,8 @@ class Photos:
         poses: device [V, 12] float32, first three rows of c2w.
         directions: device [sum of distinct W*H, 3] float32 unit camera-space directions.
         pixels: device [sum W*H, 4] uint8 straight RGBA.
+        valid: [sum W*H] bool, pixels that may be used; None where all may. valid_args: the same as kernels
+            take it, a single 1 without.
         has_alpha: True when any photo has a transparent pixel.
     """
 
@@ -40,6 +42,8 @@ class Photos:
     poses: Any
     directions: Any
     pixels: Any
+    valid: NDArray[np.bool_] | None
+    valid_args: Any
     has_alpha: bool
 
     @classmethod
@@ -58,6 +62,7 @@ class Photos:
         direction_at: dict[int, int] = {}
         directions: list[NDArray[np.float32]] = []
         pixels = []
+        masks = []
         n_pixels = n_directions = 0
         for i, view in enumerate(views):
             camera = view.camera
@@ -72,8 +77,11 @@ class Photos:
             table[i] = n_pixels, camera.width, direction_at[id(local)], camera.height
             poses[i] = camera.c2w[:3].reshape(-1)
             pixels.append(image.reshape(-1, 4))
+            valid = view.valid_pixels()
+            masks.append(np.ones(len(pixels[-1]), bool) if valid is None else valid.ravel())
             n_pixels += camera.width * camera.height
-        flat = np.concatenate(pixels)
+        flat, mask = np.concatenate(pixels), np.concatenate(masks)
+        masked = not mask.all()
         return cls(
             names=tuple(v.name for v in views),
             sizes=table[:, [1, 3]].astype(np.int64),
@@ -81,19 +89,39 @@ class Photos:
             poses=to_device(poses),
             directions=to_device(np.concatenate(directions)),
             pixels=to_device(flat),
-            has_alpha=bool((flat[:, 3] < 255).any()),
+            valid=mask if masked else None,
+            valid_args=to_device(mask.astype(np.uint8) if masked else np.ones(1, np.uint8)),
+            has_alpha=bool((flat[mask, 3] < 255).any()),
         )
 
     def args(self, gains: Any) -> PhotoArgs:
         """The photos as kernels take them, with a gain [V,3] (on the device) for each."""
         from cagefield.training.kernels.photos import PhotoArgs
 
-        return PhotoArgs(self.views, self.poses, gains, self.directions, self.pixels)
+        return PhotoArgs(
+            self.views,
+            self.poses,
+            gains,
+            self.directions,
+            self.pixels,
+            self.valid_args,
+            int(self.valid is not None),
+        )
 
     def patches(self, size: int) -> NDArray[np.int32]:
-        """All patches [P, 3] (view, first column, first row) of size x size pixels; they tile each photo."""
+        """Patches [P, 3] (view, first column, first row) of size x size pixels that tile the photos.
+
+        Those without a valid pixel are left out.
+        """
         found = []
+        first = 0
         for view, (width, height) in enumerate(self.sizes):
             row, column = np.meshgrid(np.arange(0, height, size), np.arange(0, width, size), indexing="ij")
-            found.append(np.stack([np.full(row.size, view), column.ravel(), row.ravel()], axis=1))
+            tiles = np.stack([np.full(row.size, view), column.ravel(), row.ravel()], axis=1)
+            if self.valid is not None:
+                valid = self.valid[first : first + width * height].reshape(height, width)
+                whole = np.pad(valid, ((0, -height % size), (0, -width % size)))
+                tiles = tiles[whole.reshape(len(row), size, -1, size).any(axis=(1, 3)).ravel()]
+            first += width * height
+            found.append(tiles)
         return np.concatenate(found).astype(np.int32)

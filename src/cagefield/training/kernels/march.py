@@ -147,7 +147,11 @@ def march_batch(
                 loss.penalties[ray] = 0.0
                 for a in qd.static(range(6)):
                     loss.gain_sums[6 * ray + a] = 0.0
+                drawn = 0
                 if row < photos.views[4 * view + 3] and column < width:
+                    if photos.valid[(first + pixel) * photos.masked] > 0:
+                        drawn = 1
+                if drawn == 1:
                     m = 12 * view
                     at = 3 * (photos.views[4 * view + 2] + pixel)
                     l = vec3(photos.directions[at], photos.directions[at + 1], photos.directions[at + 2])

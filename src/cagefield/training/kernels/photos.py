@@ -13,7 +13,8 @@ class PhotoArgs:
     """Posed photos as kernels take them; see `Photos`.
 
     views: [V,4] (first pixel, width, first direction, height). poses: [V,12] rows of c2w. gains: [V,3].
-    directions: camera-space, of the pixels of each kind of camera. pixels: RGBA of all photos.
+    directions: camera-space, of the pixels of each kind of camera. pixels: RGBA of all photos. valid: 0 for
+    pixels that are left out, one value for each where `masked` is 1, else a single 1.
     """
 
     views: I32
@@ -21,6 +22,8 @@ class PhotoArgs:
     gains: F32
     directions: F32
     pixels: U8
+    valid: U8
+    masked: qd.i32
 
 
 @dataclass(frozen=True, eq=False)
