@@ -322,6 +322,19 @@ def test_reality_capture_xmp_files(tmp_path):
     assert not has_photos_alone(tmp_path)
 
 
+def test_xmp_files_without_a_pose_are_named(tmp_path):
+    found = shots()
+    write.xmp(tmp_path, found)
+    file = tmp_path / "IMG_0000.xmp"
+    text = file.read_text()
+    file.write_text(text[: text.index("<xcr:Rotation>")] + text[text.index("<xcr:Position>") :])
+    with pytest.warns(
+        UserWarning, match="1 of 6 photos are left out, they have no pose in their XMP files: IMG_0000"
+    ):
+        dataset = load_dataset(tmp_path)
+    assert [view.name for view in views_of(dataset)] == [f"IMG_{n:04}" for n in range(1, 6)]
+
+
 def test_the_division_model_is_fitted(tmp_path):
     k1 = 0.09
     found = shots(distorted=False)
