@@ -211,6 +211,18 @@ def test_exr_without_colors_and_of_huge_sizes(tmp_path):
         read_header(tmp_path / "huge.exr")
 
 
+def test_damaged_exr_files_are_one_line_and_nothing_else(tmp_path, capfd):
+    noise = np.random.default_rng(0).random((64, 64)).astype(np.float32)
+    write_exr(tmp_path / "a.exr", dict.fromkeys("RGB", noise))
+    content = (tmp_path / "a.exr").read_bytes()
+    for damaged in (content[:100], content[: len(content) // 2], content[:9000] + bytes(50) + content[9050:]):
+        (tmp_path / "a.exr").write_bytes(damaged)
+        with pytest.raises(DatasetError, match=r"a\.exr: ") as caught:
+            read_photo(tmp_path / "a.exr")
+        assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_without_openexr_the_cure_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "OpenEXR", None)
     (tmp_path / "a.exr").write_bytes(b"\x76\x2f\x31\x01" + bytes(100))

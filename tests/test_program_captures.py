@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import program_folders as write
 from cagefield.datasets import Dataset, View, load_dataset
@@ -321,6 +322,19 @@ def test_reality_capture_xmp_files(tmp_path):
     assert not has_photos_alone(tmp_path)
 
 
+def test_xmp_files_without_a_pose_are_named(tmp_path):
+    found = shots()
+    write.xmp(tmp_path, found)
+    file = tmp_path / "IMG_0000.xmp"
+    text = file.read_text()
+    file.write_text(text[: text.index("<xcr:Rotation>")] + text[text.index("<xcr:Position>") :])
+    with pytest.warns(
+        UserWarning, match="1 of 6 photos are left out, they have no pose in their XMP files: IMG_0000"
+    ):
+        dataset = load_dataset(tmp_path)
+    assert [view.name for view in views_of(dataset)] == [f"IMG_{n:04}" for n in range(1, 6)]
+
+
 def test_the_division_model_is_fitted(tmp_path):
     k1 = 0.09
     found = shots(distorted=False)
@@ -466,3 +480,18 @@ def test_every_photo_missing_is_one_error(tmp_path, program):
     with pytest.raises(DatasetError) as caught:
         load_dataset(file)
     assert "\n" not in str(caught.value) and "photo" in str(caught.value)
+
+
+@pytest.mark.parametrize("program", ["metashape", "reality_capture", "meshroom"])
+def test_masks_beside_the_photos_are_found(tmp_path, program):
+    WRITERS[program](tmp_path, shots(distorted=False))
+    mask = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    mask[:10] = 0
+    (tmp_path / "masks").mkdir()
+    for number in range(6):
+        Image.fromarray(mask).save(tmp_path / "masks" / f"IMG_{number:04}.png")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        dataset = load_dataset(tmp_path)
+    for view in views_of(dataset):
+        np.testing.assert_array_equal(view.valid_pixels(), mask > 0)

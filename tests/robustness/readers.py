@@ -7,6 +7,7 @@ from editor_readers import EDITOR_READERS
 from message_readers import MESSAGE_READERS
 from network_readers import NETWORK_READERS
 from poses_readers import POSES_READERS
+from program_readers import PROGRAM_READERS
 from reader_seeds import Reader
 from scene_readers import SCENE_READERS
 from splat_readers import SPLAT_READERS
@@ -16,6 +17,7 @@ READERS: dict[str, Reader] = {
     **SCENE_READERS,
     **NETWORK_READERS,
     **DATASET_READERS,
+    **PROGRAM_READERS,
     **SPLAT_READERS,
     **POSES_READERS,
     **TRAINING_READERS,

@@ -65,6 +65,7 @@ _MATRIX = {
     *(f"r{i}{j}" for i in range(3) for j in range(3)),
 }
 _HEAD = 1 << 12  # bytes in which a CSV file has its columns' names
+_PROBED = 50  # XMP files that are looked at: photos that are not aligned have no pose
 
 
 def is_reality_capture(file: Path) -> bool:
@@ -86,11 +87,18 @@ def find_reality_capture(folder: Path) -> Path | None:
 def find_xmp(folder: Path) -> Path | None:
     """The folder, or its folder of photos, in which XMP files with poses lie beside photos; None else."""
     for place in (folder, folder / "images"):
-        if place.is_dir() and (files := _xmp_files(place)):
-            start = files[0].read_bytes()[:_HEAD] if files[0].stat().st_size < _HEAD << 4 else b""
-            if b"capturingreality" in start and b"Rotation" in start:
-                return place
+        if place.is_dir() and any(_has_pose(file) for file in _xmp_files(place)[:_PROBED]):
+            return place
     return None
+
+
+def _has_pose(file: Path) -> bool:
+    """Whether an XMP file of a usual size has a pose of RealityCapture's."""
+    try:
+        content = read_bytes(file, _HEAD << 4)
+    except OSError:
+        return False
+    return b"capturingreality" in content and b"Rotation" in content
 
 
 def load_reality_capture(file: Path, downscale: int | None, holdout: int) -> Dataset:
@@ -265,7 +273,10 @@ def _division_as_brown(where: str, k1: float, f: float, width: int, height: int)
         raise DatasetError(f"{where}: FocalLength35mm must be positive, got {f:g}")
     corner = 0.5 * float(np.hypot(width, height)) / focal
     radius = _undistorted(k1, corner) * np.sqrt(np.linspace(0.0, 1.0, 400)[1:])
-    wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
+    with np.errstate(all="ignore"):
+        wanted = 1.0 / (1.0 + k1 * radius**2) - 1.0
+    if not np.isfinite(wanted).all() or not radius[-1] > 0:
+        raise DatasetError(f"{where}: its division model (k1 = {k1:g}) makes no sense; export it again")
     powers = (radius / radius[-1])[:, None] ** (2, 4, 6, 8)
     found = np.linalg.lstsq(powers * radius[:, None], wanted * radius, rcond=None)[0]
     error = focal * float(np.abs((powers @ found - wanted) * radius).max())

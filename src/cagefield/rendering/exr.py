@@ -6,7 +6,12 @@ file (OpenEXR, "Technical Introduction"). Pixels of the data window lie in the d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import ctypes
+import io
+import os
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +24,8 @@ from cagefield.typing import UInt8
 
 _MAX_SAMPLES = 400 << 20  # of all the channels of all the parts, which are decoded at once
 _LARGEST_COORDINATE = 1 << 24
+
+_SILENCE = threading.Lock()
 
 Window = tuple[int, int, int, int]
 
@@ -53,9 +60,28 @@ def _read(path: Path, header_only: bool) -> Any:
             f"{path}: EXR photos need OpenEXR; pip install 'cagefield[exr]', or convert them to 16-bit PNG"
         ) from None
     try:
-        return OpenEXR.File(str(path), separate_channels=True, header_only=header_only, num_threads=1)
+        with _SILENCE, _silenced():
+            return OpenEXR.File(str(path), separate_channels=True, header_only=header_only, num_threads=1)
     except Exception as error:  # whatever C++ threw
         raise ValueError(f"OpenEXR: {' '.join(str(error).split())[:160]}") from None
+
+
+@contextlib.contextmanager
+def _silenced() -> Iterator[None]:
+    """Discards what OpenEXR writes of damaged files to Python's output and, from C++, to the process's."""
+    kept = [os.dup(number) for number in (1, 2)]
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            for number in (1, 2):
+                os.dup2(nowhere.fileno(), number)
+            with contextlib.redirect_stdout(io.StringIO()):
+                yield
+    finally:
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).fflush(None)
+        for number, copy in zip((1, 2), kept, strict=True):
+            os.dup2(copy, number)
+            os.close(copy)
 
 
 def _described(file: Any, path: Path) -> tuple[Mapping[str, Any], int, dict[str, str]]:
@@ -106,6 +132,8 @@ def _pixels(part: Any, names: Mapping[str, str], size: tuple[int, int]) -> UInt8
     window = _window(part.header, "displayWindow")
     data = _window(part.header, "dataWindow")
     width, height = size
+    if any(name not in part.channels for name in names.values()):
+        raise ValueError("its pixels cannot be decoded; it is damaged or cut off")  # OpenEXR goes on without
     channels = {key: np.asarray(part.channels[name].pixels, np.float32) for key, name in names.items()}
     shape = (data[3] - data[1], data[2] - data[0])
     if any(values.shape != shape for values in channels.values()):
