@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset, pose_verification
-from cagefield.datasets.photo_names import natural_key
+from cagefield.datasets.natural_order import natural_key
 from cagefield.datasets.pose_alignment import align_poses
 from cagefield.datasets.pose_check import PoseError, epipolar_errors, focal_spread, match_photos, pose_error
 from cagefield.datasets.pose_refinement import camera_groups

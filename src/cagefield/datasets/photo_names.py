@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -214,9 +213,3 @@ def picture_tree(base: Path) -> Iterator[tuple[str, ...]]:
         for name in sorted(files):
             if os.path.splitext(name)[1].lower() in EXTENSIONS and not is_hidden([name]):
                 yield (*parts, name)
-
-
-def natural_key(name: str) -> list[tuple[int, str]]:
-    """Sort key of a name that orders the numbers in it by value: 9 before 10."""
-    parts = re.split(r"(\d+)", name)
-    return [(int(part), "") if k % 2 else (0, part) for k, part in enumerate(parts)]

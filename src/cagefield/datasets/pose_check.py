@@ -21,7 +21,7 @@ from PIL import Image
 from cagefield import lenses
 from cagefield.cameras import Camera
 from cagefield.datasets import features
-from cagefield.datasets.photo_names import natural_key
+from cagefield.datasets.natural_order import natural_key
 from cagefield.datasets.views import View
 
 FloatArray = npt.NDArray[np.float64]

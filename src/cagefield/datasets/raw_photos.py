@@ -15,7 +15,7 @@ from PIL import Image, ImageOps
 from scipy.ndimage import laplace
 
 from cagefield.datasets.hidden_files import MASK_FOLDER, is_hidden
-from cagefield.datasets.photo_names import natural_key
+from cagefield.datasets.natural_order import natural_key
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
 from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter

@@ -1,0 +1,11 @@
+"""Order of file names by the numbers in them."""
+
+from __future__ import annotations
+
+import re
+
+
+def natural_key(name: str) -> list[tuple[int, str]]:
+    """Sort key of a name that orders the numbers in it by value: 9 before 10."""
+    parts = re.split(r"(\d+)", name)
+    return [(int(part), "") if k % 2 else (0, part) for k, part in enumerate(parts)]
