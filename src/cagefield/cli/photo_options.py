@@ -25,7 +25,6 @@ class PhotoOptions:
     """Shrink the photos by this factor; left out, until their longer side is 800 pixels or less."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
-
     masks: Path | None = None
     """Folder of masks, NAME.png for the photo NAME: black pixels are excluded from features, training and
     figures; left out, the masks that the data set has."""
