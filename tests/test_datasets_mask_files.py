@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cagefield import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.raw_photos import find_raw_photos
 from cagefield.errors import DatasetError
@@ -76,13 +77,14 @@ def test_missing_and_black_masks_are_named(tmp_path):
         data = load_dataset(tmp_path)
     text = " ".join(str(one.message) for one in said)
     assert "1 masks are not used, their files are missing: m/3.png" in text
-    assert "1 photos are left out, masks exclude all of it: images/4.png" in text
+    assert "1 photos are left out, masks exclude all of them: images/4.png" in text
     assert len(data.train) == 6
 
 
 @pytest.mark.filterwarnings("ignore:.*have masks")
 def test_excluded_pixels_are_no_training_rays(tmp_path):
     data = load_dataset(_capture(tmp_path, "masks/{}.png"))
+    devices.start("cpu")
     photos = Photos.load(data.train)
     assert photos.valid is not None and photos.valid.mean() == 1 - 48 / (WIDTH * HEIGHT)
     tiles = photos.patches(4)
