@@ -374,7 +374,7 @@ def test_training_on_photos_alone_finds_poses_first(photos, made, tmp_path, caps
     copy = tmp_path / "scene.poses"
     calls = []
 
-    def copied(source, to, *, frames, on_progress):
+    def copied(source, to, *, frames, on_progress, masks=None):
         calls.append(source)
         shutil.copytree(target, to)
         return PosesReport(to, 11, 9, 500, 0.5)
