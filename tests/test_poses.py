@@ -348,7 +348,7 @@ def test_the_command_makes_a_data_set_and_says_what_is_next(photos, made, tmp_pa
     real, _, _ = made
     fold = Fold(5, 9, ("a.jpg", "c.jpg"))
 
-    def fake(source, target, *, frames, on_progress):
+    def fake(source, target, *, frames, masks, on_progress):
         shutil.copytree(real, target)
         on_progress(1.0, "done")
         return PosesReport(target, 9, 7, 1234, 0.613, {"b.jpg": "blurred", "a.heic": "unreadable"})
@@ -374,7 +374,7 @@ def test_training_on_photos_alone_finds_poses_first(photos, made, tmp_path, caps
     copy = tmp_path / "scene.poses"
     calls = []
 
-    def copied(source, to, *, frames, on_progress):
+    def copied(source, to, *, frames, on_progress, masks=None):
         calls.append(source)
         shutil.copytree(target, to)
         return PosesReport(to, 11, 9, 500, 0.5)

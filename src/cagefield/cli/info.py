@@ -1,4 +1,4 @@
-"""`cagefield info`: what a scene folder holds."""
+"""`cagefield info`: what a scene folder or a data set holds."""
 
 from __future__ import annotations
 
@@ -15,17 +15,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Info:
-    """What a scene holds: field, cameras, edits and whether they can be evaluated."""
+    """What a scene holds: field, cameras, edits and whether they can be evaluated; or a data set."""
 
     scene: tyro.conf.Positional[Path]
-    """Scene folder."""
+    """Scene folder, or a data set."""
+    masks: Path | None = None
+    """Folder of masks of the data set's photos, NAME.png for the photo NAME."""
 
     def run(self) -> None:
         """Prints one line per fact."""
         from cagefield.cli.report import describe_edits
         from cagefield.fields.splat import SplatField
         from cagefield.scene import Scene
+        from cagefield.scene_files import is_scene
 
+        if not is_scene(self.scene) and _is_dataset(self.scene):
+            from cagefield.cli.dataset_report import describe_dataset
+            from cagefield.datasets import load_dataset
+
+            print("\n".join(describe_dataset(load_dataset(self.scene, masks=self.masks))))
+            return
         scene = Scene.open(self.scene)
         field = scene.field
         megabytes = sum(file.stat().st_size for file in self.scene.iterdir() if file.is_file()) / 1e6
@@ -51,6 +60,17 @@ class Info:
             print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")
         for line in describe_edits(scene.edits, field):
             print(f"edits       {line}")
+
+
+def _is_dataset(path: Path) -> bool:
+    """Whether there is a file of cameras: anything else is reported as a scene."""
+    from cagefield.datasets.colmap import find_model
+    from cagefield.datasets.llff import POSES_FILE
+    from cagefield.datasets.transforms import camera_file
+
+    if not path.is_dir():
+        return path.is_file()
+    return camera_file(path) is not None or (path / POSES_FILE).is_file() or find_model(path) is not None
 
 
 def _voxels(field: VoxelField) -> tuple[str, str]:

@@ -26,7 +26,6 @@ class PhotoOptions:
     training ask for."""
     holdout: int = 8
     """Keep every so-many-th photo for testing where the data set has no test views; 0 keeps none."""
-
     masks: Path | None = None
     """Folder of masks, NAME.png for the photo NAME: black pixels are excluded from features, training and
     figures; left out, the masks that the data set has."""

@@ -263,7 +263,8 @@ def pose_of(image: Any) -> FloatArray:
     rotation, translation = matrix[:, :3], matrix[:, 3]
     pose = np.eye(4)
     pose[:3, :3] = rotation.T * (1.0, -1.0, -1.0)
-    pose[:3, 3] = -rotation.T @ translation
+    with np.errstate(invalid="ignore"):
+        pose[:3, 3] = -rotation.T @ translation
     return pose
 
 

@@ -89,7 +89,7 @@ def with_points_file(folder: Path) -> Iterator[Path]:
     if (folder / "points3D.bin").is_file() or not (folder / "images.bin").is_file():
         yield folder
         return
-    with TemporaryFolder("model") as complete:
+    with TemporaryFolder("points") as complete:
         for name in _RECORDS:
             if (folder / name).is_file():
                 shutil.copyfile(folder / name, complete / name)
