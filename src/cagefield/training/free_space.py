@@ -36,18 +36,6 @@ MIN_POINTS = 2
 NEIGHBOR_CELLS = 7
 """A cell and its nearest neighbors, in which surfaces are looked for."""
 
-NEAR_SHARE = 0.9
-"""Share of a known free distance below which a mean stands in free space."""
-
-FAR_SHARE = 1.4
-"""Share of it above which a mean is hidden, and the photo says nothing."""
-
-MIN_PHOTOS = 2
-"""Photos that must show a mean to be in free space."""
-
-MAX_SHARE = 0.5
-"""Share of the photos with a say, above which they must do so."""
-
 SIGMAS = 3.0
 """Extent of a splat: a camera must not lie in the ellipsoid of so many standard deviations."""
 
@@ -134,29 +122,3 @@ class FreeSpace:
             local = np.einsum("nji,nj->ni", axes, center - means[rows]) / scales
             found[rows[(local * local).sum(axis=1) < 1.0]] = True
         return found
-
-
-def before_surfaces(
-    cameras: Sequence[Camera], empty: Sequence[NDArray[np.float32]], means: NDArray[np.floating]
-) -> NDArray[np.bool_]:
-    """Means [N,3] that most photos with a say show to be in free space.
-
-    `empty` [2,H,W] by photo are distances along its rays up to which there is nothing, and 1 where that is
-    known. A photo has a say where that is known at the mean's pixel and the mean is not far behind: against
-    it below NEAR_SHARE of the distance, for it up to FAR_SHARE.
-    """
-    against, count = np.zeros(len(means), np.intp), np.zeros(len(means), np.intp)
-    positions = np.asarray(means, np.float64)
-    for camera, (distances, sure) in zip(cameras, empty, strict=True):
-        pixels, depth = camera.project(positions)
-        with np.errstate(invalid="ignore"):
-            inside = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1)
-            rows = np.flatnonzero(inside & (depth > 0))
-        height, width = distances.shape
-        at = (pixels[rows] * (width / camera.width, height / camera.height)).astype(np.intp)
-        known = distances[at[:, 1], at[:, 0]].astype(np.float64)
-        share = np.linalg.norm(positions[rows] - camera.origin, axis=1) / np.maximum(known, 1e-300)
-        says = (sure[at[:, 1], at[:, 0]] == 1.0) & (known > 0) & (share < FAR_SHARE)
-        count[rows[says]] += 1
-        against[rows[says & (share < NEAR_SHARE)]] += 1
-    return np.asarray((against >= MIN_PHOTOS) & (against > MAX_SHARE * count))

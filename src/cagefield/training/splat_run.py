@@ -36,7 +36,7 @@ from cagefield.training.checkpoint_checks import (
     check_run,
     refusing_damage,
 )
-from cagefield.training.free_space import FreeSpace, before_surfaces
+from cagefield.training.free_space import FreeSpace
 from cagefield.training.kernels.gauss_newton_splats import gauss_newton, residuals
 from cagefield.training.kernels.splat_chain import chain, shapes
 from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
@@ -254,7 +254,6 @@ class SplatRun:
         """Takes out needles, and what stands nearer to a camera than anything that it shows can be."""
         state = self.state
         close = needles(state.log_scales) | self._free_space.occupied(state)
-        close |= before_surfaces([view.cameras[0] for view in self.views], self.empty, state.means)
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
                 close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
