@@ -53,6 +53,7 @@ class Budget:
     resolution: int = 256
     sh_degree: int | None = None
     seed: int = 0
+    robust: bool = False
 
 
 def learn(dataset: Dataset, kind: str, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
@@ -104,6 +105,7 @@ def splat_config(budget: Budget) -> SplatConfig:
         splats=budget.splats,
         sh_degree=SplatConfig.sh_degree if budget.sh_degree is None else budget.sh_degree,
         seed=budget.seed,
+        robust=budget.robust,
     )
 
 

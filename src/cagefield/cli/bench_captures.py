@@ -54,6 +54,8 @@ class BenchCaptures:
     perturb_poses: Flag = False
     """Disturb every camera first, test views' too: turned by 1 degree, moved by 1 % of its distance, its
     focal length changed by up to 5 %; --seed decides how."""
+    robust: Flag = False
+    """Give less weight to regions of photos that contradict the others."""
     room_size: int | None = None
     """Longer side of the photos of built-in rooms, 640 if left out."""
     room_views: int | None = None
@@ -94,7 +96,9 @@ class BenchCaptures:
         for path in (self.out, self._beside()) if self.edits else (self.out,):
             check_file(path, self.overwrite)
         check_number("--seed", self.seed, *SEEDS)
-        budget = Budget(self.minutes, self.steps, self.splats, self.resolution, self.sh_degree, self.seed)
+        budget = Budget(
+            self.minutes, self.steps, self.splats, self.resolution, self.sh_degree, self.seed, self.robust
+        )
         devices.start(self.device)
         scores: list[CaptureScore] = []
         edited: list[RoomScore] = []

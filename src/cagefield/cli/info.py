@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Info:
-    """What a scene holds: field, cameras, edits and whether they can be evaluated; or a data set."""
+    """Contents of a scene: field, cameras, edits and whether they can be evaluated; or of a data set."""
 
     scene: tyro.conf.Positional[Path]
     """Scene folder, or a data set."""
@@ -31,9 +31,12 @@ class Info:
 
         if not is_scene(self.scene) and _is_dataset(self.scene):
             from cagefield.cli.dataset_report import describe_dataset
+            from cagefield.cli.poses import verified
             from cagefield.datasets import load_dataset
 
-            print("\n".join(describe_dataset(load_dataset(self.scene, masks=self.masks))))
+            dataset = load_dataset(self.scene, masks=self.masks)
+            print("\n".join(describe_dataset(dataset)), flush=True)
+            verified(dataset, correct=False)
             return
         scene = Scene.open(self.scene)
         field = scene.field

@@ -71,7 +71,9 @@ class TrainingOptions:
             seed=self.seed,
         )
 
-    def splat_config(self, splats: int | None = None, refine_poses: bool = False) -> SplatConfig:
+    def splat_config(
+        self, splats: int | None = None, refine_poses: bool = False, robust: bool = False
+    ) -> SplatConfig:
         """The configuration of the splats' trainer; at most so many `splats`, None for its own choice."""
         from cagefield.training.splat_config import SplatConfig
 
@@ -81,6 +83,7 @@ class TrainingOptions:
             minutes=self.minutes if self.steps is None else None,
             splats=splats,
             refine_poses=refine_poses,
+            robust=robust,
             sh_degree=SplatConfig.sh_degree if self.sh_degree is None else self.sh_degree,
             seed=self.seed,
         )

@@ -57,6 +57,9 @@ class Train:
     PyTorch, and is baked into voxels at the end."""
     splats: int | None = None
     """Most splats at the end; left out, as many as the photos and the time allow."""
+    robust: Flag = False
+    """Give less weight to regions of photos that contradict the others: people who walk through, a backdrop
+    that moves; for splats."""
     refine_poses: Flag = False
     """Also move the photos' cameras to where the splats agree best with them; for poses that are rough."""
     keep_poses: Flag = False
@@ -79,7 +82,7 @@ class Train:
 
         if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
             raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
-        for option, given in (("--splats", self.splats is not None), ("--refine-poses", self.refine_poses)):
+        for option, given in self._splat_options():
             if given and self.field not in ("splat", "auto"):
                 raise CagefieldError(f"{option} is for splats; give --field splat too")
         target = check_destination(self.out, self.overwrite or self.resume)
@@ -100,7 +103,7 @@ class Train:
         if kind == "nerf":
             scene, figures, finished = self._train_nerf(dataset, checkpoint)
         elif kind == "splat":
-            options = self.training.splat_config(self.splats, self.refine_poses)
+            options = self.training.splat_config(self.splats, self.refine_poses, self.robust)
             scene, splats = train_splats(dataset, options, checkpoint, resume=self.resume)
             figures, finished = summary(splats), splats.finished
         else:
@@ -116,10 +119,18 @@ class Train:
             raise KeyboardInterrupt
         checkpoint.unlink(missing_ok=True)
 
+    def _splat_options(self) -> tuple[tuple[str, bool], ...]:
+        """Options that splats alone take, and whether they are given."""
+        return (
+            ("--refine-poses", self.refine_poses),
+            ("--robust", self.robust),
+            ("--splats", self.splats is not None),
+        )
+
     def _check_options(self) -> None:
         """Refuses, before photos are read, options that no trainer in question takes."""
         if self.field in ("auto", "splat"):
-            self.training.splat_config(self.splats, self.refine_poses)
+            self.training.splat_config(self.splats, self.refine_poses, self.robust)
         # Splats take harmonics of degree 3, voxels do not: with "auto" the photos decide.
         if self.field != "splat" and (self.field != "auto" or self.training.sh_degree != 3):
             self.training.config()
@@ -129,8 +140,8 @@ class Train:
         if self.field != "auto":
             return self.field
         kind: FieldKind = "splat" if dataset.unbounded else "voxel"
-        if kind == "voxel" and (self.splats is not None or self.refine_poses):
-            option = "--refine-poses" if self.refine_poses else "--splats"
+        option = next((option for option, given in self._splat_options() if given), None)
+        if kind == "voxel" and option is not None:
             raise CagefieldError(f"{option} is for splats, these photos get voxels; give --field splat too")
         if kind == "voxel":
             self.training.config()

@@ -19,8 +19,7 @@ class SplatConfig:
         seed: of the photos' order, of splits and of random splats.
         antialiased: as SplatField.
         exposure: fit a colour gain to each photo; None does so for captures without alpha.
-        robust: give less weight to regions of photos that contradict the others; None does so for captures
-            without alpha.
+        robust: give less weight to regions of photos that contradict the others (`robust_weights`).
         refine_poses: move the photos' cameras to where the splats agree best with them.
         background: splats far behind an unbounded capture, in shares of the others that a run begins with.
         rate: (first, last) rate of the steps.
@@ -43,7 +42,7 @@ class SplatConfig:
     seed: int = 0
     antialiased: bool = True
     exposure: bool | None = None
-    robust: bool | None = None
+    robust: bool = False
     refine_poses: bool = False
     background: float = 0.05
     rate: tuple[float, float] = (1.8, 0.1)

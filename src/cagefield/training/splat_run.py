@@ -115,9 +115,10 @@ class SplatRun:
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
         self._fitted = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
-        robust = (not alpha) if config.robust is None else config.robust
         sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
-        self._robust = RobustWeights([(-(-h // TILE), -(-w // TILE)) for w, h in sizes]) if robust else None
+        self._robust = (
+            RobustWeights([(-(-h // TILE), -(-w // TILE)) for w, h in sizes]) if config.robust else None
+        )
         self.poses = PoseRefinement(len(self.views), self._scale)
         self._buffers = Buffers()
         self._queue: list[int] = []
