@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -165,7 +166,7 @@ class BenchCaptures:
             dataset = perturbed(dataset, self.seed)
         if self.downscale is None:
             dataset = at_training_resolution(dataset, self.minutes)
-        found = verified(dataset, correct=not self.keep_poses)
+        found = verified(dataset, correct=not self.keep_poses, stream=sys.stderr)
         dataset = found.dataset
         if not dataset.test:
             raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")

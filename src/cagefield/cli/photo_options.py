@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,26 +31,32 @@ class PhotoOptions:
     """Folder of masks, NAME.png for the photo NAME: black pixels are excluded from features, training and
     figures; left out, the masks that the data set has."""
 
-    def load(
-        self, posed_in: Path | None = None, keep_poses: bool = True, minutes: float | None = None
-    ) -> Dataset:
+    def load(self, posed_in: Path | None = None, minutes: float | None = None) -> Dataset:
         """The data set; photos without poses get them first, in the folder `posed_in` where it is given.
 
-        Poses that come with photos are verified, and corrected unless `keep_poses`, where a folder is given.
-        For a training of `minutes` the photos are shrunk as `at_training_resolution` says; a line says so.
+        For a training of `minutes` the photos are shrunk as `at_training_resolution` says.
         """
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.resolution import at_training_resolution, describe_resolution
+        from cagefield.datasets.resolution import at_training_resolution
 
         data = self.data if posed_in is None else posed(self.data, posed_in, self.masks)
         masks = self.masks if data.expanduser() == self.data.expanduser() else None
         dataset = load_dataset(data, downscale=self.downscale, holdout=self.holdout, masks=masks)
-        if minutes is not None:
-            dataset = dataset if self.downscale is not None else at_training_resolution(dataset, minutes)
-            print(describe_resolution(dataset), flush=True)
-        if posed_in is None:
+        if minutes is None or self.downscale is not None:
             return dataset
-        return verified(dataset, correct=not keep_poses and data == self.data.expanduser()).dataset
+        return at_training_resolution(dataset, minutes)
+
+    def verified(self, dataset: Dataset, keep_poses: bool) -> Dataset:
+        """The loaded data set with its poses verified; lines on stderr say its photos' size and pose error.
+
+        Wrong poses are corrected unless `keep_poses`, or where they were found by `load`.
+        """
+        from cagefield.datasets.dataset import has_photos_alone
+        from cagefield.datasets.resolution import describe_resolution
+
+        print(describe_resolution(dataset), file=sys.stderr, flush=True)
+        given = not has_photos_alone(self.data.expanduser())
+        return verified(dataset, correct=given and not keep_poses, stream=sys.stderr).dataset
 
 
 Photos = tyro.conf.OmitArgPrefixes[PhotoOptions]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import tyro
 
@@ -103,14 +103,17 @@ def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
     return target
 
 
-def verified(dataset: Dataset, correct: bool = True) -> Verification:
-    """The data set with verified poses, with `correct` corrected where they are wrong; lines say so."""
+def verified(dataset: Dataset, correct: bool = True, stream: TextIO | None = None) -> Verification:
+    """The data set with verified poses, with `correct` corrected where they are wrong.
+
+    Lines about it go to `stream`, by default stdout.
+    """
     from cagefield.datasets.pose_verification import describe, poses_cache, verify_poses
 
     with stages() as move:
         found = verify_poses(dataset, correct=correct, cache=poses_cache(), on_stage=move)
     for line in describe(found):
-        print(line, flush=True)
+        print(line, file=stream, flush=True)
     return found
 
 

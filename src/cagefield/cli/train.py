@@ -94,14 +94,14 @@ class Train:
         if self.resume and not checkpoint.is_file():
             raise CagefieldError(f"no checkpoint at {checkpoint} to resume from; start anew")
         self._check_options()
-        dataset = self.photos.load(
-            target.with_name(target.name + ".poses"), self.keep_poses, self.training.minutes
-        )
+        dataset = self.photos.load(target.with_name(target.name + ".poses"), self.training.minutes)
         kind = self._kind(dataset)
         devices.start(self.device)
+        networks = nerf_config(self.training, self.preset, self.ndc) if kind == "nerf" else None
+        dataset = self.photos.verified(dataset, self.keep_poses)
         target.parent.mkdir(parents=True, exist_ok=True)
-        if kind == "nerf":
-            scene, figures, finished = self._train_nerf(dataset, checkpoint)
+        if networks is not None:
+            scene, figures, finished = self._train_nerf(dataset, networks, checkpoint)
         elif kind == "splat":
             options = self.training.splat_config(self.splats, self.refine_poses, self.robust)
             scene, splats = train_splats(dataset, options, checkpoint, resume=self.resume)
@@ -154,11 +154,9 @@ class Train:
             print(f"Training {what}", file=sys.stderr)
         return kind
 
-    def _train_nerf(self, dataset: Dataset, checkpoint: Path) -> tuple[Scene, str, bool]:
+    def _train_nerf(self, dataset: Dataset, config: NerfConfig, checkpoint: Path) -> tuple[Scene, str, bool]:
         """(scene, lines of figures, whether the training got to its end) of the original NeRF, baked."""
         from cagefield.cli.bake import bake_scene
-
-        config = nerf_config(self.training, self.preset, self.ndc)
         from cagefield.training.nerf import train_nerf
 
         with progress_bar("Training") as move:
