@@ -122,15 +122,18 @@ class Scene:
         """The scene of a field trained on a data set, with its cameras and no edits.
 
         Its background is the result's, where that has one, else what the photos have: white behind cut-outs,
-        else black.
+        else black. Splats get the data set's offset.
         """
         white = (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0)
         splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
         cameras = {split: tuple(view.camera for view in views) for split, views in splits.items() if views}
         # Poses may have been refined.
         cameras["train"] = getattr(result, "cameras", cameras["train"])
+        field = result.field
+        if isinstance(field, SplatField) and any(dataset.offset):
+            field = dataclasses.replace(field, offset=dataset.offset)
         return cls(
-            result.field,
+            field,
             cameras=cameras,
             background=background_rgb(getattr(result, "background", white)),
             gains=() if (result.gains == 1.0).all() else result.gains.tolist(),

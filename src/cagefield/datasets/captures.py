@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.cameras import Camera
+from cagefield.datasets.far_origin import near_origin
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import read_header
 from cagefield.datasets.views import Dataset, SparsePoints, View, hold_out
@@ -27,9 +28,9 @@ def unbounded_capture(
     depths: tuple[float, float] | None,
     points: SparsePoints | None = None,
 ) -> Dataset:
-    """The data set of photos of an unbounded scene; every `holdout`-th view tests."""
+    """The data set of photos of an unbounded scene, near the origin; every `holdout`-th view tests."""
     train, test = hold_out(views, holdout)
-    return Dataset(
+    dataset = Dataset(
         name=real_path(folder).name,
         path=folder,
         train=train,
@@ -42,6 +43,7 @@ def unbounded_capture(
         depths=depths,
         points=points,
     )
+    return near_origin(dataset, levelling[:3, :3].T)
 
 
 def stored_camera(where: str, camera: Camera, photo: Path, factor: int) -> Camera:

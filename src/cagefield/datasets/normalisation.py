@@ -63,6 +63,7 @@ class Similarity:
             val=moved(dataset.val),
             bounds=bounds,
             source_to_world=matrix @ dataset.source_to_world,
+            offset=(0.0, 0.0, 0.0),
             depths=None if depths is None else (self.scale * depths[0], self.scale * depths[1]),
             points=None
             if points is None

@@ -29,9 +29,6 @@ from cagefield.lenses import Lens
 
 FloatArray = npt.NDArray[np.float64]
 
-FAR = 100.0
-"""Distance of the cameras from the origin, over their spread, from which on the origin is moved to them."""
-
 OPENCV_AXES = np.array([1.0, -1.0, -1.0, 1.0])
 """Factors of a pose's columns from OpenCV's camera axes (y down, z forward) to OpenGL's, and back."""
 
@@ -256,18 +253,9 @@ def _check_aspect(where: str, size: tuple[int, int], said: tuple[int, int]) -> N
 
 
 def _levelling(poses: FloatArray, up: tuple[float, float, float] | None) -> FloatArray:
-    """A rigid motion [4,4] to a world whose up is +z, with the cameras near the origin.
-
-    The origin stays where it is unless the cameras are FAR from it, as in geographic coordinates: float32
-    would not hold their differences.
-    """
+    """A rotation [4,4] to a world whose up is +z."""
     motion = np.eye(4)
     motion[:3, :3] = levelling_rotation(poses, up)
-    origins = poses[:, :3, 3]
-    middle = np.median(origins, axis=0)
-    spread = float(np.median(np.linalg.norm(origins - middle, axis=1)))
-    if np.linalg.norm(middle) > FAR * max(spread, 1.0 / FAR):
-        motion[:3, 3] = -motion[:3, :3] @ middle
     return motion
 
 

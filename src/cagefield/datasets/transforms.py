@@ -31,6 +31,7 @@ import numpy.typing as npt
 from cagefield.cameras import Camera
 from cagefield.datasets.captures import uniform_size, warn_of_scaling
 from cagefield.datasets.colmap_lenses import LensView, report_resampled
+from cagefield.datasets.far_origin import near_origin
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photo_names import FoundPhotos, find_photos, view_name
 from cagefield.datasets.photos import choose_downscale, is_cut_out, read_header
@@ -113,7 +114,7 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
     points = main.points()
     unbounded, bounds = _extent(main, [view.camera for view in views["train"]], cut_out, synthetic, points)
     found = None if points is None else depths_of_points([v.camera for v in everything], points.positions)
-    return Dataset(
+    dataset = Dataset(
         name=real_path(folder).name,
         path=folder,
         train=train,
@@ -126,6 +127,7 @@ def load_transforms(path: Path, downscale: int | None, holdout: int) -> Dataset:
         depths=None if found is None else (float(found[:, 0].min()), float(found[:, 1].max())),
         points=points,
     )
+    return near_origin(dataset)
 
 
 def _read_views(where: Path, folder: Path, files: Sequence[_TransformsFile]) -> None:

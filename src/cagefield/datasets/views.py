@@ -175,7 +175,8 @@ class Dataset:
     reconstruction that the files came from to this data set's world: the levelling rotation for LLFF and
     COLMAP, nerfstudio's `applied_transform` (already in the poses of its files), else the identity. `depths`
     are the nearest and the farthest depth of content along the cameras' axes, where the reconstruction knows.
-    `points` are the reconstruction's, None where it has none.
+    `points` are the reconstruction's, None where it has none. `offset` is what was taken off the file's
+    coordinates because they are far from the origin (see `far_origin`); `source_to_world` has it too.
     """
 
     name: str
@@ -189,6 +190,7 @@ class Dataset:
     source_to_world: FloatArray = field(default_factory=_identity)
     depths: tuple[float, float] | None = None
     points: SparsePoints | None = None
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name, shape in (("bounds", (2, 3)), ("source_to_world", (4, 4))):
