@@ -114,6 +114,7 @@ DISK_COMMANDS: dict[str, DiskCommand] = {
         "demo -o {out} --views 3 --size 32 --steps 3 --resolution 16 --frames 2", "made", keeps=True
     ),
     "poses": DiskCommand("poses {s}/photos_alone -o {out}", "data", on_the_way=3.0),
+    "poses of a data set": DiskCommand("poses {s}/photos -o {out}", "data"),
     "bench speed": DiskCommand(
         "bench speed {s}/voxels -o {out} --size 24 --cameras 1 --rounds 1", "speed.json"
     ),

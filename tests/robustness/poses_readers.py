@@ -79,11 +79,11 @@ def _make_points(count: int, folder: Path) -> None:
     seen = tuple(frozenset((f"photo {n % 3}", f"photo {n % 5}")) for n in range(count))
     rgb = chance.integers(0, 256, (count, 3)).astype(np.uint8)
     found = SparsePoints(chance.normal(size=(count, 3)), rgb, seen, np.ones(count))
-    points._write(folder / "points-1.npz", found)
+    points.write_cached_points(folder / "points-1.npz", found)
 
 
 def _read_points(folder: Path) -> None:
-    found = points._read(folder / "points-1.npz")
+    found = points.read_cached_points(folder / "points-1.npz")
     if found is None:
         raise CagefieldError("it is damaged, and the points are found again")
     found.take(np.arange(len(found)) % 2 == 0)
