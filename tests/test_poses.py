@@ -16,9 +16,17 @@ from scipy.ndimage import gaussian_filter
 from cagefield.cameras import Camera
 from cagefield.cli import main
 from cagefield.cli import poses as poses_command
-from cagefield.datasets import features, left_out, load_dataset, poses_work, structure_from_motion
+from cagefield.datasets import (
+    features,
+    left_out,
+    load_dataset,
+    pose_verification,
+    poses_work,
+    structure_from_motion,
+)
 from cagefield.datasets.dataset import has_photos_alone
 from cagefield.datasets.folds import Fold
+from cagefield.datasets.pose_verification import Verification
 from cagefield.datasets.poses_work import work_folder
 from cagefield.datasets.raw_photos import (
     RawPhoto,
@@ -354,11 +362,18 @@ def test_the_command_makes_a_data_set_and_says_what_is_next(photos, made, tmp_pa
         return PosesReport(target, 9, 7, 1234, 0.613, {"b.jpg": "blurred", "a.heic": "unreadable"})
 
     monkeypatch.setattr(structure_from_motion, "make_poses", fake)
-    monkeypatch.setattr(poses_command, "check", lambda dataset: fold)
+    given = {}
+
+    def verified(dataset, *, correct, cache, on_stage):
+        given["correct"] = correct
+        return Verification(dataset, None, None, fold, "unmeasured")
+
+    monkeypatch.setattr(pose_verification, "verify_poses", verified)
     out = tmp_path / "data"
     assert main(["poses", str(photos), "-o", str(out)]) == 0
-    text, said = capsys.readouterr()
-    assert "folded: 5 of 9 photos" in said and "a.jpg and c.jpg" in said and "name them in that order" in said
+    text = capsys.readouterr().out
+    assert given == {"correct": False}  # the poses are cagefield's own
+    assert "poses are folded: 5 of 9 photos" in text and "(a.jpg and c.jpg)" in text
     assert "7 of 9 photos found their place" in text and "1234 points" in text and "0.61 pixels" in text
     assert text.index("left out: a.heic: unreadable") < text.index("left out: b.jpg: blurred")
     assert f"next: cagefield train {out} -o SCENE" in text

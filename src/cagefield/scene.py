@@ -7,7 +7,8 @@
       cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
       scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
                           "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
-                          "preserve_opacity": false if edits leave density as it is}
+                          "preserve_opacity": false if edits leave density as it is,
+                          "source_to_world": [4,4] from the reconstruction's coordinates, if not the same}
 
 Edits may paste from other scenes (`Edit.source`), whose folders stay where they are: relative paths of
 sources are relative to SCENE.
@@ -83,6 +84,10 @@ if TYPE_CHECKING:
         def gains(self) -> NDArray[np.float32]: ...
 
 
+MAX_CONDITION = 1e9
+"""Condition number of the linear part of `source_to_world`, from which on it counts as singular."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Scene:
     """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
@@ -93,10 +98,13 @@ class Scene:
     the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
     `preserve_opacity` multiplies density by |J d| where an edit moved it. `folder` is the one that it was
     opened from: sources of pastes are relative to that, or to the working directory where it is None.
+    `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
+    scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
 
     Raises:
         CagefieldError: a background outside [0, 1].
-        SceneError: a version this cagefield does not write, gains that do not fit the cameras.
+        SceneError: a version this cagefield does not write, gains that do not fit the cameras, a
+            source_to_world that cannot be inverted.
     """
 
     field: VoxelField | SplatField
@@ -108,6 +116,7 @@ class Scene:
     original: NerfField | None = None
     preserve_opacity: bool = True
     folder: Path | None = None
+    source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
 
     def __post_init__(self) -> None:
         cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
@@ -116,6 +125,7 @@ class Scene:
         if self.version != VERSION:
             raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
         object.__setattr__(self, "gains", _gains(self.gains, len(cameras.get("train", ()))))
+        object.__setattr__(self, "source_to_world", _affine(self.source_to_world))
 
     @classmethod
     def trained(cls, result: Trained, dataset: Dataset) -> Scene:
@@ -137,6 +147,7 @@ class Scene:
             cameras=cameras,
             background=background_rgb(getattr(result, "background", white)),
             gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
+            source_to_world=dataset.source_to_world,
         )
 
     @classmethod
@@ -198,7 +209,7 @@ class Scene:
         if not folder.is_dir():
             what = "is a file, not a folder" if folder.exists() else "does not exist"
             raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
-        background, gains, preserve_opacity = read_manifest(folder)
+        background, gains, preserve_opacity, source_to_world = read_manifest(folder)
         for name in (FIELD, CAMERAS, EDITS):
             check_part(folder / name)
         cameras = read_cameras(folder / CAMERAS)
@@ -215,6 +226,7 @@ class Scene:
                 original=original,
                 preserve_opacity=preserve_opacity,
                 folder=folder.absolute(),
+                source_to_world=np.eye(4) if source_to_world is None else source_to_world,
             )
         except SceneError as error:
             raise SceneError(f"{folder / MANIFEST}: {error}") from None
@@ -268,6 +280,8 @@ class Scene:
             manifest["gains"] = self.gains
         if not self.preserve_opacity:
             manifest["preserve_opacity"] = False
+        if not np.array_equal(self.source_to_world, np.eye(4)):
+            manifest["source_to_world"] = self.source_to_world.tolist()
         with replaced_file(folder / MANIFEST, parents=False) as draft:
             write_json(manifest, draft)
             yield
@@ -477,6 +491,22 @@ def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
         if not all(0.0 < channel < math.inf for channel in gain):
             raise SceneError(f"gains[{index}] is {list(gain)}; each must be a number above 0")
     return gains
+
+
+def _affine(values: Any) -> Array:
+    """The matrix [4,4] of an affine map that has an inverse, read-only."""
+    try:
+        matrix = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        matrix = np.empty(0)
+    fits = matrix.shape == (4, 4) and bool(np.isfinite(matrix).all())
+    if not fits or (matrix[3] != (0, 0, 0, 1)).any() or not np.linalg.cond(matrix[:3, :3]) < MAX_CONDITION:
+        raise SceneError(
+            "source_to_world must be 4 rows of 4 finite numbers, an affine map with an inverse, got "
+            f"{values!r:.80}"
+        )
+    matrix.setflags(write=False)
+    return matrix
 
 
 def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:

@@ -99,8 +99,8 @@ def check_part(path: Path) -> None:
         raise SceneError(f"{path} cannot be read ({error.strerror}); {cure}") from None
 
 
-def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool]:
-    """Background, gains, unchecked, and the opacity choice."""
+def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any, bool, Any]:
+    """Background, gains, unchecked, the opacity choice, and source_to_world, unchecked, None without."""
     path = folder / MANIFEST
     if not path.exists():
         raise SceneError(
@@ -123,9 +123,10 @@ def read_manifest(folder: Path) -> tuple[tuple[float, float, float] | None, Any,
     if not isinstance(opacity, bool):
         raise SceneError(f"{path}: preserve_opacity is {opacity!r:.40}; it must be true or false")
     try:
-        return background_rgb(document.get("background")), document.get("gains", ()), opacity
+        background = background_rgb(document.get("background"))
     except (CagefieldError, TypeError, ValueError) as error:
         raise SceneError(f"{path}: {error!s:.200}") from None
+    return background, document.get("gains", ()), opacity, document.get("source_to_world")
 
 
 def read_field(path: Path) -> VoxelField | SplatField:

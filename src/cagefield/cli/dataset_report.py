@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
@@ -35,11 +36,16 @@ def describe_dataset(dataset: Dataset) -> list[str]:
     )
     points = 0 if dataset.points is None else len(dataset.points)
     lines.append(f"points      {points or 'none, they are found at training'}")
-    matrix = dataset.source_to_world
-    if np.array_equal(matrix, np.eye(4)):
-        lines.append("world       that of the files")
-    else:
-        scale = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
-        shift = ", ".join(f"{value:.6g}" for value in matrix[:3, 3])
-        lines.append(f"world       the reconstruction's, turned, scaled by {scale:.4g}, moved by ({shift})")
+    lines.append(f"world       {describe_world(dataset.source_to_world) or 'that of the files'}")
     return lines
+
+
+def describe_world(source_to_world: NDArray[np.float64]) -> str:
+    """What a similarity [4,4] does to the reconstruction's coordinates; empty where nothing."""
+    linear, shift = source_to_world[:3, :3], source_to_world[:3, 3]
+    scale = float(np.cbrt(abs(np.linalg.det(linear))))
+    parts = ["mirrored"] * bool(np.linalg.det(linear) < 0.0)
+    parts += ["turned"] * (not np.allclose(linear, scale * np.sign(np.linalg.det(linear)) * np.eye(3)))
+    parts += [f"scaled by {scale:.4g}"] * (abs(scale - 1.0) > 1e-9)
+    parts += [f"moved by ({', '.join(f'{value:.9g}' for value in shift + 0.0)})"] * bool(shift.any())
+    return f"the reconstruction's, {', '.join(parts)}" if parts else ""

@@ -62,6 +62,9 @@ class Export:
     up: Up | None = None
     """Which way is up in the scene, where its cameras do not say: splats are turned to stand upright in the
     file's axes. y-down turns nothing: coordinates of the scene count as those of 3DGS' .ply."""
+    source_coordinates: Flag = False
+    """Coordinates of the reconstruction that the photos' poses came from, before the scene was leveled, moved
+    or scaled (COLMAP's; nerfstudio's before applied_transform)."""
     spz_version: SpzVersion | None = None
     """Version of an .spz file; left out, 3, which Spark opens, too."""
     splats: int | None = None
@@ -104,6 +107,8 @@ class Export:
             raise CagefieldError(f"{self.out}: {self.what} are not written as a page; give another name")
         if self.selection is not None or self.axes is not None:
             raise CagefieldError("a page shows the whole scene; leave out --selection and --axes")
+        if self.source_coordinates:
+            raise CagefieldError("a page shows the scene's coordinates; leave out --source-coordinates")
         if self.embed and self.out.suffix.lower() == ".html":
             raise CagefieldError(f"{self.out}: --embed writes a folder; give a name without .html")
         if self.embed:
@@ -157,6 +162,8 @@ class Export:
         suffix = self.out.suffix.lower()
         if self.what == "page":
             raise CagefieldError(f"{self.out}: a page is written as .html; give such a name")
+        if self.source_coordinates and self.up is not None:
+            raise CagefieldError("--source-coordinates turns nothing upright; leave out --up")
         if self.what == "splats":
             writer_of(self.out, self.spz_version)
         elif (self.axes, self.up, self.spz_version) != (None, None, None):
@@ -173,6 +180,7 @@ class Export:
     def _splats(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes splats; a line of figures."""
         from cagefield.exporting import baked, inside, upright
+        from cagefield.exporting.source_coordinates import splats_in_source, world_to_source
         from cagefield.fields.splat import SplatField
         from cagefield.formats.splat_files import write_splats
         from cagefield.formats.splat_import import axis_of, nearest_up
@@ -183,10 +191,14 @@ class Export:
             splats, figures = self._fitted(scene)
         if cages:
             splats = splats.take(inside(cages, splats.means))
+        line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
+        if self.source_coordinates:
+            moved = splats_in_source(splats, world_to_source(scene))
+            write_splats(moved, self.out, self.axes, spz_version=self.spz_version)
+            return f"{line}\nin the coordinates of the reconstruction"
         up = scene.up if self.up is None else axis_of(self.up)
         turned = upright(splats, up)
         write_splats(turned, self.out, self.axes, spz_version=self.spz_version)
-        line = f"{len(splats)} splats, SH degree {splats.sh_degree}; {figures}"
         if turned is not splats:
             line += f"\nturned upright from {nearest_up(up)}; --up y-down keeps the scene's coordinates"
         return line
@@ -215,18 +227,25 @@ class Export:
     def _mesh(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes a mesh; a line of figures."""
         from cagefield.exporting import inside, scene_mesh
+        from cagefield.exporting.source_coordinates import mesh_in_source, world_to_source
         from cagefield.formats.mesh_files import write_mesh
 
         with progress_bar("Meshing") as move:
             mesh = scene_mesh(scene, self.resolution, lambda done: move(done, 1.0, ""))
         if cages:
             mesh = mesh.kept(inside(cages, mesh.positions))
-        write_mesh(self.out, mesh, scene.up, offset=scene.offset)
+        up, offset = scene.up, scene.offset
+        if self.source_coordinates:
+            back = world_to_source(scene)
+            up = back[:3, :3] @ up
+            mesh, offset = mesh_in_source(mesh, back)
+        write_mesh(self.out, mesh, up, offset=offset)
         return f"{len(mesh.faces)} triangles, {len(mesh.positions)} vertices with colours"
 
     def _points(self, scene: Scene, cages: tuple[Cage, ...]) -> str:
         """Writes points; a line of figures."""
         from cagefield.exporting import MOST_SPLATS, inside, scene_points
+        from cagefield.exporting.source_coordinates import points_in_source, world_to_source
         from cagefield.formats.mesh_files import write_points
 
         with stages() as move:
@@ -235,7 +254,10 @@ class Export:
             import numpy as np
 
             points = points.take(np.flatnonzero(inside(cages, points.positions)))
-        write_points(self.out, points.positions, points.rgb, points.normals, offset=scene.offset)
+        offset = scene.offset
+        if self.source_coordinates:
+            points, offset = points_in_source(points, world_to_source(scene))
+        write_points(self.out, points.positions, points.rgb, points.normals, offset=offset)
         return f"{len(points)} points with normals and colours"
 
 

@@ -24,6 +24,7 @@ class Info:
 
     def run(self) -> None:
         """Prints one line per fact."""
+        from cagefield.cli.dataset_report import describe_world
         from cagefield.cli.report import describe_edits
         from cagefield.fields.splat import SplatField
         from cagefield.scene import Scene
@@ -58,6 +59,8 @@ class Info:
         for split, cameras in scene.cameras.items():
             sizes = sorted({f"{camera.width}x{camera.height}" for camera in cameras})
             print(f"cameras     {split}: {len(cameras)} {', '.join(sizes)}".rstrip())
+        if world := describe_world(scene.source_to_world):
+            print(f"world       {world}; export --source-coordinates undoes it")
         if scene.gains:
             low, high = (choose(map(choose, scene.gains)) for choose in (min, max))
             print(f"exposure    gains of {len(scene.gains)} training photos, from {low:.3f} to {high:.3f}")

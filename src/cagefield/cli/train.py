@@ -183,6 +183,7 @@ class Train:
                 ),
                 unbounded=dataset.unbounded,
             )
+        scene = dataclasses.replace(scene, source_to_world=moved.source_to_world)
         line = (
             f"trained {result.seconds:.0f} s, {result.steps} steps, networks of {result.field.coarse}, "
             f"{result.space}; train PSNR {result.train_psnr:.2f} dB"

@@ -1,0 +1,113 @@
+"""Splats, meshes and points in the coordinates of the reconstruction that a scene's cameras came from.
+
+Notation: a scene's `source_to_world` is x' = M x + t, M a similarity's matrix (rotation times scale, perhaps
+mirrored). Its inverse is applied in float64. What float32 would not hold of the result, its distance from the
+origin, becomes an offset.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import CagefieldError
+from cagefield.fields.meshing import Mesh
+from cagefield.fields.splat import NO_OFFSET, Offset, SplatField
+from cagefield.formats.splat_table import SplatBatch
+from cagefield.formats.splat_transform import transformed
+from cagefield.scene import Scene
+
+if TYPE_CHECKING:
+    from cagefield.training.splat_fitting import Surface
+
+FloatArray = NDArray[np.float64]
+
+MAX_DISTANCE = 1000.0
+"""Distance of a shape's middle from the origin, over its size, from which on it gets an offset."""
+
+MAX_STRETCH = 1e-3
+"""Difference of the axes' scales, as a share, that a similarity may have by rounding."""
+
+
+def world_to_source(scene: Scene) -> FloatArray:
+    """The similarity [4,4] from the scene's coordinates, without its offset, to the reconstruction's.
+
+    Raises CagefieldError where the scene's `source_to_world` is no similarity.
+    """
+    matrix = scene.source_to_world
+    if np.array_equal(matrix, np.eye(4)):
+        back = np.eye(4)
+        back[:3, 3] = scene.offset
+        return back
+    stretch = np.linalg.svd(matrix[:3, :3], compute_uv=False)
+    if stretch[0] - stretch[2] > MAX_STRETCH * stretch[0]:
+        raise CagefieldError(
+            f"the scene's source_to_world scales axes by {stretch[0]:.4g} to {stretch[2]:.4g}, which is no "
+            "similarity; leave out --source-coordinates"
+        )
+    return np.asarray(np.linalg.inv(matrix), np.float64)
+
+
+def splats_in_source(splats: SplatField, back: FloatArray) -> SplatField:
+    """The splats under a similarity [4,4]: means moved, scales scaled, harmonics turned.
+
+    The field's own offset is left out of it: `back` has it.
+    """
+    batch = SplatBatch(splats.means, splats.log_scales, splats.quaternions, splats.opacities, splats.sh)
+    found = transformed(batch, back)
+    means, offset = _near_origin(found.means.astype(np.float64))
+    return replace(
+        splats,
+        means=means.astype(np.float32),
+        log_scales=found.log_scales.astype(np.float32),
+        quaternions=found.quaternions.astype(np.float32),
+        sh=found.sh,
+        bounds=_box(splats.bounds, back) - offset,
+        offset=offset,
+    )
+
+
+def mesh_in_source(mesh: Mesh, back: FloatArray) -> tuple[Mesh, Offset]:
+    """(the mesh under a similarity [4,4] less an offset, the offset)."""
+    positions, offset = _near_origin(_moved(mesh.positions, back))
+    is_mirrored = np.linalg.det(back[:3, :3]) < 0.0
+    faces = mesh.faces[:, ::-1] if is_mirrored else mesh.faces
+    moved = Mesh(positions.astype(np.float32), _turned(mesh.normals, back), mesh.rgb, faces)
+    return moved, offset
+
+
+def points_in_source(points: Surface, back: FloatArray) -> tuple[Surface, Offset]:
+    """(the points under a similarity [4,4] less an offset, the offset)."""
+    positions, offset = _near_origin(_moved(points.positions, back))
+    return replace(points, positions=positions, normals=_turned(points.normals, back)), offset
+
+
+def _near_origin(positions: FloatArray) -> tuple[FloatArray, Offset]:
+    """(positions [N,3] less an offset, the offset): none where they are near the origin for their size."""
+    if not len(positions):
+        return positions, NO_OFFSET
+    middle = np.median(positions, axis=0)
+    size = float(np.median(np.abs(positions - middle).max(axis=1)))
+    if np.linalg.norm(middle) <= MAX_DISTANCE * size:
+        return positions, NO_OFFSET
+    step = 10.0 ** np.floor(np.log10(size)) if size > 0.0 else 1.0
+    x, y, z = (np.round(middle / step) * step + 0.0).tolist()
+    return positions - (x, y, z), (x, y, z)
+
+
+def _moved(positions: NDArray[np.floating], matrix: FloatArray) -> FloatArray:
+    return np.asarray(positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _turned(normals: NDArray[np.floating], matrix: FloatArray) -> NDArray[np.float32]:
+    turned = normals.astype(np.float64) @ matrix[:3, :3].T
+    return np.asarray(turned / np.cbrt(abs(np.linalg.det(matrix[:3, :3]))), np.float32)
+
+
+def _box(bounds: FloatArray, matrix: FloatArray) -> FloatArray:
+    """The box [2,3] around the corners of another, moved."""
+    moved = _moved(np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3), matrix)
+    return np.stack([moved.min(axis=0), moved.max(axis=0)])
