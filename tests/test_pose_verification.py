@@ -64,8 +64,7 @@ def test_the_error_is_the_distance_to_the_epipolar_line():
     # Rays are unit vectors in float64: nothing but rounding is left.
     assert epipolar_errors(one, other, first, second).max() < 1e-6
     # The epipolar line of each first pixel in the second photo, by two points of its ray.
-    origins, directions = one.rays(first)
-    near, far = (other.project(origins + t * directions)[0] for t in (3.0, 6.0))
+    near, far = (other.project(one.origin + t * (points - one.origin))[0] for t in (0.8, 1.5))
     along = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     errors = epipolar_errors(one, other, first, second + 2.0 * across)

@@ -1,4 +1,4 @@
-"""Robust weights: regions that contradict the other photos count for nothing, blurred texture counts."""
+"""Robust weights: regions that contradict the other photos count for little, blurred texture counts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from cagefield.rendering.kernels.splat_projection import TILE
 from cagefield.rendering.splat_rasterizer import tiled, untiled
-from cagefield.training.robust_weights import MIN_SCALE, SCALE_MEDIANS, RobustWeights
+from cagefield.training.robust_weights import MIN_SCALE, MIN_WEIGHT, SCALE_MEDIANS, RobustWeights
 
 DOWN, ACROSS = 4, 6
 SIZE = ACROSS * TILE, DOWN * TILE
@@ -27,11 +27,11 @@ def weights_of(difference: np.ndarray, valid: np.ndarray | None = None, visits: 
     return untiled(found[:, None], *SIZE)[..., 0]
 
 
-def test_an_outlier_counts_for_nothing_and_the_rest_for_all():
+def test_an_outlier_counts_for_little_and_the_rest_for_all():
     difference = np.zeros((SIZE[1], SIZE[0], 3))
     difference[20:44, 30:60] = 0.4
     found = weights_of(difference)
-    assert found[20:44, 30:60].max() == 0.0
+    assert found[20:44, 30:60].max() == np.float32(MIN_WEIGHT)
     far = np.ones(found.shape, bool)
     far[8:56, 16:72] = False
     assert found[far].min() > 0.99
@@ -42,7 +42,7 @@ def test_fine_texture_that_the_field_lacks_keeps_its_weight():
     difference = 0.15 * rng.choice([-1.0, 1.0], (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
     # A block's mean of 64 signs is .15 / 8 wide, in 3 channels .03: half the scale, a weight of .6.
     assert np.median(weights_of(difference)) > 0.4
-    assert np.median(weights_of(np.full_like(difference, 0.15))) == 0.0
+    assert np.median(weights_of(np.full_like(difference, 0.15))) == np.float32(MIN_WEIGHT)
 
 
 def test_masked_pixels_say_nothing():

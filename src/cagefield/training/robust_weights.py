@@ -5,7 +5,7 @@ that no single field explains. Fine texture that the field does not resolve yet 
 averages out over a block. So each photo has, for each block of BLOCK x BLOCK pixels, a running mean of the
 residual r_B = |mean_B(picture - photo)| over color channels, and the weight
 
-    w_B = 1 / (1 + (r_B / s)^2)^2,   0 below MIN_WEIGHT,   s = max(MIN_SCALE, SCALE_MEDIANS median(r)),
+    w_B = max(MIN_WEIGHT, 1 / (1 + (r_B / s)^2)^2),   s = max(MIN_SCALE, SCALE_MEDIANS median(r)),
 
 Geman and McClure's, the median over blocks of all photos; r_B is taken from the largest residual among a
 block's neighbors where the block contradicts itself by half the scale, so that outlines of an outlier go too.
@@ -35,8 +35,8 @@ MIN_SCALE = 0.06
 SCALE_MEDIANS = 8.0
 """The same in medians of all blocks' residuals."""
 
-MIN_WEIGHT = 0.1
-"""Weight below which a block counts for nothing."""
+MIN_WEIGHT = 0.15
+"""Least weight of a block: one that no other photo shows is fitted all the same, if more slowly."""
 
 FROM = 0.25
 """Progress of a training from which weights count: before, the field is too coarse to contradict."""
@@ -100,7 +100,7 @@ class RobustWeights:
         own = self.of_photo(index)
         around = np.where(own > 0.5 * self.scale, maximum_filter(own, 3, mode="nearest"), own)
         weights = 1.0 / (1.0 + (around / self.scale) ** 2) ** 2
-        return np.where(weights < MIN_WEIGHT, 0.0, weights).astype(np.float32)
+        return np.maximum(weights, MIN_WEIGHT).astype(np.float32)
 
     def weigh(self, index: int, weights: NDArray[np.float32]) -> None:
         """Scales weights [tiles,AREA] of a photo at its whole size by those of its blocks."""
