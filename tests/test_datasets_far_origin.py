@@ -11,6 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
+from cagefield.datasets.pose_refinement import RefinedPoses
+from cagefield.datasets.pose_verification import with_cameras
 from cagefield.ply import read_ply
 from cagefield.scene import Scene
 from commands import printed
@@ -109,3 +111,14 @@ def test_exports_of_trained_scenes_have_the_files_coordinates(tmp_path, capsys, 
     vertex = read_ply(tmp_path / "a.ply").elements["vertex"]
     found = np.stack([vertex[axis] for axis in "xyz"], axis=1)
     np.testing.assert_allclose(found, trained.field.means + np.array(data.offset), atol=1e-6)
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+def test_poses_in_another_world_have_no_offset(tmp_path, aligned):
+    write_transforms(tmp_path, UTM)
+    with pytest.warns(UserWarning, match="far from the origin"):
+        data = load_dataset(tmp_path)
+    cameras = {view.name: view.camera for view in (*data.train, *data.test)}
+    found = with_cameras(data, RefinedPoses(cameras, data.points, 0.5, aligned))
+    assert found.offset == (data.offset if aligned else (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(found.source_to_world, data.source_to_world if aligned else np.eye(4))

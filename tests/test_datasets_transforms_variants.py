@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from cagefield.cli import main
 from cagefield.datasets import load_dataset
+from cagefield.datasets.transforms_json import read_json
 from cagefield.errors import DatasetError
 from posed_photos import ring, save
 
@@ -53,6 +55,28 @@ def test_small_faults_of_the_text(tmp_path):
     values = {**_values(tmp_path), "fl_x": "30.0", "totp": [float("nan")], "note": "a // b, }"}
     text = json.dumps(values)[:-1] + ", // the end\n /* none */ }"
     _assert_right(_load(tmp_path, text))
+
+
+def test_faults_of_the_text_keep_the_place_of_errors(tmp_path):
+    text = '{ /* one\n two */ "a": "x\\" // no comment", // three\n "b": [1, 2,], }'
+    values = read_json(_written(tmp_path, text))
+    assert values == {"a": 'x" // no comment', "b": [1, 2]}
+    with pytest.raises(DatasetError, match="not valid JSON at line 3, column 7 "):
+        read_json(_written(tmp_path, text.replace("[1, 2,]", "!!!")))
+
+
+@pytest.mark.parametrize("part", ['"', '\\"', "/*", ",", '"a', "//\n", ", ", "\\", "}"])
+def test_damaged_text_takes_linear_time(tmp_path, part):
+    """A megabyte is passed by within seconds; where each character began a search to the end, in hours."""
+    began = time.process_time()
+    with pytest.raises(DatasetError, match="not valid JSON"):
+        read_json(_written(tmp_path, '{"a": ' + part * (1_000_000 // len(part))))
+    assert time.process_time() - began < 5.0
+
+
+def _written(folder: Path, text: str) -> Path:
+    (folder / "a.json").write_text(text)
+    return folder / "a.json"
 
 
 def test_uniform_scale_of_rotations_is_taken_out_and_said(tmp_path):

@@ -14,6 +14,8 @@ from reader_seeds import Read, Reader
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.datasets.point_files import read_points
+from cagefield.datasets.raw_masks import RawMasks
+from cagefield.datasets.raw_photos import upright
 from cagefield.rendering.images import read_image
 from posed_photos import room_capture, save_llff
 from scenes import ball_cameras
@@ -157,8 +159,150 @@ def points_reader(count: int = 50) -> Reader:
     )
 
 
+def _make_faulty_transforms(folder: Path) -> None:
+    """Comments, commas before closing brackets, numbers in text, an infinite pose, map coordinates."""
+    _make_transforms(4, folder)
+    file = folder / "capture" / "transforms.json"
+    values = json.loads(file.read_text())
+    values |= {
+        "fl_x": "30.0",
+        "k1": "0.01",
+        "totp": [float("nan")],
+        "note": "a // b, }",
+        "applied_scale": "0.5",
+    }
+    values["applied_transform"] = [[0, 1, 0, 3], [1, 0, 0, 4], [0, 0, -1, 5]]
+    for frame in values["frames"]:
+        for row, far in enumerate((500123.25, 5412345.5, 312.0)):
+            frame["transform_matrix"][row] = [str(value) for value in frame["transform_matrix"][row]]
+            frame["transform_matrix"][row][3] = repr(float(frame["transform_matrix"][row][3]) + far)
+    values["frames"][3]["transform_matrix"] = [[float("-inf")] * 4] * 4
+    file.write_text("// a capture\n" + json.dumps(values, indent=1)[:-1] + ", /* the end */ }")
+
+
+def _make_written_by_others(folder: Path) -> None:
+    """A text model: a byte order mark, spaces and backslashes in names, no second lines, an unused camera."""
+    _make_colmap(True, 3, 20, 1)(folder)
+    model = folder / "capture" / "sparse" / "0"
+    for name in ("rigs", "frames"):
+        (model / f"{name}.txt").unlink()
+    lines = [line for line in (model / "images.txt").read_text().splitlines() if line.endswith(".png")]
+    for n, line in enumerate(lines):
+        old = line.split()[-1]
+        new = folder / "capture" / "images" / f"cam {n % 2}" / f"photo {old}"
+        new.parent.mkdir(exist_ok=True)
+        (folder / "capture" / "images" / old).rename(new)
+        lines[n] = line.removesuffix(old) + f"cam {n % 2}\\photo {old}"
+    (model / "images.txt").write_text("\r\n".join(lines) + "\r\n")
+    cameras = (model / "cameras.txt").read_text()
+    (model / "cameras.txt").write_text("\ufeff" + cameras + "77 FULL_OPENCV 9 9 5 5 4 4 0 0 0 0 0 0 0 0\n")
+
+
+LENSES = {
+    "SIMPLE_RADIAL_FISHEYE": "30 12 8 0.01",
+    "RADIAL_FISHEYE": "30 12 8 0.01 0.001",
+    "FULL_OPENCV": "30 30 12 8 0.04 -0.02 0.001 0.001 0 0.01 0 0",
+    "THIN_PRISM_FISHEYE": "30 30 12 8 0.01 0 0.001 0 0 0 0.001 0",
+    "FOV": "30 30 12 8 0.1",
+}
+"""Parameters, by COLMAP's name of the lens."""
+
+
+def _make_lens(model: str, folder: Path) -> None:
+    _make_colmap(True, 3, 20, 1)(folder)
+    file = folder / "capture" / "sparse" / "0" / "cameras.txt"
+    file.write_text(f"1 {model} 24 16 {LENSES[model]}\n")
+
+
+def _make_panoramas(folder: Path) -> None:
+    _make_transforms(3, folder)
+    file = folder / "capture" / "transforms.json"
+    values = {"camera_model": "EQUIRECTANGULAR", "frames": json.loads(file.read_text())["frames"]}
+    for frame in values["frames"]:
+        Image.fromarray(np.full((16, 32, 3), 90, np.uint8)).save(folder / "capture" / frame["file_path"])
+    file.write_text(json.dumps(values))
+
+
+def _read_pixels(folder: Path) -> None:
+    data = load_dataset(folder / "capture")
+    for view in (*data.train, *data.test):
+        view.load()
+        view.valid_pixels()
+
+
+def _make_masks(folder: Path) -> None:
+    """`mask_path` of the first frame; of the second a mask in the folder `masks`."""
+    _make_transforms(3, folder)
+    capture = folder / "capture"
+    file = capture / "transforms.json"
+    values = json.loads(file.read_text())
+    values["frames"][0]["mask_path"] = "hidden/0.png"
+    file.write_text(json.dumps(values))
+    mask = np.full((16, 24), 255, np.uint8)
+    mask[4:8] = 0
+    for name in ("hidden/0.png", "masks/1.png", "images/dynamic_mask_2.png"):
+        (capture / name).parent.mkdir(exist_ok=True)
+        Image.fromarray(mask).save(capture / name)
+
+
+def _make_raw_masks(folder: Path) -> None:
+    (folder / "photos" / "masks").mkdir(parents=True)
+    mask = np.full((16, 24), 255, np.uint8)
+    mask[4:8] = 0
+    for n in range(3):
+        exif = Image.Exif()
+        exif[0x0112] = 6
+        photo = Image.fromarray(np.full((16, 24, 3), 90, np.uint8))
+        photo.save(folder / "photos" / f"{n}.jpg", exif=exif)
+        Image.fromarray(mask).save(folder / "photos" / "masks" / f"{n}.png")
+
+
+def _read_raw_masks(folder: Path) -> None:
+    photos = folder / "photos"
+    names = [f"{n}.jpg" for n in range(3)]
+    masks = RawMasks.of(photos, names)
+    masks.digest()
+    for name in names:
+        photo = upright(photos / name, name, folder / "out")
+        masks.write(name, photos / name, photo, folder / "valid")
+
+
+def variant_readers() -> dict[str, Reader]:
+    """Of data sets as other programs write them, with pixels and masks where these are at stake."""
+    model = "capture/sparse/0"
+    found = {
+        "transforms.json, faulty": Reader(
+            _make_faulty_transforms, _read_capture, {"capture/transforms.json": "text"}
+        ),
+        "COLMAP, text of others": Reader(
+            _make_written_by_others,
+            _read_capture,
+            {f"{model}/{name}.txt": "text" for name in ("cameras", "images", "points3D")},
+        ),
+        "panoramas": Reader(_make_panoramas, _read_pixels, {"capture/transforms.json": "json"}),
+        "masks": Reader(
+            _make_masks,
+            _read_pixels,
+            {"capture/transforms.json": "json"}
+            | dict.fromkeys(
+                (f"capture/{name}" for name in ("hidden/0.png", "masks/1.png", "images/dynamic_mask_2.png")),
+                "png",
+            ),
+        ),
+        "masks of raw photos": Reader(
+            _make_raw_masks, _read_raw_masks, {"photos/masks/0.png": "png", "photos/1.jpg": "bytes"}
+        ),
+    }
+    for lens in LENSES:
+        found[f"lens {lens}"] = Reader(
+            partial(_make_lens, lens), _read_pixels, {f"{model}/cameras.txt": "small text"}
+        )
+    return found
+
+
 DATASET_READERS: dict[str, Reader] = {
     "transforms.json": transforms_reader(),
+    **variant_readers(),
     **colmap_readers(),
     "LLFF": llff_reader(),
     "points.ply": points_reader(),

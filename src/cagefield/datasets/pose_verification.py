@@ -170,7 +170,8 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
 def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
     """The data set with other cameras and points; views without a camera are left out.
 
-    The cube of interest of an unbounded capture is found anew.
+    The cube of interest of an unbounded capture is found anew. In another world than the given one nothing is
+    known of the file's coordinates.
     """
 
     def moved(views: tuple[View, ...]) -> tuple[View, ...]:
@@ -192,6 +193,8 @@ def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
         bounds=bounds,
         depths=depth_range(cameras, positions),
         points=found.points,
+        source_to_world=dataset.source_to_world if found.aligned else np.eye(4),
+        offset=dataset.offset if found.aligned else (0.0, 0.0, 0.0),
     )
 
 

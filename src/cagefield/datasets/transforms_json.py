@@ -19,8 +19,10 @@ from cagefield.regular_files import read_bytes
 FloatArray = npt.NDArray[np.float64]
 
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
-_COMMENTS = re.compile(r'"(?:[^"\\]|\\.)*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
-_COMMAS = re.compile(r'"(?:[^"\\]|\\.)*"|,(?=\s*[}\]])', re.DOTALL)
+# What has no end is taken to the end of the text, so that each character is looked at once.
+_STRING = r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\Z)'
+_COMMENTS = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_COMMAS = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -51,11 +53,18 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def _strict(text: str) -> str:
     """The text without comments (their lines stay) and without commas before a closing bracket."""
+    return _blanked(_COMMAS, _blanked(_COMMENTS, text))
 
-    def without(found: re.Match[str]) -> str:
-        return found[0] if found[0].startswith('"') else re.sub(r"[^\n]", " ", found[0])
 
-    return _COMMAS.sub(without, _COMMENTS.sub(without, text))
+def _blanked(pattern: re.Pattern[str], text: str) -> str:
+    """The text with spaces in the place of what a pattern finds outside of strings; line breaks stay."""
+    parts, at = list[str](), 0
+    for found in pattern.finditer(text):
+        begin, end = found.span()
+        if text[begin] != '"':
+            parts += [text[at:begin], "\n".join(" " * len(line) for line in text[begin:end].split("\n"))]
+            at = end
+    return "".join([*parts, text[at:]])
 
 
 def number(where: str, source: dict[str, Any], key: str) -> float | None:
