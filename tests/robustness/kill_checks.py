@@ -213,6 +213,23 @@ def demo_problem(folder: Path, said: int) -> str | None:
     return photos_problem("demo/photos")(folder, 1)
 
 
+def posed_problem(folder: Path, said: int) -> str | None:
+    """What is wrong with the transforms.json, of which an old one was there: not whole, or a file gone."""
+    from cagefield import datasets
+
+    data = folder / "data"
+    if not (data / "notes.txt").is_file():
+        return "lost: the user's file"
+    try:
+        found = datasets.load_dataset(data, holdout=0)
+        views = {view.name: view for view in (*found.train, *found.test, *found.val)}
+        for view in views.values():
+            view.load()
+    except Exception as error:
+        return f"unreadable: {error}"
+    return None if len(views) == 5 else f"lost: {5 - len(views)} photos of 5"
+
+
 def poses_problem(folder: Path, said: int) -> str | None:
     """What is wrong with the data set, of which an old one was there: not whole, or the user's file gone."""
     from cagefield import datasets

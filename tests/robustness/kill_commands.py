@@ -17,6 +17,7 @@ from kill_checks import (
     new_problem,
     photos_problem,
     pictures_problem,
+    posed_problem,
     poses_problem,
     scene_problem,
     trained_problem,
@@ -27,6 +28,9 @@ from kill_lines import LINES, SLOW_LINES
 from kill_points import Say
 
 from cagefield import Scene
+from cagefield.datasets import load_dataset
+from cagefield.datasets.procedural import make_scene
+from cagefield.datasets.transforms_writer import write_transforms
 from cagefield.rendering.images import write_png
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
@@ -213,6 +217,20 @@ def _poses_of_video(folder: Path, say: Say) -> None:
 
 
 _pictures = Command(_make_pictures, _render, pictures_problem)
+
+
+def _make_verified(folder: Path) -> None:
+    make_scene("chair", folder / "photos", views=3, size=16, test_views=1)
+    write_transforms(load_dataset(folder / "photos"), folder / "data")
+    (folder / "data" / "notes.txt").write_text("mine")
+
+
+def _verify(folder: Path, say: Say) -> None:
+    cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
+    say(1)
+
+
+_verifying = Command(_make_verified, _verify, posed_problem)
 _posing = Command(_make_posed, _poses, poses_problem)
 
 COMMANDS: dict[str, Command] = {
@@ -240,6 +258,8 @@ SLOW_COMMANDS: dict[str, Command] = {
     "poses": _posing,
     "poses, renames": renamed(_posing, "data"),
     "poses of a video": Command(_make_posed_video, _poses_of_video, poses_problem),
+    "poses of a data set": _verifying,
+    "poses of a data set, renames": renamed(_verifying, "data"),
     "render, pictures, renames": renamed(_pictures, "out"),
     **SLOW_LINES,
 }

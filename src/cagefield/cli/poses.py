@@ -53,6 +53,7 @@ class Poses:
             print(make(self.photos, self.out, self.frames, self.masks))
             verified(load_dataset(self.out, downscale=1), correct=False)
         else:
+            recover_folder(real_path(self.out), lambda folder: (folder / FILE).is_file())
             check_folder(self.out, self.overwrite, FILE)
             found = verified(load_dataset(self.photos, downscale=1, holdout=0, masks=self.masks))
             with progress_bar("Writing photos") as move:

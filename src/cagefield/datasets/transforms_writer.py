@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from cagefield.atomic_files import replaced_folder
+from cagefield.atomic_files import recover_folder, replaced_folder
 from cagefield.datasets.features import OnProgress
 from cagefield.datasets.views import Dataset, SparsePoints, View
 
@@ -34,6 +34,7 @@ def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | N
 
     Raises DatasetError where a photo cannot be read, OSError where the folder cannot be written.
     """
+    recover_folder(target, lambda folder: (folder / FILE).is_file())
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     views = {view.name: view for split in splits.values() for view in split}
     with replaced_folder(target, FILES) as draft:
