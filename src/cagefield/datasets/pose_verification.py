@@ -42,6 +42,9 @@ MAX_GAIN = 0.7
 MAX_CONTRADICTED = 0.05
 """Share of pairs that contradict adjusted poses, above which structure from motion is tried too."""
 
+MAX_FOLD_GAIN = 0.85
+"""The same of folded poses with a small error: pairs across a real fold have a large one."""
+
 MAX_SHARED_GAIN = 1.25
 """The same where only focal lengths are scattered: one lens for all must explain the photos as well."""
 
@@ -158,8 +161,10 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
     """
     if after is None:
         return before is None and fold is not None
-    if before is None or fold is not None:
+    if before is None:
         return not after.is_wrong
+    if fold is not None and not before.is_wrong:
+        return not after.is_wrong and after.capped < MAX_FOLD_GAIN * before.capped
     if not before.is_wrong:
         return not after.is_wrong and after.median <= MAX_SHARED_GAIN * before.median
     if not after.is_wrong:
