@@ -112,7 +112,7 @@ def test_plain(tmp_path):
         {"extra": ("77 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 0 0 0",)},
         {"extra": ("78 NEWEST 640 480 500",)},
     ],
-    ids=str,
+    ids=lambda changes: "-".join(changes),
 )
 @pytest.mark.filterwarnings("ignore:.*not where it says")
 def test_variants_are_read_alike(tmp_path, changes):

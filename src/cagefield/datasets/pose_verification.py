@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from cagefield import json_text
 from cagefield.atomic_files import replaced_file
@@ -42,8 +43,8 @@ MAX_GAIN = 0.7
 MAX_CONTRADICTED = 0.05
 """Share of pairs that contradict adjusted poses, above which structure from motion is tried too."""
 
-MAX_FOLD_GAIN = 0.85
-"""The same of folded poses with a small error: pairs across a real fold have a large one."""
+MIN_FOLD_TURN_DEG = 5.0
+"""Turn of a tenth of the photos, at least, by which new poses differ from those of a real fold."""
 
 MAX_SHARED_GAIN = 1.25
 """The same where only focal lengths are scattered: one lens for all must explain the photos as well."""
@@ -114,7 +115,7 @@ def verify_poses(
         after = pose_error(matches, [view.whole() for view in all_views(other)])
         if not _is_better(before, after, fold):
             return None
-        if fold is not None and find_fold(other) is not None:
+        if fold is not None and (_agrees(dataset, found) or find_fold(other) is not None):
             return None
         names = tuple(view.name for view in views if view.name not in found.cameras)
         return Verification(other, before, after, fold, outcome, found.aligned, names)
@@ -164,12 +165,20 @@ def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | N
     if before is None:
         return not after.is_wrong
     if fold is not None and not before.is_wrong:
-        return not after.is_wrong and after.capped < MAX_FOLD_GAIN * before.capped
+        return not after.is_wrong
     if not before.is_wrong:
         return not after.is_wrong and after.median <= MAX_SHARED_GAIN * before.median
     if not after.is_wrong:
         return after.capped < before.capped
     return after.median < MAX_GAIN * before.median and after.capped < MAX_GAIN * before.capped
+
+
+def _agrees(dataset: Dataset, found: RefinedPoses) -> bool:
+    """Whether new poses say the same as the given ones, so that these are not folded."""
+    given = [view.camera.c2w[:3, :3] for view in all_views(dataset) if view.name in found.cameras]
+    new = [found.cameras[view.name].c2w[:3, :3] for view in all_views(dataset) if view.name in found.cameras]
+    turns = Rotation.from_matrix(np.stack(given).transpose(0, 2, 1) @ np.stack(new)).magnitude()
+    return found.aligned and bool(np.degrees(np.quantile(turns, 0.9)) < MIN_FOLD_TURN_DEG)
 
 
 def with_cameras(dataset: Dataset, found: RefinedPoses) -> Dataset:
