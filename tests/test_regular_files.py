@@ -154,7 +154,9 @@ def test_links_in_a_circle_are_one_line(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "e.yaml").write_text("edits: []\n")
     assert str(loop) in refused(capsys, "edit", scene, tmp_path / "e.yaml", "-o", loop)
     (tmp_path / "folder.sog").mkdir()
-    assert "it has no meta.json" in refused(capsys, "import", tmp_path / "folder.sog", "-o", tmp_path / "new")
+    assert "a folder without meta.json" in refused(
+        capsys, "import", tmp_path / "folder.sog", "-o", tmp_path / "new"
+    )
 
 
 def test_links_in_a_circle_beside_a_scene_stop_no_editor(tmp_path: Path) -> None:

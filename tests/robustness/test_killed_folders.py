@@ -239,7 +239,9 @@ def test_poses_that_a_training_used_come_back(
 
     monkeypatch.setattr(dataset, "has_photos_alone", lambda photos: True)
     monkeypatch.setattr(
-        structure_from_motion, "is_made_of", lambda target, photos: (target / "poses.json").is_file()
+        structure_from_motion,
+        "is_made_of",
+        lambda target, photos, masks=None: (target / "poses.json").is_file(),
     )
     made_poses(tmp_path)
     put_aside(tmp_path / "out", ended)

@@ -48,13 +48,13 @@ class Poses:
         from cagefield.datasets.transforms_writer import FILE, write_transforms
 
         check_number("--frames", self.frames, 3, 10_000)
+        marks = (RECORD, FILE)
+        recover_folder(real_path(self.out), lambda folder: any((folder / mark).is_file() for mark in marks))
+        check_folder(self.out, self.overwrite, next((m for m in marks if (self.out / m).is_file()), FILE))
         if has_photos_alone(self.photos.expanduser()) or not self.photos.expanduser().exists():
-            check_folder(self.out, self.overwrite, RECORD)
             print(make(self.photos, self.out, self.frames, self.masks))
             verified(load_dataset(self.out, downscale=1), correct=False)
         else:
-            recover_folder(real_path(self.out), lambda folder: (folder / FILE).is_file())
-            check_folder(self.out, self.overwrite, FILE)
             found = verified(load_dataset(self.photos, downscale=1, holdout=0, masks=self.masks))
             with progress_bar("Writing photos") as move:
                 write_transforms(found.dataset, self.out, lambda done, note: move(done, 1.0, note))
