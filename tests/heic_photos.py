@@ -30,4 +30,4 @@ TURNED_HEIC = base64.b64decode(
     "Aa8J4CGAdKWv/s9gcK//lVx//57x0P3p+Pj/+f2f/+e9Y/5m8dO5L//7zjX/6+ir/6144cXZIsu3/YIWHA99aej7E34gdWP/"
     "rt8jq+ejODP9/tg4Mg1n84R+1ae3/B4tdPnVEhh2f7HUVl74r45lNHP/0uekTYhtTyvGbQZ+/VokVdNwHTcZ3A=="
 )
-"""The same with the property `irot` of 270 degrees anticlockwise: upright it is 48 x 64."""
+"""HEIC photo with the property `irot` of 270 degrees anticlockwise: upright it is 48 x 64."""

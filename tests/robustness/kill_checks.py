@@ -214,7 +214,7 @@ def demo_problem(folder: Path, said: int) -> str | None:
 
 
 def posed_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with the transforms.json, of which an old one was there: not whole, or a file gone."""
+    """Fault of the transforms.json, of which an old one was there: not whole, or a file gone."""
     from cagefield import datasets
 
     data = folder / "data"

@@ -41,7 +41,7 @@ def describe_dataset(dataset: Dataset) -> list[str]:
 
 
 def describe_world(source_to_world: NDArray[np.float64]) -> str:
-    """What a similarity [4,4] does to the reconstruction's coordinates; empty where nothing."""
+    """Description of a similarity [4,4] of the reconstruction's coordinates; empty for the identity."""
     linear, shift = source_to_world[:3, :3], source_to_world[:3, 3]
     scale = float(np.cbrt(abs(np.linalg.det(linear))))
     parts = ["mirrored"] * bool(np.linalg.det(linear) < 0.0)

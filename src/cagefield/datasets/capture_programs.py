@@ -29,7 +29,7 @@ LAYOUTS += "cameras (RealityCapture), cameras.sfm (Meshroom)"
 
 
 def program_of_folder(folder: Path) -> tuple[Reader, Path] | None:
-    """What reads a capture program's folder, and the file or folder that it reads; None for other folders."""
+    """Reader of a capture program's folder, and the file or folder that it reads; None for other folders."""
     for find, load in (
         (find_polycam, load_polycam),
         (find_record3d, load_record3d),
@@ -45,7 +45,7 @@ def program_of_folder(folder: Path) -> tuple[Reader, Path] | None:
 
 
 def program_of_file(file: Path) -> tuple[Reader, Path] | None:
-    """What reads a capture program's file, and the file; None for other files."""
+    """Reader of a capture program's file, and the file; None for other files."""
     suffix = file.suffix.lower()
     if suffix == ".sfm":
         return load_meshroom, file

@@ -57,7 +57,7 @@ def _load(path: Path, downscale: int | None, holdout: int) -> Dataset:
 
 
 def _reader_of(path: Path) -> tuple[Reader, Path]:
-    """What reads the data set at `path`, and the folder or file that it reads."""
+    """Reader of the data set at `path`, and the folder or file that it reads."""
     if not path.exists():
         raise DatasetError(f"{path} does not exist; give the folder of the photos and their camera file")
     if path.is_file():

@@ -36,7 +36,7 @@ class Header:
     height: int
     alpha: bool
     conversion: str | None = None
-    """What is done to its pixels, as of `color_conversion.conversion_of`."""
+    """Conversion of its pixels, as of `color_conversion.conversion_of`."""
 
 
 def find_photo(path: Path) -> Path | None:

@@ -20,7 +20,7 @@ MAX_MEDIAN_TURN_DEG = 15.0
 """Median angle between aligned orientations, above which two sets of poses have nothing in common."""
 
 MAX_MEDIAN_OFFSET = 0.3
-"""The same of positions, in shares of their spread."""
+"""Median offset between aligned positions, in shares of their spread, from which poses disagree."""
 
 ROUNDS = 50
 

@@ -58,7 +58,7 @@ MAX_MEDIAN_PIXELS = 0.9
 """Median of the photos' errors from which poses are wrong; right ones have .15 to .65."""
 
 MAX_TENTH_PIXELS = 4.0
-"""The same of the 90 % quantile; right ones have up to 1."""
+"""90 % quantile of the photos' errors from which poses are wrong; right ones have up to 1."""
 
 MAX_PAIR_PIXELS = 8.0
 """Error at which that of a pair is capped in the mean over pairs: false matches count no more than others."""

@@ -47,7 +47,7 @@ MIN_FOLD_TURN_DEG = 5.0
 """Turn of a tenth of the photos, at least, by which new poses differ from those of a real fold."""
 
 MAX_SHARED_GAIN = 1.25
-"""The same where only focal lengths are scattered: one lens for all must explain the photos as well."""
+"""Epipolar error after over before, at most, where only focal lengths are scattered."""
 
 _VERSION = b"poses 1"
 

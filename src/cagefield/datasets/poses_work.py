@@ -231,7 +231,7 @@ def plainly_named(photos: Sequence[RawPhoto], work: Path) -> list[str]:
 
 
 def record_of(source: Path, frames: int, masks: Path | None = None) -> dict[str, Any]:
-    """What tells one set of photos from another: names, sizes in bytes, times of change; digest of masks."""
+    """Record of a set of photos: names, sizes in bytes, times of change; digest of masks."""
     if not source.exists():
         raise DatasetError(f"{source} does not exist; give a folder of photos or a video")
     if source.is_file() and not is_video(source):

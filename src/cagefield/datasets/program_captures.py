@@ -88,7 +88,7 @@ def _named_values(where: str) -> Iterator[None]:
 
 @dataclass
 class ProgramCapture:
-    """What a program's file says.
+    """Content of a program's file.
 
     Attributes:
         file: it, or its folder, for messages.

@@ -72,7 +72,7 @@ class RawMasks:
         return cls(masks)
 
     def digest(self) -> str:
-        """What tells these masks from others: a digest of names, sizes in bytes and times of change."""
+        """Identity of these masks: a digest of names, sizes in bytes and times of change."""
         if not self.masks:
             return ""
         states = [

@@ -229,7 +229,7 @@ def _xmp_files(folder: Path) -> list[Path]:
 
 
 def _xmp_values(file: Path) -> dict[str, str]:
-    """What an XMP file says in the namespace of RealityCapture, as attributes or elements."""
+    """Values of an XMP file in the namespace of RealityCapture, as attributes or elements."""
     values: dict[str, str] = {}
     for element in read_xml(file).iter():
         values |= {k.removeprefix(_XCR): v for k, v in element.attrib.items() if k.startswith(_XCR)}

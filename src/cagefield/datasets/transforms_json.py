@@ -19,7 +19,7 @@ from cagefield.regular_files import read_bytes
 FloatArray = npt.NDArray[np.float64]
 
 _MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
-# What has no end is taken to the end of the text, so that each character is looked at once.
+# A pattern without an end is taken to the end of the text, so that each character is looked at once.
 _STRING = r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\Z)'
 _COMMENTS = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _COMMAS = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)

@@ -90,7 +90,7 @@ class View:
         return replace(self, camera=self.camera.downscaled(factor), downscale=self.downscale * factor)
 
     def whole(self) -> View:
-        """The same photo, not shrunk: all pixels of its file, and their camera.
+        """View of the whole photo, not shrunk: all pixels of its file, and their camera.
 
         Raises DatasetError where the file cannot be read.
         """

@@ -34,7 +34,7 @@ def has_alpha(image: Image.Image) -> bool:
 
 
 def conversion_of(image: Image.Image) -> str | None:
-    """What is lost or changed by reading a picture as 8-bit sRGB, in words; None for nothing.
+    """Loss by reading a picture as 8-bit sRGB, in words; None for nothing.
 
     The picture's pixels must not have been loaded yet.
     """
@@ -107,7 +107,7 @@ def _profiled_mode(image: Image.Image) -> str:
 
 
 def _profile_of(image: Image.Image) -> tuple[ImageCms.ImageCmsTransform, str] | None:
-    """What converts a picture's colors to sRGB, and the name of its profile; None where they are sRGB.
+    """Conversion of a picture's colors to sRGB, and the name of its profile; None where they are sRGB.
 
     Profiles that cannot be read, or of another kind of color than the picture's, are none.
     """

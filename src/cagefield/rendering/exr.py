@@ -106,7 +106,7 @@ def _described(file: Any, path: Path) -> tuple[Mapping[str, Any], int, dict[str,
 
 
 def _color_channels(names: list[str]) -> dict[str, str]:
-    """Those of the layer without a name; else of the first layer that has colors; else none."""
+    """Channels of the layer without a name; else of the first layer that has colors; else none."""
     layers = sorted({name.rpartition(".")[0] for name in names}, key=lambda layer: (layer != "", layer))
     for layer in layers:
         prefix = f"{layer}." if layer else ""

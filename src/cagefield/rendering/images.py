@@ -42,7 +42,7 @@ _DENSEST, _ALWAYS = 1100, 1 << 18
 """Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
 
 _DENSEST_EFFICIENT = 16 * _DENSEST
-"""The same of HEIF and AVIF: flat blocks of 64 x 64 pixels take a fraction of a bit."""
+"""Pixels for each byte of HEIF and AVIF, at most: flat blocks of 64 x 64 pixels take a fraction of a bit."""
 
 _TILE = 1 << 16
 

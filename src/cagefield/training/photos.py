@@ -111,7 +111,7 @@ class Photos:
     def patches(self, size: int) -> NDArray[np.int32]:
         """Patches [P, 3] (view, first column, first row) of size x size pixels that tile the photos.
 
-        Those without a valid pixel are left out.
+        Views without a valid pixel are left out.
         """
         found = []
         first = 0

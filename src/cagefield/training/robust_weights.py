@@ -33,7 +33,7 @@ MIN_SCALE = 0.06
 """Least residual at which a weight falls to a quarter, of colors in [0,1]."""
 
 SCALE_MEDIANS = 8.0
-"""The same in medians of all blocks' residuals."""
+"""Residual at which a weight falls to a quarter, in medians of all blocks' residuals."""
 
 MIN_WEIGHT = 0.15
 """Least weight of a block: one that no other photo shows is fitted all the same, if more slowly."""
