@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from cagefield import json_text
+from cagefield.datasets.transforms_json import read_json
 from cagefield.errors import DatasetError
-from cagefield.regular_files import MOST_TEXT, read_bytes
+from cagefield.regular_files import MOST_TEXT
 
 
 def read_object(path: Path, most: int = MOST_TEXT) -> dict[str, Any]:
@@ -16,18 +15,7 @@ def read_object(path: Path, most: int = MOST_TEXT) -> dict[str, Any]:
 
     Raises DatasetError where it is not one.
     """
-    try:
-        values = json_text.loads(read_bytes(path, most).decode("utf-8-sig"), finite=False)
-    except json.JSONDecodeError as error:
-        raise DatasetError(
-            f"{path}: not valid JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
-            "the file may be cut off, copy it again"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"{path}: cannot be read ({error})") from None
-    if not isinstance(values, dict):
-        raise DatasetError(f"{path}: must be a JSON object; export it again")
-    return values
+    return read_json(path, most, "of a capture program; export it again")
 
 
 def objects_of(where: str, values: dict[str, Any], key: str) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from cagefield import json_text
 from cagefield.camera_checks import RIGID_TOLERANCE
 from cagefield.errors import DatasetError
-from cagefield.regular_files import read_bytes
+from cagefield.regular_files import MOST_TEXT, read_bytes
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -25,15 +25,17 @@ _COMMENTS = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _COMMAS = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """The object of a JSON file in UTF-8, or UTF-16 with its mark; comments and last commas are passed by.
+def read_json(path: Path, most: int = MOST_TEXT, wanted: str = "with the key 'frames'") -> dict[str, Any]:
+    """The object of a JSON file of at most `most` bytes, in UTF-8, or UTF-16 with its mark.
+
+    Comments and last commas are passed by; `wanted` is what an error asks of the object.
 
     NaN and infinite numbers are kept: who reads a value checks it.
 
     Raises DatasetError, with line and column, for what is no JSON object.
     """
     try:
-        content = read_bytes(path)
+        content = read_bytes(path, most)
         text = content.decode(_MARKS.get(content[:2], "utf-8-sig"))
         try:
             values = json_text.loads(text, finite=False)
@@ -47,7 +49,7 @@ def read_json(path: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: cannot be read ({error})") from None
     if not isinstance(values, dict):
-        raise DatasetError(f"{path}: must be a JSON object with the key 'frames'")
+        raise DatasetError(f"{path}: must be a JSON object {wanted}")
     return values
 
 
