@@ -143,9 +143,10 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
     assert poses_command.verified(right).dataset is right and len(solver.calls) == 1
 
 
-def test_poses_found_anew_that_are_no_better_are_not_taken(photos, tmp_path, monkeypatch, capsys):
+def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tmp_path, monkeypatch, capsys):
     wrong = dataset(tmp_path / "wrong", folded(), photos)
     monkeypatch.setattr("cagefield.datasets.pose_verification.PoseSolver", _Solver(wrong))
     monkeypatch.setattr("cagefield.datasets.pose_verification.poses_cache", lambda: tmp_path / "cache")
     assert poses_command.verified(wrong).dataset is wrong
-    assert "nothing better was found" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "poses look folded" in said and "structure from motion finds the same poses" in said

@@ -44,13 +44,10 @@ class Poses:
         """Makes the data set; prints what became of the photos."""
         from cagefield.datasets import load_dataset
         from cagefield.datasets.dataset import has_photos_alone
-        from cagefield.datasets.structure_from_motion import RECORD
-        from cagefield.datasets.transforms_writer import FILE, write_transforms
+        from cagefield.datasets.transforms_writer import RECORD, write_transforms
 
         check_number("--frames", self.frames, 3, 10_000)
-        marks = (RECORD, FILE)
-        recover_folder(real_path(self.out), lambda folder: any((folder / mark).is_file() for mark in marks))
-        check_folder(self.out, self.overwrite, next((m for m in marks if (self.out / m).is_file()), FILE))
+        check_folder(self.out, self.overwrite, RECORD)
         if has_photos_alone(self.photos.expanduser()) or not self.photos.expanduser().exists():
             print(make(self.photos, self.out, self.frames, self.masks))
             verified(load_dataset(self.out, downscale=1), correct=False)
@@ -89,7 +86,8 @@ def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
     A data set that was made of the same photos before is used again.
     """
     from cagefield.datasets.dataset import has_photos_alone
-    from cagefield.datasets.structure_from_motion import RECORD, is_made_of
+    from cagefield.datasets.structure_from_motion import is_made_of
+    from cagefield.datasets.transforms_writer import RECORD
 
     photos = photos.expanduser()
     if not has_photos_alone(photos):

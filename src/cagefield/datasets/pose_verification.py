@@ -5,17 +5,17 @@ bundle-adjusted (`pose_refinement`); where that does not cure them, structure fr
 the photos. The data set gets the poses with the least epipolar error, in its given world where they agree
 with the given ones enough to tell where that is.
 
-A correction is kept in the user's cache, under a digest of photos and given cameras.
+Figures and corrections are kept in the user's cache, under a digest of photos and given cameras.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,10 +26,10 @@ from cagefield.caches import cache_root
 from cagefield.cameras import Camera
 from cagefield.datasets.folds import Fold, find_fold
 from cagefield.datasets.points import capture_key, read_cached_points, write_cached_points
-from cagefield.datasets.pose_check import PoseError, in_order, match_photos, pose_error
+from cagefield.datasets.pose_check import PhotoMatches, PoseError, in_order, match_photos, pose_error
 from cagefield.datasets.pose_refinement import PoseSolver, RefinedPoses
 from cagefield.datasets.region import cube_of_interest, depth_range
-from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError
 from cagefield.regular_files import read_text
 from cagefield.temporary_folders import TemporaryFolder
@@ -49,7 +49,7 @@ MIN_FOLD_TURN_DEG = 5.0
 MAX_SHARED_GAIN = 1.25
 """Epipolar error after over before, at most, where only focal lengths are scattered."""
 
-_VERSION = b"poses 1"
+_VERSION = b"poses 2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +65,7 @@ class Verification:
             structure from motion.
         aligned: whether the cameras are in the given world.
         left_out: names of views without a new pose.
+        same_fold: poses found from the photos alone agree with the given ones, so that the fold is doubtful.
     """
 
     dataset: Dataset
@@ -74,6 +75,7 @@ class Verification:
     outcome: Outcome
     aligned: bool = True
     left_out: tuple[str, ...] = ()
+    same_fold: bool = False
 
 
 def all_views(dataset: Dataset) -> list[View]:
@@ -92,47 +94,83 @@ def verify_poses(
 ) -> Verification:
     """The data set with its poses measured and, with `correct`, corrected where they are wrong.
 
-    Corrections are read from and written to the folder `cache`.
+    Figures and corrections are read from and written to the folder `cache`.
 
     Raises DatasetError where a photo cannot be read, StoppedError where COLMAP fails.
     """
     views = [view.whole() for view in all_views(dataset)]
-    matches = match_photos(views, partial(on_stage, "Checking poses"))
-    before = pose_error(matches, views)
-    fold = find_fold(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
-    wrong = fold is not None or (before is not None and before.is_wrong)
-    scattered = before is not None and before.has_scattered_focals
-    if not correct or not (wrong or scattered):
-        return Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
-    file = None if cache is None else cache / f"poses-{capture_key(views, seed, _VERSION)}.json"
-    known = None if file is None else _read(file)
-    tried: list[tuple[Outcome, RefinedPoses]] = [] if known is None else [known]
-    best: Verification | None = None
+    version = _VERSION + (b" unbounded" if dataset.unbounded else b"")
+    file = None if cache is None else cache / f"poses-{capture_key(views, seed, version)}.json"
+    findings = None if file is None else _read(file)
+    if findings is None or (correct and findings.is_suspect and not findings.searched):
+        matches = match_photos(views, partial(on_stage, "Checking poses"))
+        if findings is None:
+            fold = find_fold(dataset, partial(on_stage, "Comparing photos")) if dataset.unbounded else None
+            findings = _Findings(pose_error(matches, views), fold)
+        if correct and findings.is_suspect:
+            findings = _searched(dataset, views, findings, matches, seed, on_stage)
+        if file is not None:
+            _write(file, findings)
+    before, fold = findings.before, findings.fold
+    if not correct or findings.corrected is None:
+        outcome: Outcome = "unmeasured" if before is None else "kept"
+        return Verification(dataset, before, before, fold, outcome, same_fold=findings.same_fold)
+    outcome, found, after = findings.corrected
+    left_out = tuple(view.name for view in views if view.name not in found.cameras)
+    moved = with_cameras(dataset, found)
+    return Verification(moved, before, after, fold, outcome, found.aligned, left_out, findings.same_fold)
 
-    def judged(outcome: Outcome, found: RefinedPoses) -> Verification | None:
-        """The verification with these poses where they are better than the given ones."""
+
+@dataclass(frozen=True, eq=False)
+class _Findings:
+    """Figures of given poses, whether better ones were searched for, and (outcome, poses, error) if found.
+
+    `same_fold`: new poses agree with the given ones, so that their fold is doubtful.
+    """
+
+    before: PoseError | None
+    fold: Fold | None
+    searched: bool = False
+    same_fold: bool = False
+    corrected: tuple[Outcome, RefinedPoses, PoseError | None] | None = None
+
+    @property
+    def is_suspect(self) -> bool:
+        """Whether better poses are searched for."""
+        before = self.before
+        return self.fold is not None or (
+            before is not None and (before.is_wrong or before.has_scattered_focals)
+        )
+
+
+def _searched(
+    dataset: Dataset,
+    views: list[View],
+    findings: _Findings,
+    matches: PhotoMatches,
+    seed: int,
+    on_stage: OnStage,
+) -> _Findings:
+    """The findings with the best of the corrected poses, where some are better than the given ones."""
+    before, fold = findings.before, findings.fold
+    best: tuple[Outcome, RefinedPoses, PoseError | None] | None = None
+    for outcome, found in _corrections(views, before, fold, seed, on_stage):
         other = with_cameras(dataset, found)
         after = pose_error(matches, [view.whole() for view in all_views(other)])
-        if not _is_better(before, after, fold):
-            return None
-        if fold is not None and (_agrees(dataset, found) or find_fold(other) is not None):
-            return None
-        names = tuple(view.name for view in views if view.name not in found.cameras)
-        return Verification(other, before, after, fold, outcome, found.aligned, names)
-
-    for outcome, found in tried:
-        best = judged(outcome, found)
-    if best is None:
-        for outcome, found in _corrections(views, before, fold, seed, on_stage):
-            judgement = judged(outcome, found)
-            if judgement is not None and (best is None or _error(judgement) < _error(best)):
-                best = judgement
-                if file is not None:
-                    _write(file, outcome, found)
-            after = None if best is None else best.after
-            if after is not None and not after.is_wrong and after.contradicted <= MAX_CONTRADICTED:
+        if fold is not None and not (after is not None and after.is_wrong) and _agrees(dataset, found):
+            fold, findings = None, replace(findings, same_fold=True)
+            if before is None or not (before.is_wrong or before.has_scattered_focals):
                 break
-    return best or Verification(dataset, before, before, fold, "unmeasured" if before is None else "kept")
+        if not _is_better(before, after, fold):
+            continue
+        if fold is not None and find_fold(other) is not None:
+            continue
+        if best is None or _capped(after) < _capped(best[2]):
+            best = outcome, found, after
+        after = best[2]
+        if after is not None and not after.is_wrong and after.contradicted <= MAX_CONTRADICTED:
+            break
+    return replace(findings, searched=True, corrected=best)
 
 
 def _corrections(
@@ -151,8 +189,8 @@ def _corrections(
                 yield "rebuilt", found
 
 
-def _error(one: Verification) -> float:
-    return float("inf") if one.after is None else one.after.capped
+def _capped(error: PoseError | None) -> float:
+    return float("inf") if error is None else error.capped
 
 
 def _is_better(before: PoseError | None, after: PoseError | None, fold: Fold | None) -> bool:
@@ -221,8 +259,9 @@ def describe(one: Verification) -> list[str]:
     if one.fold is not None:
         first, second = one.fold.pair
         lines.append(
-            f"poses are folded: {one.fold.photos} of {one.fold.compared} photos stand beside others that "
-            f"show something else ({first} and {second}), as where two sides of a thing look alike"
+            f"poses {'look' if one.same_fold else 'are'} folded: {one.fold.photos} of {one.fold.compared} "
+            f"photos stand beside others that show something else ({first} and {second}), as where two sides "
+            "of a thing look alike"
         )
     elif one.before is not None and one.before.has_scattered_focals:
         lines.append(
@@ -236,6 +275,8 @@ def describe(one: Verification) -> list[str]:
         }[one.outcome]
         world = "in the given world" if one.aligned else "in another world: too few agree with the given ones"
         lines.append(f"poses are {how}, {world}: {one.after}; --keep-poses leaves them as they are")
+    elif one.same_fold:
+        lines.append("structure from motion finds the same poses from the photos alone: they are used")
     elif one.fold is not None or (one.before is not None and one.before.is_wrong):
         lines.append("nothing better was found: the given poses are used")
     if one.left_out:
@@ -248,16 +289,25 @@ def poses_cache() -> Path:
     return cache_root() / "poses"
 
 
-def _write(file: Path, outcome: Outcome, found: RefinedPoses) -> None:
-    """Writes corrected poses whole or not at all; where the folder cannot be written to, nothing."""
-    values = {
-        "outcome": outcome,
-        "cameras": {name: camera.to_dict() for name, camera in found.cameras.items()},
-        "reprojection_error": found.reprojection_error,
-        "aligned": found.aligned,
+def _write(file: Path, findings: _Findings) -> None:
+    """Writes the findings whole or not at all; where the folder cannot be written to, nothing."""
+    values: dict[str, Any] = {
+        "before": None if findings.before is None else asdict(findings.before),
+        "fold": None if findings.fold is None else asdict(findings.fold),
+        "searched": findings.searched,
+        "same_fold": findings.same_fold,
     }
-    if found.points is not None:
-        write_cached_points(file.with_suffix(".npz"), found.points)
+    if findings.corrected is not None:
+        outcome, found, after = findings.corrected
+        values |= {
+            "outcome": outcome,
+            "after": None if after is None else asdict(after),
+            "cameras": {name: camera.to_dict() for name, camera in found.cameras.items()},
+            "reprojection_error": found.reprojection_error,
+            "aligned": found.aligned,
+        }
+        if found.points is not None:
+            write_cached_points(file.with_suffix(".npz"), found.points)
     try:
         with replaced_file(file) as draft:
             draft.write_text(json.dumps(values), encoding="utf-8")
@@ -265,15 +315,41 @@ def _write(file: Path, outcome: Outcome, found: RefinedPoses) -> None:
         return
 
 
-def _read(file: Path) -> tuple[Outcome, RefinedPoses] | None:
-    """Corrected poses of a file; None where it is not there or damaged."""
+def _read(file: Path) -> _Findings | None:
+    """The findings of a file; None where it is not there or damaged."""
     try:
         values = json_text.loads(read_text(file))
+        before, searched, same_fold = _error_of(values["before"]), values["searched"], values["same_fold"]
+        fold = None if values["fold"] is None else _fold_of(values["fold"])
+        if not (isinstance(searched, bool) and isinstance(same_fold, bool)):
+            return None
+        if "outcome" not in values:
+            return _Findings(before, fold, searched, same_fold)
         cameras = {str(name): Camera.from_dict(one) for name, one in values["cameras"].items()}
         outcome, error, aligned = values["outcome"], float(values["reprojection_error"]), values["aligned"]
-        points: SparsePoints | None = read_cached_points(file.with_suffix(".npz"))
         if outcome not in ("adjusted", "rebuilt") or not isinstance(aligned, bool) or not np.isfinite(error):
             return None
-        return outcome, RefinedPoses(cameras, points, error, aligned)
+        found = RefinedPoses(cameras, read_cached_points(file.with_suffix(".npz")), error, aligned)
+        return _Findings(before, fold, searched, same_fold, (outcome, found, _error_of(values["after"])))
     except (OSError, ValueError, TypeError, KeyError, AttributeError, CagefieldError):
         return None
+
+
+def _error_of(values: dict[str, Any] | None) -> PoseError | None:
+    """A pose error of a file; raises ValueError, TypeError or KeyError where it is damaged."""
+    if values is None:
+        return None
+    name, worst = values["worst"]
+    shares = [float(values[key]) for key in ("median", "tenth", "focal_spread", "capped", "contradicted")]
+    if not np.isfinite([*shares, float(worst)]).all():
+        raise ValueError("a pose error that is not finite")
+    median, tenth, focal_spread, capped, contradicted = shares
+    photos, pairs, size = (int(values[key]) for key in ("photos", "pairs", "size"))
+    one = (str(name), float(worst))
+    return PoseError(median, tenth, photos, pairs, size, one, focal_spread, capped, contradicted)
+
+
+def _fold_of(values: dict[str, Any]) -> Fold:
+    """A fold of a file; raises ValueError, TypeError or KeyError where it is damaged."""
+    first, second = values["pair"]
+    return Fold(int(values["photos"]), int(values["compared"]), (str(first), str(second)))

@@ -38,10 +38,9 @@ from cagefield.datasets.poses_work import (
 )
 from cagefield.datasets.raw_masks import VALID_FOLDER
 from cagefield.datasets.raw_photos import RawPhoto
+from cagefield.datasets.transforms_writer import FILES, RECORD
 from cagefield.errors import DatasetError
 from cagefield.regular_files import read_text
-
-RECORD = "poses.json"
 
 MOST_FOR_ALL_PAIRS = 120
 """Photos of which every pair is matched; of more, those that are near in order or look alike."""
@@ -267,7 +266,7 @@ def _write(
         model.image(index + 1).name = photos[index].name
     for image_id in [number for number in model.images if number - 1 not in placed]:
         del model.images[image_id]
-    with replaced_folder(target, ("images", "masks", "sparse", RECORD)) as draft:
+    with replaced_folder(target, FILES) as draft:
         for index in sorted(placed):
             photo = photos[index]
             _link(photo.path, draft / "images" / photo.name)

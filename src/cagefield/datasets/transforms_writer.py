@@ -4,6 +4,7 @@ images/...        the photos, as they are; resampled ones as PNG
 masks/...         black where pixels are excluded, for photos with a mask
 sparse_pc.ply     the sparse points
 transforms.json   intrinsics of each frame, OpenGL camera-to-world poses, `applied_transform`, the splits
+poses.json        the record of a data set that `cagefield poses` wrote, which alone may be replaced
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from cagefield.datasets.views import Dataset, SparsePoints, View
 
 FILE = "transforms.json"
 
-FILES = ("images", "masks", "sparse_pc.ply", FILE)
-"""Files and folders that a written data set has."""
+RECORD = "poses.json"
+
+FILES = ("images", "masks", "sparse", "sparse_pc.ply", FILE, RECORD)
+"""Files and folders that `cagefield poses` writes, with a COLMAP model or with transforms.json."""
 
 
 def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | None = None) -> None:
@@ -34,7 +37,7 @@ def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | N
 
     Raises DatasetError where a photo cannot be read, OSError where the folder cannot be written.
     """
-    recover_folder(target, lambda folder: (folder / FILE).is_file())
+    recover_folder(target, lambda folder: (folder / RECORD).is_file())
     splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
     views = {view.name: view for split in splits.values() for view in split}
     with replaced_folder(target, FILES) as draft:
@@ -56,6 +59,7 @@ def write_transforms(dataset: Dataset, target: Path, on_progress: OnProgress | N
             values["ply_file_path"] = "sparse_pc.ply"
             _write_points(dataset.points, draft / "sparse_pc.ply")
         (draft / FILE).write_text(json.dumps(values, indent=1), encoding="utf-8")
+        (draft / RECORD).write_text(json.dumps({"photos": len(views)}, indent=1), encoding="utf-8")
 
 
 def _write_photo(view: View, folder: Path) -> str:
