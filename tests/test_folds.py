@@ -150,3 +150,21 @@ def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tm
     assert poses_command.verified(wrong).dataset is wrong
     said = capsys.readouterr().out
     assert "poses look folded" in said and "structure from motion finds the same poses" in said
+
+
+def test_bundle_adjustment_that_stays_folded_confirms_no_fold(photos, tmp_path, monkeypatch):
+    """Poses that are rough and folded: adjusted ones agree with them, and are as folded; new ones are taken."""
+    from cagefield.datasets import pose_verification
+    from cagefield.datasets.pose_check import PoseError
+
+    wrong, right = dataset(tmp_path / "a", folded(), photos), dataset(tmp_path / "b", cameras(), photos)
+    solver = _Solver(right)
+    monkeypatch.setattr(solver.__class__, "refine", lambda *_: _Solver(wrong).rebuild())
+    monkeypatch.setattr(pose_verification, "PoseSolver", solver)
+    monkeypatch.setattr(pose_verification, "match_photos", lambda *_: None)
+    rough, good = (PoseError(m, m, 20, 40, 800, ("a", m), capped=m) for m in (6.0, 0.3))
+    errors = iter([rough, good, good])
+    monkeypatch.setattr(pose_verification, "pose_error", lambda *_: next(errors))
+    found = pose_verification.verify_poses(wrong)
+    assert found.outcome == "rebuilt" and not found.same_fold
+    assert found.dataset.train[0].camera == right.train[0].camera

@@ -186,6 +186,27 @@ def test_scattered_focals_of_one_lens_are_shared_only_where_that_fits_as_well():
     assert not pose_verification._is_better(wrong, replace(right, median=4.0, capped=4.0), None)
 
 
+def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(capture):
+    """Focal lengths from .7 to 1.4 of the lens's, and distances that make up for them, as COLMAP has them."""
+    rng = np.random.default_rng(5)
+
+    def zoomed(view):
+        scale = float(np.exp(rng.uniform(-0.35, 0.35)))
+        c2w = view.camera.c2w.copy()
+        c2w[:3, 3] *= scale  # the cameras look at the origin
+        camera = replace(view.camera, c2w=c2w, fx=view.camera.fx * scale, fy=view.camera.fy * scale)
+        return replace(view, camera=camera)
+
+    given = replace(capture, train=tuple(map(zoomed, capture.train)), test=tuple(map(zoomed, capture.test)))
+    found = verify_poses(given)
+    assert found.before.has_scattered_focals and found.outcome in ("adjusted", "rebuilt")
+    assert found.after.median < 0.5
+    focals = {round(view.camera.fx, 6) for view in all_views(found.dataset)}
+    assert len(focals) == 1 and focals.pop() == pytest.approx(capture.train[0].camera.fx, rel=0.03)
+    turn, offset = disagreement(found.dataset, capture)
+    assert turn < 0.6 and offset < 0.04
+
+
 def test_names_are_in_the_order_of_their_numbers():
     assert sorted(["a10b2", "a9", "a10b10", "b1", "a"], key=natural_key) == [
         "a",

@@ -290,7 +290,7 @@ def test_photos_of_one_size_and_focal_length_share_a_camera(tmp_path):
     assert cameras[1].params[0] == pytest.approx(1.2 * 400) and not cameras[1].has_prior_focal_length
     assert {camera.model.name for camera in cameras} == {"SIMPLE_RADIAL"}
     many, _ = structure_from_motion.camera_guesses(raw[:3] * 4)
-    assert many[0].model.name == "OPENCV"
+    assert many[0].model.name == "RADIAL"  # one focal length: the pixels are square
 
 
 def test_many_photos_are_matched_with_neighbours_and_with_those_alike(photos, tmp_path):

@@ -128,7 +128,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def matched(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same of a run that was stopped after the matches."""
-    return _stopped_at("unfolded_models", tmp_path_factory.mktemp("matched"))
+    return _stopped_at("reconstruct", tmp_path_factory.mktemp("matched"))
 
 
 def _stopped_at(step: str, folder: Path) -> Path:

@@ -106,6 +106,6 @@ def test_the_unfolded_model_must_not_lose_photos_or_points(tmp_path, monkeypatch
     monkeypatch.setattr(repeated_views, "contradicting", lambda *_: {(2, 20)})
     counts = _counts(40, 6, period=20)
     matches = Matches(counts, np.zeros_like(counts, dtype=bool))
-    (found,) = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)
+    (found,), _ = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)
     assert found is models["pruned" if wins else "plain"]
     assert removed == [far_pairs(counts), {(2, 20)}]

@@ -123,6 +123,8 @@ def summary(report: PosesReport, seconds: float) -> str:
         f"{report.placed} of {report.total} photos found their place in {took}; {report.points} points, "
         f"mean reprojection error {report.error:.2f} pixels"
     ]
+    if report.moving:
+        lines.append(f"{report.moving} photos show things that move: features on these were left out")
     listed = sorted(report.left_out.items())
     lines += [f"  left out: {name}: {reason}" for name, reason in listed[:_LISTED]]
     if len(listed) > _LISTED:

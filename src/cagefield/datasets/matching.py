@@ -15,6 +15,7 @@ from pathlib import Path
 
 from cagefield.datasets import colmap_process, features
 from cagefield.datasets.features import OnProgress, Pairs
+from cagefield.datasets.moving_features import MIN_MATCHES
 
 _TILE = 12  # pairs are matched in tiles of so many photos each way, whose descriptors are read once
 
@@ -30,14 +31,16 @@ def match(
     pairs: Pairs,
     *,
     verify: bool,
+    several: bool = False,
     seed: int = 0,
     on_progress: OnProgress | None = None,
     processes: int | None = None,
 ) -> None:
     """Matches the features of the photos `names[i]`, `names[j]` for all (i, j) in `pairs`.
 
-    Those that are matched already are left. `verify` fits epipolar geometry to each pair. The result does not
-    depend on the number of `processes`, which for None is one a core, and fewer for few pairs.
+    Those that are matched already are left. `verify` fits epipolar geometry to each pair; `several` fits
+    more than one, of things that move on their own, from MIN_MATCHES matches on. The result does not depend
+    on the number of `processes`, which for None is one a core, and fewer for few pairs.
 
     Raises StoppedError where COLMAP fails.
     """
@@ -59,7 +62,7 @@ def match(
             part.mkdir()
             copy = database if count == 1 else Path(shutil.copyfile(database, part / "database.db"))
             task = {"task": "match", "database": str(copy), "folder": str(part), "lines": lines[start:end]}
-            tasks.append(task | {"verify": verify, "seed": seed})
+            tasks.append(task | {"verify": verify, "several": several, "seed": seed})
         colmap_process.run("matching", tasks, progress)
         if count > 1:
             for part in parts:
@@ -72,6 +75,7 @@ def match_here(
     folder: str,
     lines: Sequence[str],
     verify: bool,
+    several: bool,
     seed: int,
     on_done: Callable[[int], None],
 ) -> None:
@@ -85,6 +89,9 @@ def match_here(
     )
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = seed
+    if several:
+        verification.multiple_models = True
+        verification.min_num_inliers = MIN_MATCHES
     listing = Path(folder) / "pairs.txt"
     pairing = pycolmap.ImportedPairingOptions(match_list_path=str(listing))
     for start in range(0, len(lines), _TILE**2):

@@ -17,7 +17,7 @@ Source: Schönberger and Frahm, "Structure-from-Motion Revisited" (2016); Cauchy
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +27,12 @@ import numpy.typing as npt
 from cagefield.cameras import Camera
 from cagefield.datasets import features, triangulation
 from cagefield.datasets.colmap import pose_of
-from cagefield.datasets.colmap_lenses import lens_views
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.left_out import verified_matches
 from cagefield.datasets.matching import match
 from cagefield.datasets.pose_alignment import Similarity, align_poses
 from cagefield.datasets.pose_check import SEQUENCE_STEPS
-from cagefield.datasets.structure_from_motion import MOST_FOR_ALL_PAIRS, unfolded_models
+from cagefield.datasets.structure_from_motion import MOST_FOR_ALL_PAIRS, model_camera, reconstruct
 from cagefield.datasets.views import SparsePoints, View
 
 FloatArray = npt.NDArray[np.float64]
@@ -67,12 +66,14 @@ class RefinedPoses:
         points: sparse points of the reconstruction.
         reprojection_error: mean, pixels of the full-size photos.
         aligned: whether they are in the given world; not where both sets of poses disagree too much.
+        moving: photos whose features on things that move were left out.
     """
 
     cameras: dict[str, Camera]
     points: SparsePoints | None
     reprojection_error: float
     aligned: bool
+    moving: int = 0
 
 
 class PoseSolver:
@@ -136,8 +137,11 @@ class PoseSolver:
         self._match(pairs, features.share(on_progress, 0.0, 0.5))
         matches = verified_matches(self._database, count)
         mapping = features.share(on_progress, 0.5, 1.0)
-        models = unfolded_models(self._folder, matches, self._seed, mapping)
-        return self._collected(models[0], None) if models else None
+        found = reconstruct(self._folder, self._names, matches, self._seed, mapping)
+        if not found.models:
+            return None
+        collected = self._collected(found.models[0], None)
+        return None if collected is None else replace(collected, moving=len(found.moving))
 
     def _match(self, pairs: features.Pairs, on_progress: OnProgress) -> None:
         match(self._database, self._names, pairs, verify=True, seed=self._seed, on_progress=on_progress)
@@ -154,9 +158,7 @@ class PoseSolver:
         cameras = {}
         for n, pose in zip(placed, poses, strict=True):
             view = self._views[n]
-            made = model.camera(images[n].camera_id)
-            lens = lens_views(made.model.name, tuple(made.params.tolist()), made.width, made.height)[0]
-            posed = lens.camera.with_c2w(to_world.moved_pose(pose))
+            posed = model_camera(model, images[n]).with_c2w(to_world.moved_pose(pose))
             cameras[view.name] = posed.resized(view.camera.width, view.camera.height)
         points = triangulation.collect_points(model, self._shrunk, None, to_world)
         shrinking = float(np.mean([one.scale for one in self._shrunk]))

@@ -49,7 +49,7 @@ MIN_FOLD_TURN_DEG = 5.0
 MAX_SHARED_GAIN = 1.25
 """Epipolar error after over before, at most, where only focal lengths are scattered."""
 
-_VERSION = b"poses 2"
+_VERSION = b"poses 3"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +66,7 @@ class Verification:
         aligned: whether the cameras are in the given world.
         left_out: names of views without a new pose.
         same_fold: poses found from the photos alone agree with the given ones, so that the fold is doubtful.
+        moving: photos whose features on things that move, such as a backdrop, were left out.
     """
 
     dataset: Dataset
@@ -76,6 +77,7 @@ class Verification:
     aligned: bool = True
     left_out: tuple[str, ...] = ()
     same_fold: bool = False
+    moving: int = 0
 
 
 def all_views(dataset: Dataset) -> list[View]:
@@ -118,7 +120,9 @@ def verify_poses(
     outcome, found, after = findings.corrected
     left_out = tuple(view.name for view in views if view.name not in found.cameras)
     moved = with_cameras(dataset, found)
-    return Verification(moved, before, after, fold, outcome, found.aligned, left_out, findings.same_fold)
+    return Verification(
+        moved, before, after, fold, outcome, found.aligned, left_out, findings.same_fold, found.moving
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +161,8 @@ def _searched(
     for outcome, found in _corrections(views, before, fold, seed, on_stage):
         other = with_cameras(dataset, found)
         after = pose_error(matches, [view.whole() for view in all_views(other)])
-        if fold is not None and not (after is not None and after.is_wrong) and _agrees(dataset, found):
+        right = after is None or not after.is_wrong
+        if fold is not None and right and outcome == "rebuilt" and _agrees(dataset, found):
             fold, findings = None, replace(findings, same_fold=True)
             if before is None or not (before.is_wrong or before.has_scattered_focals):
                 break
@@ -165,7 +170,8 @@ def _searched(
             continue
         if fold is not None and find_fold(other) is not None:
             continue
-        if best is None or _capped(after) < _capped(best[2]):
+        # Matches on things that move contradict right poses: they do not decide then.
+        if best is None or found.moving or _capped(after) < _capped(best[2]):
             best = outcome, found, after
         after = best[2]
         if after is not None and not after.is_wrong and after.contradicted <= MAX_CONTRADICTED:
@@ -275,6 +281,8 @@ def describe(one: Verification) -> list[str]:
         }[one.outcome]
         world = "in the given world" if one.aligned else "in another world: too few agree with the given ones"
         lines.append(f"poses are {how}, {world}: {one.after}; --keep-poses leaves them as they are")
+        if one.moving:
+            lines.append(f"{one.moving} photos show things that move: features on these were left out")
     elif one.same_fold:
         lines.append("structure from motion finds the same poses from the photos alone: they are used")
     elif one.fold is not None or (one.before is not None and one.before.is_wrong):
@@ -305,6 +313,7 @@ def _write(file: Path, findings: _Findings) -> None:
             "cameras": {name: camera.to_dict() for name, camera in found.cameras.items()},
             "reprojection_error": found.reprojection_error,
             "aligned": found.aligned,
+            "moving": found.moving,
         }
         if found.points is not None:
             write_cached_points(file.with_suffix(".npz"), found.points)
@@ -329,7 +338,8 @@ def _read(file: Path) -> _Findings | None:
         outcome, error, aligned = values["outcome"], float(values["reprojection_error"]), values["aligned"]
         if outcome not in ("adjusted", "rebuilt") or not isinstance(aligned, bool) or not np.isfinite(error):
             return None
-        found = RefinedPoses(cameras, read_cached_points(file.with_suffix(".npz")), error, aligned)
+        points, moving = read_cached_points(file.with_suffix(".npz")), int(values["moving"])
+        found = RefinedPoses(cameras, points, error, aligned, moving)
         return _Findings(before, fold, searched, same_fold, (outcome, found, _error_of(values["after"])))
     except (OSError, ValueError, TypeError, KeyError, AttributeError, CagefieldError):
         return None

@@ -21,8 +21,11 @@ from typing import Any
 
 from cagefield import json_text
 from cagefield.atomic_files import recover_folder, replaced_folder
-from cagefield.datasets import features, repeated_views
+from cagefield.cameras import Camera
+from cagefield.datasets import features, moving_features, repeated_views
+from cagefield.datasets.colmap import pose_of
 from cagefield.datasets.colmap_files import check_whole
+from cagefield.datasets.colmap_lenses import lens_views
 from cagefield.datasets.database_check import check_database
 from cagefield.datasets.features import OnProgress, Photo
 from cagefield.datasets.left_out import Matches, reasons_left_out, verified_matches, why_none
@@ -48,8 +51,13 @@ MOST_FOR_ALL_PAIRS = 120
 LONGER_SIDE = 1600
 """Photos are shrunk to this many pixels for features."""
 
+MIN_STATIC_POINTS, MIN_STATIC_SHARE = 12, 0.15
+"""Points that place a photo, number and share, at least, where only those that stand still are left."""
+
 LEAST_SHARED = 12
-"""Photos that share a camera, from which on its lens is OPENCV instead of SIMPLE_RADIAL."""
+"""Photos that share a camera, from which on its lens has a second radial term: RADIAL, not SIMPLE_RADIAL.
+
+Both have square pixels: cameras that are held level do not tell their aspect from a stretched scene."""
 
 _FOCAL_GUESS = 1.2  # focal length over the longer side, where the camera wrote none
 
@@ -65,6 +73,7 @@ class PosesReport:
         points: sparse points.
         error: mean reprojection error in pixels.
         left_out: the other photos, and what was wrong with each.
+        moving: photos whose features on things that move were left out.
     """
 
     folder: Path
@@ -73,6 +82,7 @@ class PosesReport:
     points: int
     error: float
     left_out: Mapping[str, str] = field(default_factory=dict)
+    moving: int = 0
 
 
 def make_poses(
@@ -141,7 +151,8 @@ def _made(
     pairs = features.all_pairs(len(photos)) if few else features.likely_pairs(database, len(photos))
     match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
     shared_matches = verified_matches(database, len(photos))
-    models = unfolded_models(work, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    found = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    models = found.models
     if not models:
         raise DatasetError(f"{source}: {why_none(photos, shared_matches)}")
     model = models[0]
@@ -156,6 +167,7 @@ def _made(
         model.num_points3D(),
         float(model.compute_mean_reprojection_error()),
         left_out,
+        len(found.moving),
     )
     _write(model, photos, placed, target, record, report)
     return report
@@ -176,7 +188,7 @@ def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     groups, numbers = features.consecutive((p.width, p.height, p.focal) for p in photos)
     cameras = []
     for index, (width, height, focal) in enumerate(groups):
-        model = "OPENCV" if numbers.count(index) >= LEAST_SHARED else "SIMPLE_RADIAL"
+        model = "RADIAL" if numbers.count(index) >= LEAST_SHARED else "SIMPLE_RADIAL"
         guess = _FOCAL_GUESS * max(width, height) if focal is None else focal
         camera = pycolmap.Camera.create_from_model_name(index + 1, model, guess, width, height)
         camera.has_prior_focal_length = focal is not None
@@ -184,15 +196,74 @@ def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
     return cameras, numbers
 
 
-def unfolded_models(work: Path, matches: Matches, seed: int, on_progress: OnProgress) -> list[Any]:
-    """The reconstructions, the one with the most photos first, without pairs that only look alike.
+@dataclass(frozen=True, eq=False)
+class Reconstructions:
+    """Reconstructions by COLMAP, the one with the most photos first.
+
+    Attributes:
+        models: the reconstructions.
+        moving: numbers of photos whose features on things that move were removed.
+    """
+
+    models: list[Any]
+    moving: tuple[int, ...] = ()
+
+
+def reconstruct(
+    work: Path, names: Sequence[str], matches: Matches, seed: int, on_progress: OnProgress
+) -> Reconstructions:
+    """Reconstructions from the verified matches in `work`, without folds and without things that move.
+
+    Where photos show things that move, those without their features are taken if they place as many photos
+    and the matches that are left agree with them better.
+    """
+    mapping = features.share(on_progress, 0.0, 0.7)
+    models, database = unfolded_models(work, matches, seed, mapping)
+    if not models:
+        return Reconstructions(models)
+    matched = moving_features.read_features(database, len(names))
+    before = _cameras(models[0])
+    moving, photos = moving_features.moving_features(matched, before)
+    if len(photos) < moving_features.MIN_PHOTOS:
+        return Reconstructions(models)
+    copy = work / "static_features.db"
+    shutil.copyfile(database, copy)
+    pairs = moving_features.remove_features(copy, moving)
+    verifying = features.share(on_progress, 0.7, 0.8)
+    match(copy, names, pairs, verify=True, several=True, seed=seed, on_progress=verifying)
+    static = _map(work, copy, len(names), seed, features.share(on_progress, 0.8, 1.0), few_matches=True)
+    if not static or static[0].num_reg_images() < models[0].num_reg_images():
+        return Reconstructions(models)
+    left = moving_features.read_features(copy, len(names))
+    errors = [
+        moving_features.capped_error(left, cameras, moving)[0] for cameras in (before, _cameras(static[0]))
+    ]
+    return Reconstructions(static, tuple(photos)) if errors[1] < errors[0] else Reconstructions(models)
+
+
+def _cameras(model: Any) -> dict[int, Camera]:
+    """Cameras of a reconstruction's photos, by number of the photo, in its world."""
+    return {number - 1: model_camera(model, model.image(number)) for number in model.reg_image_ids()}
+
+
+def model_camera(model: Any, image: Any) -> Camera:
+    """The camera of an image of a reconstruction, in its world."""
+    made = model.camera(image.camera_id)
+    lens = lens_views(made.model.name, tuple(made.params.tolist()), made.width, made.height)[0]
+    return lens.camera.with_c2w(pose_of(image))
+
+
+def unfolded_models(
+    work: Path, matches: Matches, seed: int, on_progress: OnProgress
+) -> tuple[list[Any], Path]:
+    """(reconstructions without pairs that only look alike, the most photos first; database of their pairs).
 
     Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
     these are left out, unless fewer photos, or with as many fewer points, come of it.
     """
     count, database = len(matches.counts), work / "database.db"
     if not repeated_views.are_in_order(matches.counts):
-        return _map(work, database, count, seed, on_progress)
+        return _map(work, database, count, seed, on_progress), database
     far = repeated_views.far_pairs(matches.counts)
     chain = _map(work, without_pairs(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
     false: set[tuple[int, int]] = set()
@@ -201,9 +272,10 @@ def unfolded_models(work: Path, matches: Matches, seed: int, on_progress: OnProg
         false = repeated_views.contradicting(repeated_views.rotations_of(chain[0]), relative)
     plain = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
     if not false:
-        return plain
-    pruned = _map(work, without_pairs(database, false), count, seed, features.share(on_progress, 0.66, 1.0))
-    return pruned if _size(pruned) >= _size(plain) else plain
+        return plain, database
+    fewer = without_pairs(database, false)
+    pruned = _map(work, fewer, count, seed, features.share(on_progress, 0.66, 1.0))
+    return (pruned, fewer) if _size(pruned) >= _size(plain) else (plain, database)
 
 
 def _size(models: Sequence[Any]) -> tuple[int, int]:
@@ -219,12 +291,18 @@ def without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
     return copy
 
 
-def _map(work: Path, database: Path, count: int, seed: int, on_progress: OnProgress) -> list[Any]:
-    """The reconstructions, the one with the most photos first."""
+def _map(
+    work: Path, database: Path, count: int, seed: int, on_progress: OnProgress, few_matches: bool = False
+) -> list[Any]:
+    """The reconstructions, the one with the most photos first; `few_matches` are enough for a photo."""
     pycolmap = features.engine()
     options = pycolmap.IncrementalPipelineOptions(min_model_size=3, random_seed=seed, max_num_models=10)
     options.mapper.random_seed = seed
     options.triangulation.random_seed = seed
+    if few_matches:
+        options.min_num_matches = moving_features.MIN_MATCHES
+        options.mapper.abs_pose_min_num_inliers = MIN_STATIC_POINTS
+        options.mapper.abs_pose_min_inlier_ratio = MIN_STATIC_SHARE
     out = work / "models"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir()
