@@ -153,7 +153,7 @@ def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tm
 
 
 def test_bundle_adjustment_that_stays_folded_confirms_no_fold(photos, tmp_path, monkeypatch):
-    """Poses that are rough and folded: adjusted ones agree with them, and are as folded; new ones are taken."""
+    """Rough and folded poses: adjusted ones agree with them and are as folded; new ones are taken."""
     from cagefield.datasets import pose_verification
     from cagefield.datasets.pose_check import PoseError
 
