@@ -233,6 +233,7 @@ def test_the_command_measures_rooms_and_folders(room, tmp_path, capsys):
     assert (
         "--steps 20 --resolution 16 --room-size 64 --room-views 9`" in command and "table.md" not in command
     )
+    assert "`cagefield bench captures ROOM room-chair " in command
     (made,) = (tmp_path / "work").glob("photos-*/room-chair")
     stamp = (made / "transforms.json").stat().st_mtime_ns
     shown = read_image(pictures / "room_voxel_frame_00001.png")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cagefield.benchmarking.perturbation import perturbed
 from cagefield.cameras import Camera
 from cagefield.datasets import load_dataset, pose_verification
 from cagefield.datasets.natural_order import natural_key
@@ -26,24 +27,6 @@ COUNT = 16
 def capture(tmp_path_factory) -> Dataset:
     folder = textured_capture(tmp_path_factory.mktemp("posed"), COUNT, 1.9, size=(480, 360))
     return replace(load_dataset(folder, downscale=1), unbounded=False)  # no search for folds: test_folds
-
-
-def perturbed(dataset: Dataset, turn_deg: float, offset: float, focal: float, seed: int = 0) -> Dataset:
-    """Cameras turned, moved by a share of their distance to the origin, focal lengths scaled, by chance."""
-    rng = np.random.default_rng(seed)
-
-    def moved(view):
-        axis, way = rng.normal(size=(2, 3))
-        c2w = view.camera.c2w.copy()
-        turn = Rotation.from_rotvec(np.radians(turn_deg) * axis / np.linalg.norm(axis)).as_matrix()
-        c2w[:3, :3] = turn @ c2w[:3, :3]
-        c2w[:3, 3] += offset * np.linalg.norm(c2w[:3, 3]) * way / np.linalg.norm(way)
-        scale = 1.0 + rng.uniform(-focal, focal)
-        camera = view.camera
-        return replace(view, camera=replace(camera, c2w=c2w, fx=camera.fx * scale, fy=camera.fy * scale))
-
-    train, test = tuple(map(moved, dataset.train)), tuple(map(moved, dataset.test))
-    return replace(dataset, train=train, test=test)
 
 
 def disagreement(one: Dataset, other: Dataset) -> tuple[float, float]:
@@ -108,7 +91,7 @@ def test_right_poses_are_left_as_they_are_and_measured_once(capture, tmp_path, m
 
 
 def test_perturbed_poses_are_adjusted_in_their_world_and_kept_for_next_time(capture, tmp_path, monkeypatch):
-    wrong = perturbed(capture, 1.0, 0.01, 0.05)
+    wrong = perturbed(capture)
     found = verify_poses(wrong, cache=tmp_path)
     assert found.outcome == "adjusted" and found.aligned and found.before.is_wrong
     assert found.after.median < 0.5
@@ -147,7 +130,7 @@ def test_poses_of_other_photos_are_found_anew(capture):
 
 
 def test_wrong_poses_are_measured_and_kept_where_that_is_asked_for(capture, tmp_path):
-    wrong = perturbed(capture, 1.0, 0.01, 0.05)
+    wrong = perturbed(capture)
     found = verify_poses(wrong, correct=False, cache=tmp_path)
     assert found.dataset is wrong and found.before.is_wrong and found.outcome == "kept"
 

@@ -35,13 +35,19 @@ def _words(options: Any, silent: Collection[str]) -> Iterator[str]:
             yield from _words(value, silent)
             continue
         if option.default is dataclasses.MISSING:
-            yield from map(str, value) if isinstance(value, tuple) else [str(value)]
+            yield from map(_placeless, value if isinstance(value, tuple) else (value,))
             continue
         yield "--" + option.name.replace("_", "-")
         if isinstance(value, tuple):
             yield from map(str, value)
         elif not isinstance(value, bool):
             yield str(value)
+
+
+def _placeless(value: object) -> str:
+    """The value; of a file or folder the name alone, in capitals: a place that is left open."""
+    path = Path(str(value))
+    return path.resolve().name.upper() if path.exists() else str(value)
 
 
 @contextmanager
