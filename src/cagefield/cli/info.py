@@ -35,7 +35,7 @@ class Info:
             from cagefield.cli.poses import verified
             from cagefield.datasets import load_dataset
 
-            dataset = load_dataset(self.scene, masks=self.masks)
+            dataset = load_dataset(self.scene, downscale=1, masks=self.masks)
             print("\n".join(describe_dataset(dataset)), flush=True)
             verified(dataset, correct=False)
             return
