@@ -9,6 +9,7 @@ from cagefield.cameras import Camera
 from cagefield.cli import poses as poses_command
 from cagefield.datasets import View, folds
 from cagefield.datasets.pose_refinement import RefinedPoses
+from cagefield.datasets.pose_verification import describe
 from cagefield.datasets.procedural.textures import noise
 from cagefield.datasets.views import Dataset
 from cagefield.rendering.images import write_png
@@ -168,3 +169,28 @@ def test_bundle_adjustment_that_stays_folded_confirms_no_fold(photos, tmp_path, 
     found = pose_verification.verify_poses(wrong)
     assert found.outcome == "rebuilt" and not found.same_fold
     assert found.dataset.train[0].camera == right.train[0].camera
+
+
+def test_poses_without_moving_things_win_though_matches_on_these_contradict_them(
+    photos, tmp_path, monkeypatch
+):
+    from dataclasses import replace as changed
+
+    from cagefield.datasets import pose_verification
+    from cagefield.datasets.pose_check import PoseError
+
+    data = changed(dataset(tmp_path / "a", cameras(), photos), unbounded=False)
+    solver = _Solver(data)
+    plain = solver.rebuild()
+    monkeypatch.setattr(solver.__class__, "refine", lambda *_: plain)
+    monkeypatch.setattr(solver.__class__, "rebuild", lambda *_: changed(plain, moving=5))
+    monkeypatch.setattr(pose_verification, "PoseSolver", solver)
+    monkeypatch.setattr(pose_verification, "match_photos", lambda *_: None)
+    rough = PoseError(6.0, 6.0, 20, 40, 800, ("a", 6.0), capped=6.0)
+    by_all = PoseError(0.3, 0.4, 20, 40, 800, ("a", 0.3), capped=0.8, contradicted=0.1)
+    errors = iter([rough, by_all, changed(by_all, capped=1.0)])
+    monkeypatch.setattr(pose_verification, "pose_error", lambda *_: next(errors))
+    for _ in range(2):  # found, and read from the cache
+        found = pose_verification.verify_poses(data, cache=tmp_path)
+        assert found.outcome == "rebuilt" and found.moving == 5
+        assert "5 photos show things that move: features on these were left out" in describe(found)

@@ -71,22 +71,21 @@ def read_features(database: Path, count: int) -> MatchedFeatures:
 
 
 def pair_errors(
-    matched: MatchedFeatures, cameras: Mapping[int, Camera], without: Sequence[Mask] | None = None
+    matched: MatchedFeatures, cameras: Mapping[int, Camera]
 ) -> dict[Pair, tuple[npt.NDArray[np.intp], FloatArray]]:
     """(matches [M,2], epipolar errors [M] over the longer side) of pairs from similar directions.
 
-    `cameras` are those of the placed photos; `without` [K] by photo are features that do not count.
+    `cameras` are those of the placed photos.
     """
     found = {}
     least_cosine = np.cos(np.radians(MAX_TURN_DEG))
     for (i, j), rows in matched.matches.items():
         if i not in cameras or j not in cameras or cameras[i].forward @ cameras[j].forward < least_cosine:
             continue
-        used = rows if without is None else rows[~(without[i][rows[:, 0]] | without[j][rows[:, 1]])]
-        if len(used):
-            pixels = matched.keypoints[i][used[:, 0]], matched.keypoints[j][used[:, 1]]
+        if len(rows):
+            pixels = matched.keypoints[i][rows[:, 0]], matched.keypoints[j][rows[:, 1]]
             errors = epipolar_errors(cameras[i], cameras[j], *pixels)
-            found[i, j] = used, errors / max(cameras[j].width, cameras[j].height)
+            found[i, j] = rows, errors / max(cameras[j].width, cameras[j].height)
     return found
 
 
@@ -115,16 +114,14 @@ def moving_features(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> 
     return moving, photos
 
 
-def capped_error(
-    matched: MatchedFeatures, cameras: Mapping[int, Camera], without: Sequence[Mask]
-) -> tuple[float, int]:
-    """(mean over pairs of their median error, capped, over the longer side; number of pairs)."""
+def capped_error(matched: MatchedFeatures, cameras: Mapping[int, Camera]) -> float:
+    """Mean over pairs from similar directions of their median error, capped, over the longer side."""
     errors = [
-        min(float(np.median(each)), 2.0 * CONTRADICTING_SHARE)
-        for _, each in pair_errors(matched, cameras, without).values()
-        if len(each) >= MIN_MATCHES
+        min(float(np.median(errors)), 2.0 * CONTRADICTING_SHARE)
+        for rows, errors in pair_errors(matched, cameras).values()
+        if len(rows) >= MIN_MATCHES
     ]
-    return (float(np.mean(errors)) if errors else float("inf")), len(errors)
+    return float(np.mean(errors)) if errors else float("inf")
 
 
 def remove_features(database: Path, moving: Sequence[Mask]) -> list[Pair]:

@@ -235,9 +235,7 @@ def reconstruct(
     if not static or static[0].num_reg_images() < models[0].num_reg_images():
         return Reconstructions(models)
     left = moving_features.read_features(copy, len(names))
-    errors = [
-        moving_features.capped_error(left, cameras, moving)[0] for cameras in (before, _cameras(static[0]))
-    ]
+    errors = [moving_features.capped_error(left, each) for each in (before, _cameras(static[0]))]
     return Reconstructions(static, tuple(photos)) if errors[1] < errors[0] else Reconstructions(models)
 
 
