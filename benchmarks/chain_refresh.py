@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import devices
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
-from cagefield.cages import Cage
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 
 WARM_UP = 3
 DRAGGED = 4

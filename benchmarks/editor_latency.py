@@ -25,8 +25,8 @@ import numpy as np
 import tyro
 from playwright.sync_api import Page, sync_playwright
 
-from cagefield import devices
 from cagefield.benchmarking.machine import cpu_model
+from cagefield.compute import devices
 from cagefield.errors import CagefieldError
 
 EDITS = """\

@@ -18,11 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import devices
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
-from cagefield.cages import Cage
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device.edit_lattice import LATTICE_STRAIN
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -33,10 +34,9 @@ from cagefield.edits.operations import (
     Shear,
     Translate,
 )
+from cagefield.geometry.cage import Cage
 from cagefield.warps import FlowShell
 from cagefield.warps.continuous import ContinuousWarp
-from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.edit_lattice import LATTICE_STRAIN
 from cagefield.warps.flow_table import table
 
 BOX, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)

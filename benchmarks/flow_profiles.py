@@ -15,8 +15,8 @@ import numpy as np
 from cagefield.benchmarking.cases import CASES
 from cagefield.benchmarking.compare import continuous
 from cagefield.benchmarking.distortion import between
-from cagefield.cages import Cage
 from cagefield.edits import Edit
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps import Falloff, FlowShell, TrilinearShell, flow_velocity
 from cagefield.warps.extended_coordinates import Extended

@@ -23,13 +23,10 @@ import numpy as np
 import quadrants as qd
 from scipy.spatial.transform import Rotation
 
-from cagefield import devices
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, write_text
-from cagefield.cage_checks import are_valid
-from cagefield.cages import Cage
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.limits import largest_of
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -40,7 +37,10 @@ from cagefield.edits.operations import (
     Shear,
     Translate,
 )
+from cagefield.edits.safe_fraction import largest_of
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.cage_checks import are_valid
 from cagefield.typing import Array, Mask
 from cagefield.warps import FlowShell, flow_table
 from cagefield.warps.extended_coordinates import Extended

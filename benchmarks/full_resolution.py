@@ -19,10 +19,10 @@ from cagefield.benchmarking.full_resolution import measure, table
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import write_text
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
 from cagefield.errors import CagefieldError
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 from cagefield.typing import Float32
 
 

@@ -18,23 +18,23 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import devices
 from cagefield.benchmarking import compare
 from cagefield.benchmarking.cases import CASES, chosen
 from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr, supersampled
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
 from cagefield.benchmarking.workbench import Settings, Workbench
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import procedural_scene
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.renderer import Renderer
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.procedural import procedural_scene
 from cagefield.rendering.renderers import renderer_of
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.voxels.voxel_config import VoxelConfig
 from cagefield.typing import AnyArray
 
 Factors = tuple[float, float, float]

@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import EditStack, Scene, devices, load_edits
+from cagefield import EditStack, Scene, load_edits
 from cagefield.benchmarking.strips import Panel, strip
+from cagefield.compute import devices
 from cagefield.errors import SceneError
-from cagefield.rendering.images import write_png
-from cagefield.rendering.metrics import psnr
+from cagefield.images.image_files import write_png
+from cagefield.images.metrics import psnr
 
 EDITS = Path(__file__).parent / "operations"
 

@@ -31,9 +31,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from playwright.sync_api import Page, sync_playwright
 
 from cagefield.benchmarking.machine import cpu_model
-from cagefield.exporting.page import ScenePage
-from cagefield.fields.splat import SplatField
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import SplatField
+from cagefield.pages.scene_page import ScenePage
+from cagefield.scene.scene import Scene
 from editor_page import CHROMIUM, FLAGS, asking
 from field_page import FieldPage, field_page
 from gpu_objects import COUNT

@@ -25,17 +25,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import cagefield
 from cagefield.benchmarking.machine import cpu_model
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack, load_edits
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import MAGIC, VERSION, encode_page_edits, for_pages
-from cagefield.formats.page_field import encode_page_field
-from cagefield.formats.page_file import unpack
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.occupancy import of_field
-from cagefield.rendering.render_result import RenderResult, to_uint8
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.metrics import psnr
+from cagefield.images.render_result import RenderResult, to_uint8
+from cagefield.pages.page_edits import MAGIC, VERSION, encode_page_edits, for_pages
+from cagefield.pages.page_field import encode_page_field
+from cagefield.pages.page_file import unpack
+from cagefield.rendering.voxels.occupancy import of_field
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 from field_page import FieldPage, field_page
 
 EXAMPLES = Path(cagefield.__file__).parent / "examples"

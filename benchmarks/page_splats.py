@@ -21,17 +21,17 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from cagefield.benchmarking.machine import cpu_model
-from cagefield.cages import Cage
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_splat_edits import encode_page_splat_edits
-from cagefield.formats.page_splats import encode_page_splats
-from cagefield.formats.splat_files import read_splats
-from cagefield.rendering.deformed_splats import changed_splats
-from cagefield.rendering.render_result import to_uint8
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.rendering.splat_splitting import split_of
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.cage import Cage
+from cagefield.images.render_result import to_uint8
+from cagefield.pages.page_splat_edits import encode_page_splat_edits
+from cagefield.pages.page_splats import encode_page_splats
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splitting import split_of
 from field_page import FieldPage, field_page
 from page_pictures import alike
 

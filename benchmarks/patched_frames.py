@@ -14,11 +14,11 @@ import statistics
 import time
 from pathlib import Path
 
-from cagefield import devices
 from cagefield.benchmarking.cases import CASES
 from cagefield.benchmarking.machine import cpu_model
 from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cli.options import TrainingOptions
+from cagefield.compute import devices
 from cagefield.edits import EditStack
 
 CAMERAS = 6

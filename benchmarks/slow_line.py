@@ -31,9 +31,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from playwright.sync_api import sync_playwright
 
 from cagefield.benchmarking.machine import cpu_model
-from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
-from cagefield.formats.page_file import bytes_until
-from cagefield.scene import Scene
+from cagefield.pages.page_file import bytes_until
+from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
+from cagefield.scene.scene import Scene
 from editor_page import CHROMIUM, FLAGS, asking
 
 PATIENCE = 300.0

@@ -23,8 +23,8 @@ import tyro
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from cagefield.formats.splat_ply import write_splat_ply
-from cagefield.formats.splat_table import BATCH, SplatBatch
+from cagefield.formats.splats.splat_ply import write_splat_ply
+from cagefield.formats.splats.splat_table import BATCH, SplatBatch
 
 PAIRS = (
     (".ply", ".spz"),
@@ -93,7 +93,7 @@ class Large:
 
 _CONVERT = """
 import resource, sys
-from cagefield.formats.splat_files import convert_splats
+from cagefield.formats.splats.splat_files import convert_splats
 convert_splats(sys.argv[1], sys.argv[2])
 print(round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
 """

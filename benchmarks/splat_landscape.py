@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.fields.splat import SplatField
-from cagefield.sh import C0
+from cagefield.fields.sh import C0
+from cagefield.fields.splat_field import SplatField
 from cagefield.typing import Float32
 
 BLOCK = 1_000_000

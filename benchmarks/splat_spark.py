@@ -34,15 +34,15 @@ from playwright.sync_api import sync_playwright
 
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
-from cagefield.cameras import Camera
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import READABLE, ending_of, read_splats, write_splats
-from cagefield.rendering import splat_reference
-from cagefield.rendering.images import write_png
-from cagefield.rendering.kernels.splat_projection import BLUR
-from cagefield.rendering.render_result import RenderResult
-from cagefield.rendering.splat_rasterizer import intrinsics, near_depth
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.cameras.camera import Camera
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import READABLE, ending_of, read_splats, write_splats
+from cagefield.images.image_files import write_png
+from cagefield.images.render_result import RenderResult
+from cagefield.rendering.splats import reference_rasterizer
+from cagefield.rendering.splats.kernels.projection import BLUR
+from cagefield.rendering.splats.rasterizer import intrinsics, near_depth
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.typing import AnyArray, Float32
 
 SIZE = 400
@@ -63,7 +63,7 @@ FLAGS = [
 ]
 NOTES = (
     "PSNR in dB of our pictures, on white or on black, the lower, 99 at most.",
-    "`oracle`: against `rendering/splat_reference.py` in float64, whole pictures of the same view with `side`"
+    "`oracle`: against `rendering/splats/reference_rasterizer.py` in float64, whole pictures of the same view with `side`"
     f" pixels a side, {SMALL} above {MANY} splats.",
     f"`Spark as it is`: against Spark 2.2.0, pictures of {SIZE}x{SIZE} in 8 bits. `Spark, alike`: with the"
     " file's filter, our end of splats, our order by depth, and its precise storage of splats.",
@@ -226,8 +226,8 @@ def least(some: list[Float32], others: list[Float32]) -> str:
 def by_oracle(renderer: SplatRenderer, camera: Camera) -> str:
     """The lower PSNR, on white and on black, of our picture against the oracle's."""
     near, limits = near_depth(renderer.field.bounds), intrinsics(camera).limits
-    seen = splat_reference.project(renderer.splats, camera, near, limits)
-    colour, through, depth = splat_reference.blend(seen, camera.width, camera.height)
+    seen = reference_rasterizer.project(renderer.splats, camera, near, limits)
+    colour, through, depth = reference_rasterizer.blend(seen, camera.width, camera.height)
     figures = []
     for name in BACKGROUNDS:
         exact = RenderResult.from_premultiplied(colour, 1.0 - through, depth, background=name)

@@ -21,15 +21,15 @@ import numpy as np
 
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number, write_text
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import read_splats
-from cagefield.rendering.images import write_png
-from cagefield.rendering.splat_renderer import MOVING_DETAIL, SplatRenderer
-from cagefield.rendering.splat_splitting import split_of
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.cage import Cage
+from cagefield.images.image_files import write_png
+from cagefield.rendering.splats.splat_renderer import MOVING_DETAIL, SplatRenderer
+from cagefield.rendering.splats.splitting import split_of
 from splat_landscape import landscape
 
 ROUNDS = 7
@@ -80,8 +80,8 @@ def frame_row(name: str, field: SplatField, width: int, height: int) -> tuple[st
 
 def training_row(count: int, width: int, height: int, folder: Path) -> tuple[str, ...]:
     """A row of the steps' table: a run on one photo, with as many splats from its first step on."""
-    from cagefield.training.splat_config import SplatConfig
-    from cagefield.training.splat_run import SplatRun
+    from cagefield.training.splats.splat_config import SplatConfig
+    from cagefield.training.splats.splat_run import SplatRun
 
     field = random_splats(count)
     camera = camera_of(field, width, height)
@@ -141,8 +141,8 @@ def landscape_table(count: int) -> Table:
 
 def edits_table(count: int) -> Table:
     """How long `count` splats take through a turn, a move and a discrete move, nothing known of them."""
-    from cagefield.rendering import moved_splats, splat_splitting
-    from cagefield.rendering.deformed_splats import deformed_splats
+    from cagefield.rendering.splats import splat_motion, splitting
+    from cagefield.rendering.splats.raster_splats import deformed_splats
 
     a, b, c = (
         Cage.box(middle, half)
@@ -159,14 +159,14 @@ def edits_table(count: int) -> Table:
     SplatRenderer(field).render(camera_of(field, 64, 64))
 
     def fresh(split: bool) -> int:
-        moved_splats.known_stacks.clear()
-        splat_splitting.known_splits.clear()
+        splat_motion.known_stacks.clear()
+        splitting.known_splits.clear()
         return len(deformed_splats(field, edits, split=split_of(field, edits) if split else None))
 
     rows = []
     for name, split in (("no", False), ("yes", True)):
         milliseconds = least(lambda split=split: fresh(split))
-        moved = len(moved_splats.moved_splats(field, edits).source)
+        moved = len(splat_motion.moved_splats(field, edits).source)
         rows.append((name, str(count), str(moved), str(fresh(split)), number(milliseconds, 0)))
     notes = (
         "Three edits, one after the other: a turn and stretch, a move, both continuous; a discrete move.",

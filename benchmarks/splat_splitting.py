@@ -16,11 +16,11 @@ import numpy as np
 import tyro
 
 from cagefield import Cage, Camera, Edit, EditStack, SplatField
-from cagefield.rendering.deformed_splats import deformed_splats
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.rendering.splat_splitting import split_for_edits
+from cagefield.images.image_files import side_by_side, write_png
+from cagefield.images.metrics import psnr
+from cagefield.rendering.splats.raster_splats import deformed_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splitting import split_for_edits
 from splat_volume import volume_picture
 
 CAMERA = Camera.look_at((0, -4.5, 0.6), (0.1, 0, 0.1), width=300, height=360, fov_x=0.6)

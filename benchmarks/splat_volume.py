@@ -19,7 +19,7 @@ import numba
 import numpy as np
 
 from cagefield import Camera, Edit, SplatField
-from cagefield.quaternions import rotation_matrices
+from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.warps.forward import to_deformed
 
 C0 = 0.28209479177387814

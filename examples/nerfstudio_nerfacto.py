@@ -13,8 +13,8 @@ import numpy as np
 import torch
 
 from cagefield import Camera, load_edits
+from cagefield.images.image_files import write_png
 from cagefield.rendering import render_sampled
-from cagefield.rendering.images import write_png
 
 
 class Nerfacto:

@@ -11,9 +11,9 @@ import pytest
 
 import editor_page
 from cagefield import Scene, load_dataset
-from cagefield.datasets.procedural import make_scene
-from cagefield.training.voxel import train_voxel
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.procedural import make_scene
+from cagefield.training.voxels.train_voxels import train_voxel
+from cagefield.training.voxels.voxel_config import VoxelConfig
 from own_cache import cache_of_its_own
 
 

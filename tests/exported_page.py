@@ -17,9 +17,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 from editor_page import CHROMIUM, FLAGS
 from gpu_objects import COUNT
 from page_fields import SIZE

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import cagefield
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from editor_page import CHROMIUM, FLAGS, USUAL
 
 VIEWER = Path(cagefield.__file__).parent / "exporting" / "viewer" / "viewer.js"

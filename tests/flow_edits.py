@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CageError, EditError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps import Falloff, FlowShell
 from cagefield.warps.extended_coordinates import Extended

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
 
 EXTENSION = "KHR_gaussian_splatting"
 _CODES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cagefield.fields.mlp import Linear, Mlp
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
 
 State = dict[str, np.ndarray]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cagefield.caches import cache_root
+from cagefield.files.user_cache import cache_root
 
 
 def cache_of_its_own(place: Path) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from cagefield.cages import Cage
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 
 SIZE = 120
 """Of the scene's pictures."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cages import Cage
 from cagefield.edits.patch import Patch
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from page_fields import lumps
 

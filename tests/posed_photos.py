@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
-from cagefield.datasets.procedural.textures import noise
+from cagefield.procedural.textures import noise
 
 POINT = np.array([0.15, -0.1, 0.2])
 WIDTH, HEIGHT = 96, 64

@@ -9,9 +9,7 @@ from hypothesis import HealthCheck, assume, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
 from cagefield.edits.edit import Edit
-from cagefield.edits.limits import is_valid, largest_safe
 from cagefield.edits.operations import (
     MoveCorner,
     MoveEdge,
@@ -23,7 +21,9 @@ from cagefield.edits.operations import (
     Translate,
     displacement,
 )
+from cagefield.edits.safe_fraction import is_valid, largest_safe
 from cagefield.errors import CageError, EditError
+from cagefield.geometry.cage import Cage
 
 Array = NDArray[np.float64]
 

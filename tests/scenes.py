@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from cagefield.benchmarking.workbench import Settings
-from cagefield.cameras import Camera, turntable
-from cagefield.fields.voxel import VoxelField
-from cagefield.scene import Scene
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.scene.scene import Scene
+from cagefield.training.voxels.voxel_config import VoxelConfig
 
 SH_C0 = 0.28209479177387814
 

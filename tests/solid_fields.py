@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.fields.voxel import VoxelField
-from cagefield.sh import C0
+from cagefield.fields.sh import C0
+from cagefield.fields.voxel_field import VoxelField
 
 
 def solid_field(solid: NDArray[np.bool_], rgb: NDArray[np.floating], scale: float = 1.0) -> VoxelField:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.datasets.views import Dataset, SparsePoints, View
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.images import write_png
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.fields.splat_field import SplatField
+from cagefield.images.image_files import write_png
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from scenes import SH_C0
 from splat_scenes import ball_of_splats
 

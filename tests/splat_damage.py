@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import WRITABLE, read_splats, write_splats
-from cagefield.formats.splat_spz_writer import write_spz
-from cagefield.formats.splat_table import FieldTable
+from cagefield.fields import sh as spherical_harmonics
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import WRITABLE, read_splats, write_splats
+from cagefield.formats.splats.splat_table import FieldTable
+from cagefield.formats.splats.spz_writer import write_spz
 
 SLACK = 1 << 18
 """Bytes beside the honest memory: messages, what modules keep from their first use."""

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.cameras import Camera
-from cagefield.rendering import splat_reference as reference
-from cagefield.rendering.splat_rasterizer import (
+from cagefield.cameras.camera import Camera
+from cagefield.rendering.splats import reference_rasterizer as reference
+from cagefield.rendering.splats.rasterizer import (
     COLOUR,
     intrinsics,
     kernels,
@@ -17,7 +17,7 @@ from cagefield.rendering.splat_rasterizer import (
     tiled,
     world_to_camera,
 )
-from cagefield.training.kernels.splat_chain import CURVATURES, GRADIENTS, chain
+from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS, chain
 from splat_views import NEAR, single, splats_of
 
 Values = dict[str, NDArray]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cages import Cage
-from cagefield.fields.splat import SplatField
-from cagefield.patches.light import Ambience
-from cagefield.quaternions import quaternions_of
-from cagefield.sh import C0
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.fields.sh import C0
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.quaternions import quaternions_of
 
 STEP = 0.05
 REACH, STRENGTH = 0.3, 0.7

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cameras import turntable
-from cagefield.fields.splat import SplatField
-from cagefield.scene import Scene
+from cagefield.cameras.camera import turntable
+from cagefield.fields.splat_field import SplatField
+from cagefield.scene.scene import Scene
 from scenes import SH_C0
 
 

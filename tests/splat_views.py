@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.cameras import Camera
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.cameras.camera import Camera
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.rendering.splats.raster_splats import DeformedSplats
 
 NEAR = 0.3
 LENSES = {

@@ -17,8 +17,8 @@ from cagefield.benchmarking.strips import difference, strip
 from cagefield.benchmarking.workbench import Settings, Workbench, beside
 from cagefield.cli import main
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import read_image
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.images.image_files import read_image
+from cagefield.training.voxels.voxel_config import VoxelConfig
 
 TINY = Settings(
     views=16,

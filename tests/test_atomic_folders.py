@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from cagefield import atomic_files
-from cagefield.atomic_files import recover_folder, replaced_folder
-from cagefield.exchange import exchanged
-from cagefield.scene import Scene
+from cagefield.files import atomic
+from cagefield.files.atomic import recover_folder, replaced_folder
+from cagefield.files.rename_exchange import exchanged
+from cagefield.scene.scene import Scene
 from scenes import ball_scene, files_of
 
 EDIT = """edits:
@@ -39,7 +39,7 @@ def test_the_users_own_files_are_kept(
     tmp_path: Path, can_exchange: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not can_exchange:
-        monkeypatch.setattr(atomic_files, "exchanged", lambda one, other: False)
+        monkeypatch.setattr(atomic, "exchanged", lambda one, other: False)
     target = tmp_path / "out"
     (target / "mine").mkdir(parents=True)
     (target / "mine" / "deep.txt").write_text("mine")
@@ -63,7 +63,7 @@ def test_a_folder_that_is_to_replace_another_has_none_beside_it(tmp_path: Path) 
 _KILLED = textwrap.dedent("""
     import os, shutil, signal, sys
     from pathlib import Path
-    import cagefield.edits.files, cagefield.scene
+    import cagefield.edits.edit_files, cagefield.scene.scene
     from cagefield import atomic_files
     from cagefield.cli import main
     source, edits, way = sys.argv[1:]

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Cage
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
 from cagefield.edits import Edit, EditStack
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.rendering.metrics import psnr
+from cagefield.fields.sh import sh_basis
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.images.metrics import psnr
 from cagefield.rendering.renderers import renderer_of
-from cagefield.sh import sh_basis
+from cagefield.rendering.splats.bake_splats import baked_splats
 from splat_scenes import random_splats
 
 INNER = Cage.box((0, 0, 0), (1.2, 1.0, 1.4))

@@ -24,20 +24,20 @@ from cagefield.benchmarking.mapped_photographs import MappedScene
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Workbench, digest
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.cli import main, parse
 from cagefield.cli.bench_command import command_line
 from cagefield.cli.bench_edits import BenchEdits
 from cagefield.cli.bench_training import BenchSpeed, BenchTraining
 from cagefield.cli.options import TrainingOptions
 from cagefield.cli.photo_options import PhotoOptions
-from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import read_image
-from cagefield.scene import Scene
-from cagefield.training.voxel import train_voxel
+from cagefield.geometry.cage import Cage
+from cagefield.images.image_files import read_image
+from cagefield.procedural import SCENES, ProceduralScene, procedural_scene
+from cagefield.scene.scene import Scene
+from cagefield.training.voxels.train_voxels import train_voxel
 from commands import refused
 from scenes import TINY, ball_scene, files_of
 

@@ -12,13 +12,13 @@ from cagefield.benchmarking.edits_table import Score, table
 from cagefield.benchmarking.figures import Figures
 from cagefield.benchmarking.naive_splats import NAIVE, naive_splats, seen_naively
 from cagefield.benchmarking.workbench import Settings
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.rendering.deformed_splats import deformed_splats
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.scene import Scene
-from cagefield.training.splat_config import SplatConfig
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.splats.raster_splats import deformed_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.scene import Scene
+from cagefield.training.splats.splat_config import SplatConfig
 from splat_scenes import random_splats
 
 INNER = Cage.box((0, 0, 0), 0.9)

@@ -14,13 +14,13 @@ from cagefield.benchmarking.edits import measure
 from cagefield.benchmarking.edits_table import table
 from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cli import main
-from cagefield.rendering.metrics import psnr
+from cagefield.images.metrics import psnr
 from commands import refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.rendering.nerf import render_nerf  # noqa: E402
-from cagefield.training.nerf_config import NerfConfig  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import render_nerf  # noqa: E402
+from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
@@ -52,7 +52,7 @@ def test_the_command_trains_the_chosen_preset(tmp_path: Path, capsys, monkeypatc
         asked.append(config)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cagefield.training.nerf.train_nerf", refuse)
+    monkeypatch.setattr("cagefield.training.nerf.train_nerf.train_nerf", refuse)
     argv = [
         "bench", "edits", "--field", "nerf", "--preset", "small", "--no-methods", "--steps", "5",
         "--scenes", "microphone", "--edits", "delete_base", "--views", "2", "--size", "16",

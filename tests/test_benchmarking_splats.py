@@ -9,7 +9,7 @@ from cagefield.benchmarking.learning import Budget, splat_config
 from cagefield.benchmarking.workbench import Settings
 from cagefield.cli.bench_edits import BenchEdits
 from cagefield.cli.options import TrainingOptions
-from cagefield.training.splat_config import SplatConfig
+from cagefield.training.splats.splat_config import SplatConfig
 from commands import refused
 
 

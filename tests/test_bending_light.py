@@ -9,18 +9,18 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.continuous_relighting import bent_voxels
+from cagefield.completion.patcher import Patcher
+from cagefield.completion.splat_patch import bent_splats
+from cagefield.completion.surfaces.grid_block import block_of
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import bent_voxels
-from cagefield.patches.block import block_of
-from cagefield.patches.light import Ambience
-from cagefield.patches.patcher import Patcher
-from cagefield.patches.splats import bent_splats
-from cagefield.rendering.renderer import Renderer
-from cagefield.sh import C0
+from cagefield.fields.sh import C0
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from solid_fields import db, solid_field
 from splat_rooms import LIGHT, REACH, STRENGTH
 from splat_rooms import room as splat_room

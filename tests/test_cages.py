@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from scipy.spatial.transform import Rotation
 
-from cagefield import hex_determinant, trilinear_hex
-from cagefield.cages import Cage, outside_by
 from cagefield.errors import CageError
+from cagefield.geometry import hexahedron, hexahedron_determinant
+from cagefield.geometry.cage import Cage, outside_by
 from random_cages import cages, examples, seeds
 
 
@@ -27,7 +27,7 @@ def test_corner_order_is_that_of_vtk_voxels() -> None:
 def test_rotation_is_intrinsic_xyz_and_right_handed() -> None:
     theta = (0.3, -0.7, 1.1)
     turned = Cage.box((1, 2, 3), (1, 2, 3), theta)
-    offsets = (trilinear_hex.BITS - 0.5) * (1, 2, 3)
+    offsets = (hexahedron.BITS - 0.5) * (1, 2, 3)
     expected = np.array((1, 2, 3)) + Rotation.from_euler("XYZ", theta).apply(offsets)
     np.testing.assert_allclose(turned.corners, expected, atol=1e-14)
     np.testing.assert_allclose(Cage.box((1, 2, 3), (1, 2, 3)).rotate(theta).corners, expected, atol=1e-14)
@@ -62,7 +62,7 @@ def test_shear_and_scale_along_the_cage() -> None:
     np.testing.assert_allclose(longer.corners, Cage.box((1, 1, 1), (2, 2, 3), theta).corners, atol=1e-13)
     turned = Cage.box((1, 1, 1), (1, 2, 3), (0, 0, 0.5)).rotate((0.7, 0, 0), axes="cage")
     R = Rotation.from_euler("z", 0.5) * Rotation.from_euler("x", 0.7)
-    expected = R.apply((trilinear_hex.BITS - 0.5) * (1, 2, 3)) + 1.0
+    expected = R.apply((hexahedron.BITS - 0.5) * (1, 2, 3)) + 1.0
     np.testing.assert_allclose(turned.corners, expected, atol=1e-13)
 
 
@@ -83,7 +83,7 @@ def test_affine_is_exact_for_parallelepipeds_only() -> None:
     sheared = Cage.box((1, 2, 3), (1, 2, 3), (0.1, 0.2, 0.3)).shear(xy=0.5)
     A, b = sheared.affine
     assert sheared.is_affine and not skewed().is_affine
-    np.testing.assert_allclose(b + trilinear_hex.BITS @ A.T, sheared.corners, atol=1e-14)
+    np.testing.assert_allclose(b + hexahedron.BITS @ A.T, sheared.corners, atol=1e-14)
     assert Cage.box((0, 0, 0), 1).move_face("+x", (0.3, 0.1, 0)).is_affine
 
 
@@ -110,26 +110,26 @@ def test_contains_agrees_with_half_spaces_where_faces_are_planar() -> None:
 def test_contains_the_points_of_bilinear_hexahedra_and_no_others(cage: Cage, seed: int) -> None:
     rng = np.random.default_rng(seed)
     u = rng.random((200, 3))
-    assert cage.contains(trilinear_hex.points(cage.corners, u)).all()
+    assert cage.contains(hexahedron.points(cage.corners, u)).all()
     face = rng.integers(0, 3, 200)
     u[np.arange(200), face] = rng.integers(0, 2, 200)
-    assert cage.contains(trilinear_hex.points(cage.corners, u)).all()
+    assert cage.contains(hexahedron.points(cage.corners, u)).all()
     beyond = u.copy()
     beyond[np.arange(200), face] += 1e-6 * (2 * u[np.arange(200), face] - 1)
     # One millionth outside a face is outside, unless the hexahedron folds back over itself beyond it.
-    regular = np.linalg.det(trilinear_hex.jacobian(cage.corners, beyond)) > 0.0
-    assert not cage.contains(trilinear_hex.points(cage.corners, beyond[regular])).any()
+    regular = np.linalg.det(hexahedron.jacobian(cage.corners, beyond)) > 0.0
+    assert not cage.contains(hexahedron.points(cage.corners, beyond[regular])).any()
     assert not cage.contains(cage.center + 100.0 * rng.normal(size=(50, 3))).any()
 
 
 @examples(25)
 @given(cages(), seeds)
 def test_determinant_polynomial(cage: Cage, seed: int) -> None:
-    bernstein = hex_determinant.determinant_coefficients(cage.corners)
+    bernstein = hexahedron_determinant.determinant_coefficients(cage.corners)
     u = np.random.default_rng(seed).random((50, 3))
     basis = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u**2])
     value = np.einsum("ijk,in,jn,kn->n", bernstein, basis[:, :, 0], basis[:, :, 1], basis[:, :, 2])
-    det = np.linalg.det(trilinear_hex.jacobian(cage.corners, u))
+    det = np.linalg.det(hexahedron.jacobian(cage.corners, u))
     # 64 triple products of edges: rounding relative to the largest of them.
     np.testing.assert_allclose(value, det, atol=1e-13 * np.abs(bernstein).max())
     assert (det > 0.0).all()
@@ -139,8 +139,8 @@ def test_is_positive_decides_by_splitting() -> None:
     # (x - 1/3)^2 + c: positive at the corners, its least Bernstein coefficient is negative.
     square = np.array([1 / 9, 1 / 9 - 1 / 3, 4 / 9])
     block = np.broadcast_to(square[:, None, None], (1, 3, 3, 3))
-    assert not hex_determinant.is_positive(block - 1e-3)
-    assert hex_determinant.is_positive(block + 1e-3)
+    assert not hexahedron_determinant.is_positive(block - 1e-3)
+    assert hexahedron_determinant.is_positive(block + 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -176,8 +176,8 @@ def test_inside_out_cages_name_the_corner() -> None:
     with pytest.raises(CageError, match="inside out between its corners, nearest to corner 6"):
         Cage(np.array(tangled))
     # A twist alone never folds: the middle shrinks to (1 + cos) / 2, which is 0 at 180 degrees only.
-    top = Rotation.from_euler("z", 2.8).apply(trilinear_hex.BITS[4:] - 0.5)
-    Cage(np.concatenate([trilinear_hex.BITS[:4] - 0.5, top]))
+    top = Rotation.from_euler("z", 2.8).apply(hexahedron.BITS[4:] - 0.5)
+    Cage(np.concatenate([hexahedron.BITS[:4] - 0.5, top]))
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield.camera_paths import load_camera_path, orbit
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.camera_paths import load_camera_path, orbit
 from cagefield.errors import CameraError
 
 

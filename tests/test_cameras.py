@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cagefield import lenses
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras import lenses
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.errors import CameraError
 
 LENSES = {

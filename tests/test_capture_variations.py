@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import ProceduralScene, capture, make_capture
-from cagefield.datasets.procedural.distractors import (
+from cagefield.errors import SceneError
+from cagefield.images.image_files import read_image
+from cagefield.procedural import ProceduralScene, capture, make_capture
+from cagefield.procedural.distractors import (
     PERSON_CLEARANCE,
     PERSON_HEIGHT,
     person,
@@ -19,22 +21,20 @@ from cagefield.datasets.procedural.distractors import (
     sheet_behind,
     with_distractors,
 )
-from cagefield.datasets.procedural.flash import NEAREST, STRENGTH, FlashLight
-from cagefield.datasets.procedural.hand_held import picture
-from cagefield.datasets.procedural.parts import Part, Primitive, place
-from cagefield.datasets.procedural.rooms import ROOMS
-from cagefield.datasets.procedural.shapes import Box, Sphere
-from cagefield.datasets.procedural.srgb import encoded, linear
-from cagefield.datasets.procedural.textures import Plain
-from cagefield.datasets.procedural.variations import (
+from cagefield.procedural.flash import NEAREST, STRENGTH, FlashLight
+from cagefield.procedural.hand_held import picture
+from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.rooms import ROOMS
+from cagefield.procedural.shapes import Box, Sphere
+from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.textures import Plain
+from cagefield.procedural.variations import (
     BACKDROP_SHARE,
     MAX_GAIN,
     PERSON_SHARE,
     Changes,
     changes_of,
 )
-from cagefield.errors import SceneError
-from cagefield.rendering.images import read_image
 from commands import printed, refused
 
 VIEWS, SIZE = 17, 96

@@ -15,15 +15,15 @@ from cagefield.benchmarking import captures, room_edits
 from cagefield.benchmarking.captures import CaptureScore, DepthFigures, for_training, sighted_points, table
 from cagefield.benchmarking.cases import ROOM_CASES, Case
 from cagefield.benchmarking.learning import Budget, Learnt, Show, learn, sampled_opacity
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import capture, make_capture
-from cagefield.datasets.procedural.hand_held import picture
 from cagefield.datasets.views import PhotoMask, SparsePoints
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import read_image
-from cagefield.rendering.render_result import RenderResult
+from cagefield.images.image_files import read_image
+from cagefield.images.render_result import RenderResult
+from cagefield.procedural import capture, make_capture
+from cagefield.procedural.hand_held import picture
 from cagefield.training.evaluation import Evaluation, ViewFigures
 from commands import printed, refused
 

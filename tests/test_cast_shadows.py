@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.lighting.directional_light import half_sphere
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.options import CastShadow
 from cagefield.errors import EditError, EditFileError
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.sun import half_sphere
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from solid_fields import db, solid_field
 
 FLOOR, TOP, HALF = -0.4, 0.1, 0.2

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.datasets import Dataset, load_dataset
-from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
+from cagefield.procedural import make_scene
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.checkpoint_checks import check_arrays, check_counts, check_finite, check_run
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.splat_run import SplatRun
-from cagefield.training.voxel_config import VoxelConfig
-from cagefield.training.voxel_run import VoxelRun
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_run import SplatRun
+from cagefield.training.voxels.voxel_config import VoxelConfig
+from cagefield.training.voxels.voxel_run import VoxelRun
 
 devices.start()
 
@@ -151,8 +151,8 @@ def test_texts_whose_letters_are_none_are_refused(tmp_path: Path) -> None:
 
 def test_the_sums_of_other_networks_are_refused(photos: Dataset, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
-    from cagefield.training.nerf_config import NerfConfig
-    from cagefield.training.nerf_run import NerfRun
+    from cagefield.training.nerf.nerf_config import NerfConfig
+    from cagefield.training.nerf.nerf_run import NerfRun
 
     run = NerfRun(photos, NerfConfig(steps=4, width=8, depth=2, samples=(4, 4), batch_rays=16))
     run.advance()

@@ -13,9 +13,9 @@ import pytest
 
 import cagefield
 from cagefield import Scene, load_edits
-from cagefield.cages import Cage
 from cagefield.cli import main
 from cagefield.edits import Edit, EditStack
+from cagefield.geometry.cage import Cage
 from commands import printed, refused
 from scenes import ball_scene, files_of
 
@@ -110,7 +110,7 @@ def test_interrupt_exits_with_130(
     def interrupted(_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cagefield.scene.Scene.open", interrupted)
+    monkeypatch.setattr("cagefield.scene.scene.Scene.open", interrupted)
     assert main(["info", str(scene)]) == 130
     assert capsys.readouterr().err == "cagefield: interrupted\n"
 
@@ -121,7 +121,7 @@ def test_unreadable_folder_is_one_line(
     def denied(_: object) -> None:
         raise PermissionError(13, "Permission denied", "scene/field.safetensors")
 
-    monkeypatch.setattr("cagefield.scene.Scene.open", denied)
+    monkeypatch.setattr("cagefield.scene.scene.Scene.open", denied)
     assert refused(capsys, "info", scene) == "cagefield: scene/field.safetensors: Permission denied\n"
 
 

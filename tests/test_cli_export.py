@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.files import save_edits
+from cagefield.edits.edit_files import save_edits
 from cagefield.errors import CagefieldError, EditError
 from cagefield.exporting import (
     DETAIL,
@@ -24,14 +23,15 @@ from cagefield.exporting import (
     scene_mesh,
     upright_turn,
 )
-from cagefield.formats.splat_files import read_splats
-from cagefield.formats.splat_import import axis_of, import_splats, nearest_up
-from cagefield.ply import read_ply
-from cagefield.rendering.baked_splats import baked_splats
+from cagefield.files.ply import read_ply
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.cage import Cage
 from cagefield.rendering.edited_field import EditedField, edited_bounds
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.scene import Scene
-from cagefield.server.render_queue.exports import write_edited
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.import_splats import axis_of, import_splats, nearest_up
+from cagefield.scene.scene import Scene
+from cagefield.server.render_queue.splat_downloads import write_edited
 from commands import printed, refused
 from scenes import ball_field, ball_scene
 from splat_scenes import ball_of_splats, random_splats, splat_scene

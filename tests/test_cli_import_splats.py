@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from cagefield import Scene
-from cagefield.camera_paths import shared_up
+from cagefield.cameras.camera_paths import shared_up
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import write_splats
-from cagefield.formats.splat_import import import_splats
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import write_splats
+from cagefield.scene.import_splats import import_splats
 from commands import printed, refused
 from scenes import files_of
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats
@@ -97,7 +97,7 @@ def test_invisible_splats_make_no_scene() -> None:
 
 def test_the_cameras_of_a_data_set_see_the_splats_where_its_reconstruction_has_them(tmp_path: Path) -> None:
     from cagefield import load_dataset
-    from cagefield.datasets.procedural import make_scene
+    from cagefield.procedural import make_scene
 
     dataset = load_dataset(make_scene("plant", tmp_path / "photos", views=3, size=16, test_views=2))
     turned = np.array(

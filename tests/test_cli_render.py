@@ -11,7 +11,7 @@ import pytest
 
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.cli import main
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
 from commands import refused
 from scenes import ball_scene, files_of
 

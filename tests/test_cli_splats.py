@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from cagefield import Scene, load_edits
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.images import read_image
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.image_files import read_image
 from commands import printed, refused
 from scenes import ball_scene, files_of
 from splat_scenes import splat_scene

@@ -11,8 +11,8 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.cli import main
-from cagefield.datasets.procedural import make_scene
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
+from cagefield.procedural import make_scene
 from commands import refused
 from scenes import ball_scene, files_of
 
@@ -82,7 +82,7 @@ def test_interrupted_training_is_saved_and_resumed(
     photos: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *QUICK]
-    from cagefield.training.voxel_run import VoxelRun
+    from cagefield.training.voxels.voxel_run import VoxelRun
 
     advance = VoxelRun.advance
 

@@ -10,9 +10,9 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.cli import main
-from cagefield.datasets.procedural import make_scene
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.procedural import make_scene
 from commands import refused
 from posed_photos import room_capture
 from splat_scenes import assert_same_splats
@@ -36,7 +36,7 @@ def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Points that are found stay out of the user's cache."""
-    monkeypatch.setattr("cagefield.training.splat.points_cache", lambda: tmp_path / "points")
+    monkeypatch.setattr("cagefield.training.splats.train_splats.points_cache", lambda: tmp_path / "points")
     return tmp_path / "points"
 
 
@@ -78,7 +78,7 @@ def test_interrupted_training_is_saved_and_resumed(
 ) -> None:
     import signal
 
-    from cagefield.training.splat_run import SplatRun
+    from cagefield.training.splats.splat_run import SplatRun
 
     argv = ["train", str(photos), "-o", str(tmp_path / "scene"), *STEPS, "--field", "splat"]
     advance = SplatRun.advance

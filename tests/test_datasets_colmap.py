@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from cagefield.datasets import colmap_files, load_dataset
-from cagefield.datasets.colmap_files import check_whole
-from cagefield.datasets.normalisation import in_unit_cube
+from cagefield.datasets import load_dataset
+from cagefield.datasets.colmap import colmap_files
+from cagefield.datasets.colmap.colmap_files import check_whole
+from cagefield.datasets.nerf_normalization import in_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 

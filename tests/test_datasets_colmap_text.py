@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.errors import DatasetError
 from posed_photos import ring, save

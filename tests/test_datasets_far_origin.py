@@ -11,10 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.datasets import load_dataset
-from cagefield.datasets.pose_refinement import RefinedPoses
-from cagefield.datasets.pose_verification import with_cameras
-from cagefield.ply import read_ply
-from cagefield.scene import Scene
+from cagefield.datasets.sfm.pose_refinement import RefinedPoses
+from cagefield.datasets.sfm.pose_verification import with_cameras
+from cagefield.files.ply import read_ply
+from cagefield.scene.scene import Scene
 from commands import printed
 from posed_photos import ring, save
 from splat_scenes import random_splats

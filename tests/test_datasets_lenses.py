@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cagefield.datasets import load_dataset
-from cagefield.datasets.colmap_lenses import FACES, PARAMETERS, lens_views
+from cagefield.datasets.colmap.colmap_lenses import FACES, PARAMETERS, lens_views
 from cagefield.datasets.undistortion import EQUIRECTANGULAR, IDENTITY, SourceLens
 from cagefield.datasets.views import PhotoMask, View
 from cagefield.errors import DatasetError

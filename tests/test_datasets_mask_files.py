@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.raw_photos import find_raw_photos
 from cagefield.errors import DatasetError
-from cagefield.rendering.metrics import psnr, ssim
-from cagefield.training.photos import Photos
+from cagefield.images.metrics import psnr, ssim
+from cagefield.training.voxels.ray_batches import Photos
 from posed_photos import ring, save
 
 N, WIDTH, HEIGHT = 9, 24, 16

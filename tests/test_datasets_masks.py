@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import PhotoMask, View
 from cagefield.errors import DatasetError
 

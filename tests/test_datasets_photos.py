@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset, View
 from cagefield.datasets.photos import choose_downscale, find_photo, photo_folders, read_header, read_photo
 from cagefield.datasets.views import hold_out, report_missing
 from cagefield.errors import DatasetError
-from cagefield.rendering import images
+from cagefield.images import image_files
 from posed_photos import save
 
 RNG = np.random.default_rng(5)
@@ -70,7 +70,7 @@ def test_photos_are_converted_in_tiles(tmp_path, monkeypatch, channels, factor):
     save(tmp_path / "a.png", RNG.integers(0, 256, (47, 20, channels), dtype=np.uint8))
     whole = read_photo(tmp_path / "a.png", factor)
     for pixels in (1, 50, 200, 400):
-        monkeypatch.setattr(images, "_TILE", pixels)
+        monkeypatch.setattr(image_files, "_TILE", pixels)
         np.testing.assert_array_equal(read_photo(tmp_path / "a.png", factor), whole)
 
 

@@ -11,11 +11,11 @@ import zipfile
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.normalisation import Similarity
-from cagefield.datasets.points import points_of, random_points, read_cached_points, training_points
-from cagefield.datasets.triangulation import nearest_pairs, triangulate
+from cagefield.datasets.nerf_normalization import Similarity
+from cagefield.datasets.sfm.sparse_points import points_of, random_points, read_cached_points, training_points
+from cagefield.datasets.sfm.triangulation import nearest_pairs, triangulate
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import DatasetError
 from posed_photos import distance_to_textures, photo_of_textures, ring, save, textured_capture
@@ -116,7 +116,7 @@ def test_the_cache_serves_the_same_capture_and_no_other(capture, data, tmp_path,
         asked.append(len(views))
         return first.take(np.arange(60))
 
-    monkeypatch.setattr("cagefield.datasets.points.triangulate", made_again)
+    monkeypatch.setattr("cagefield.datasets.sfm.sparse_points.triangulate", made_again)
     again = points_of(data, tmp_path)
     assert not asked
     np.testing.assert_array_equal(again.positions, first.positions)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.cameras import Camera
-from cagefield.datasets.region import cube_of_interest, focus_point, levelling_rotation
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.scene_bounds import cube_of_interest, focus_point, levelling_rotation
 from posed_photos import ring
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from cagefield.cli import main
 from cagefield.datasets import load_dataset
-from cagefield.datasets.transforms_json import read_json
+from cagefield.datasets.transforms.transforms_json import read_json
 from cagefield.errors import DatasetError
 from posed_photos import ring, save
 

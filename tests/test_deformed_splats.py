@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cagefield.cages import Cage, rotation_matrix
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import EditError
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.deformed_splats import DeformedSplats, deformed_splats, rotation_matrices
-from cagefield.rendering.deformed_splats_reference import deformed_splats_reference
-from cagefield.rendering.kernels.splat_deforming import polar_rotation
-from cagefield.rendering.moved_splats import moved_splats
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage, rotation_matrix
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.kernels.deformation import polar_rotation
+from cagefield.rendering.splats.raster_splats import DeformedSplats, deformed_splats, rotation_matrices
+from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
+from cagefield.rendering.splats.splat_motion import moved_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.warps import forward
 from splat_scenes import random_splats
 
@@ -372,7 +372,7 @@ def test_points_whose_coordinates_are_lost_are_mapped_by_the_reference(monkeypat
 
 
 def test_a_longer_stack_begins_where_the_shorter_one_ended(monkeypatch):
-    from cagefield.rendering import moved_splats as module
+    from cagefield.rendering.splats import splat_motion as module
 
     calls = []
     original = module.to_deformed

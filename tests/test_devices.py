@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.errors import DeviceError
 
 

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from cagefield import caches
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion import patch_cache
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.diffuse_irradiance import Facing
+from cagefield.completion.lighting.directional_light import Sun
+from cagefield.completion.patch_cache import DiskCache
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import NewLight, Patch, SplatPatch
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches import disk_cache
-from cagefield.patches.disk_cache import DiskCache
-from cagefield.patches.facing import Facing
-from cagefield.patches.light import Ambience
-from cagefield.patches.patcher import Patcher
-from cagefield.patches.sun import Sun
-from cagefield.rendering.render_result import RenderResult
-from cagefield.rendering.renderer import Renderer
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.files import user_cache
+from cagefield.geometry.cage import Cage
+from cagefield.images.render_result import RenderResult
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from solid_fields import solid_field
 from splat_rooms import cage as splat_cage
 from splat_rooms import room as splat_room
@@ -37,8 +37,8 @@ CAMERAS = turntable((0.0, 0.0, 0.0), 3.0, 4, elevation=0.7, width=48, height=48,
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     # Not by the variable of the user's cache: kernels are kept there too.
-    monkeypatch.setattr(disk_cache, "cache_root", lambda: tmp_path)
-    monkeypatch.setattr(disk_cache, "LEAST_SECONDS", -1.0)
+    monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path)
+    monkeypatch.setattr(patch_cache, "LEAST_SECONDS", -1.0)
     return tmp_path / "patches"
 
 
@@ -180,12 +180,12 @@ def test_all_that_results_follow_from_is_told_apart(monkeypatch: pytest.MonkeyPa
     assert made_again((MOVE,), dataclasses.replace(FIELD, contracted=True))
     assert made_again((MOVE,), cameras=CAMERAS[:3])
     assert not made_again((MOVE,))
-    monkeypatch.setattr(disk_cache, "VERSIONS", ("another",))
+    monkeypatch.setattr(patch_cache, "VERSIONS", ("another",))
     assert made_again((MOVE,))
 
 
 def test_quick_results_are_not_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(disk_cache, "LEAST_SECONDS", 1e9)
+    monkeypatch.setattr(patch_cache, "LEAST_SECONDS", 1e9)
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert not folder.exists()
 
@@ -212,7 +212,7 @@ def test_damaged_files_are_made_anew(how: str, folder: Path) -> None:
 
 def test_without_a_folder_everything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(disk_cache, "cache_root", lambda: tmp_path / "file")
+    monkeypatch.setattr(patch_cache, "cache_root", lambda: tmp_path / "file")
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert (tmp_path / "file").read_text() == ""
 
@@ -228,7 +228,7 @@ def test_a_full_disk_leaves_nothing_half(folder: Path, monkeypatch: pytest.Monke
 
 
 def test_the_last_room_on_a_disk_stays_free(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(disk_cache, "LEFT_BYTES", 1 << 60)
+    monkeypatch.setattr(patch_cache, "LEFT_BYTES", 1 << 60)
     assert made_again((MOVE,)) and made_again((MOVE,))
     assert list(folder.iterdir()) == []
 
@@ -250,14 +250,14 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
     os.utime(first, (now - 1000.0,) * 2)
     old = folder / ("0" * 32 + ".npz")
     old.write_bytes(b"old")
-    os.utime(old, (now - caches.KEPT_SECONDS - 60.0,) * 2)
+    os.utime(old, (now - user_cache.KEPT_SECONDS - 60.0,) * 2)
     made_again((BEND,))
     assert not old.exists() and len(list(folder.iterdir())) == 2
-    monkeypatch.setattr(disk_cache, "MOST_BYTES", 4 * size + size // 2)
+    monkeypatch.setattr(patch_cache, "MOST_BYTES", 4 * size + size // 2)
     for number in range(3):
         made_again((MOVE, number))
     assert not first.exists() and len(list(folder.iterdir())) == 4
-    monkeypatch.setattr(disk_cache, "MOST_BYTES", 2 * size)
+    monkeypatch.setattr(patch_cache, "MOST_BYTES", 2 * size)
     assert made_again(("too large",)) and made_again(("too large",))
 
 

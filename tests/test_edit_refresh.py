@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cages import Cage
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.renderer import Renderer
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from scenes import ball_field
 
 
@@ -107,7 +107,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> list[int
 
 
 def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.rendering import occupancy_continuous
+    from cagefield.rendering.voxels import occupancy_continuous
     from cagefield.warps import flow_lattice
 
     def work(stack: EditStack, number: int) -> list[list[int]]:
@@ -131,8 +131,8 @@ def test_refresh_of_one_edit_in_ten_is_that_of_one_alone(monkeypatch: pytest.Mon
 
 
 def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cagefield.edits.device.device_stack import DeviceStack
     from cagefield.warps import flow_lattice
-    from cagefield.warps.device_stack import DeviceStack
 
     # All in the same outer cage: what one of them costs does not depend on where the others are.
     chain = EditStack(HALF.rotate((0, 0, 0.01 * number)) for number in range(10))
@@ -149,7 +149,7 @@ def test_lattices_of_the_others_are_kept(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_while_dragged_one_of_ten_in_the_same_outer_cage_is_mapped_alone(
     monkeypatch: pytest.MonkeyPatch, place: int
 ) -> None:
-    from cagefield.rendering import occupancy_continuous
+    from cagefield.rendering.voxels import occupancy_continuous
 
     mapped: list[tuple[int, int]] = []
     images = occupancy_continuous.images_of

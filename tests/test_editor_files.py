@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.edits.files import load_edits
-from cagefield.formats.splat_files import read_splats, write_splats
-from cagefield.kernel_cache import kernel_cache
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.scene import Scene
+from cagefield.compute.kernel_cache import kernel_cache
+from cagefield.edits.edit_files import load_edits
+from cagefield.formats.splats.splat_files import read_splats, write_splats
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.scene.scene import Scene
 from editor_cone import cone
 from editor_page import EditorPage, editor_page
 from editor_server import editor_server

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import EDGES
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import load_edits
-from cagefield.scene import Scene
+from cagefield.geometry.cage import EDGES
+from cagefield.scene.scene import Scene
 from editor_cone import EDITS, cone, difference, moved
 from editor_page import PATIENCE, EditorPage, editor_page
 from editor_server import EditorServer, editor_server

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
 from cagefield.edits import Edit, EditStack, dump_edits
-from cagefield.scene import Scene
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from cagefield.server.web.launch import open_scene
 from editor_page import EditorPage, asking, editor_page
 from editor_server import EditorServer, editor_server

@@ -14,10 +14,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import load_edits
-from cagefield.fields.splat import SplatField
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import SplatField
+from cagefield.scene.scene import Scene
 from editor_cone import cone, difference, moved
 from editor_jobs import read_video, render
 from editor_page import EditorPage, editor_page

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from cagefield import trilinear_hex
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, Rotate, Scale, Shear, Translate
 from cagefield.errors import EditError
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from random_cages import edits, examples, seeds, unit_vectors
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -32,7 +32,7 @@ def test_regions_of_a_continuous_edit(edit: Edit, seed: int) -> None:
     rng = np.random.default_rng(seed)
     low, high = edit.outer.aabb
     p = low + rng.uniform(-0.2, 1.2, (400, 3)) * (high - low)
-    p = np.concatenate([p, trilinear_hex.points(edit.deformed.corners, rng.random((100, 3)))])
+    p = np.concatenate([p, hexahedron.points(edit.deformed.corners, rng.random((100, 3)))])
     c = stack.to_canonical(p)
     outside = ~edit.outer.contains(p)
     assert np.array_equal(c.points[outside], p[outside])  # bit for bit
@@ -41,7 +41,7 @@ def test_regions_of_a_continuous_edit(edit: Edit, seed: int) -> None:
     assert inside[-100:].all()
     worst = np.linalg.norm(c.jacobian, axis=(1, 2)).max()
     # Exact inside: phi keeps the trilinear coordinates.
-    expected = trilinear_hex.points(edit.inner.corners, u[inside])
+    expected = hexahedron.points(edit.inner.corners, u[inside])
     np.testing.assert_allclose(c.points[inside], expected, atol=1e-12 * worst)
     assert not c.emptied.any()
     assert (np.linalg.det(c.jacobian) > 0.0).all()

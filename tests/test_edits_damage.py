@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack, dump_edits, load_edits, parse_edits
-from cagefield.edits.names import MOST_CHARACTERS, mended, problem_of_name
-from cagefield.edits.sequence import MOST_OPERATIONS
+from cagefield.edits.edit_names import MOST_CHARACTERS, mended, problem_of_name
+from cagefield.edits.operation_sequence import MOST_OPERATIONS
 from cagefield.errors import CagefieldError, EditError, EditFileError
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages

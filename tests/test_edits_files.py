@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cagefield.cages import Cage
 from cagefield.edits import (
     Edit,
     EditStack,
     MoveCorners,
     Rotate,
     dump_edits,
-    files,
+    edit_files,
     load_edits,
     parse_edits,
     save_edits,
 )
 from cagefield.errors import EditFileError
+from cagefield.geometry.cage import Cage
 from random_cages import edits, examples, seeds
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -38,7 +38,7 @@ edits:
 
 
 def test_the_example_in_the_docstring_is_an_edit_file() -> None:
-    text = textwrap.dedent((files.__doc__ or "").split("\n\n")[1])
+    text = textwrap.dedent((edit_files.__doc__ or "").split("\n\n")[1])
     first, second, third = parse_edits(text)
     assert third == Edit.paste("../microphone", Cage.box((0, 0, 0), 2), name="microphone")
     assert first.name == "arm up" and first.lattice == 64 and len(first.operations) == 8

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import PhotoMask, View
 from cagefield.training.evaluation import Evaluation, ViewFigures, composited, evaluate_views, view_figures
 

@@ -27,8 +27,8 @@ def loaded(name: str) -> ModuleType:
 
 def test_an_own_module_is_edited_exactly_and_baked(tmp_path) -> None:
     from cagefield.fields import Field
-    from cagefield.rendering.images import read_image
-    from cagefield.rendering.metrics import psnr
+    from cagefield.images.image_files import read_image
+    from cagefield.images.metrics import psnr
 
     example = loaded("own_field")
     assert isinstance(example.OwnField(example.Torus()), Field)

@@ -13,23 +13,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.keyframe_files import dump_path
+from cagefield.cameras.keyframes import Keyframe, Timeline
+from cagefield.completion.patcher import Patcher
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.partial import partial_edit
+from cagefield.edits.partial_edit import partial_edit
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError
-from cagefield.exporting.page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
-from cagefield.exporting.path_states import path_edits
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_file import bytes_until, unpack
-from cagefield.formats.page_layers import layer_key
-from cagefield.formats.page_path import MAGIC, VERSION
-from cagefield.keyframe_files import dump_path
-from cagefield.keyframes import Keyframe, Timeline
-from cagefield.patches.patcher import Patcher
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.renderer import Renderer
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.pages.page_file import bytes_until, unpack
+from cagefield.pages.page_layers import layer_key
+from cagefield.pages.page_path import MAGIC, VERSION
+from cagefield.pages.path_states import path_edits
+from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
 from hand import Hand

@@ -15,12 +15,12 @@ from cagefield.datasets import load_dataset
 from cagefield.errors import CagefieldError, SceneError
 from cagefield.exporting.source_coordinates import mesh_in_source, points_in_source, splats_in_source
 from cagefield.fields.meshing import Mesh
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import read_splats
-from cagefield.ply import read_ply
-from cagefield.quaternions import rotation_matrices
-from cagefield.scene import Scene
-from cagefield.sh import sh_basis
+from cagefield.fields.sh import sh_basis
+from cagefield.fields.splat_field import SplatField
+from cagefield.files.ply import read_ply
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.scene.scene import Scene
 from commands import printed, refused
 from posed_photos import ring, save
 from scenes import ball_scene
@@ -75,7 +75,7 @@ def test_far_reconstructions_get_an_offset():
 
 @pytest.mark.parametrize("mirror", [np.eye(3), np.diag([1.0, 1.0, -1.0])])
 def test_meshes_and_points_too(mirror):
-    from cagefield.training.splat_fitting import Surface
+    from cagefield.training.splats.fit_splats import Surface
 
     back = similarity(TURN @ mirror, 3.0)
     rgb = np.full((3, 3), 0.5, np.float32)

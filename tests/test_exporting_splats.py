@@ -11,22 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
+from cagefield.cameras.keyframe_files import dump_path
+from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.cli import main
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.partial import partial_edit
+from cagefield.edits.partial_edit import partial_edit
 from cagefield.errors import CagefieldError
-from cagefield.exporting.page import NAMES, ScenePage, write_folder
-from cagefield.formats.page_file import bytes_until
-from cagefield.formats.page_splat_edits import encode_page_splat_edits
-from cagefield.formats.page_splats import encode_page_splats
-from cagefield.formats.splat_files import read_splats
-from cagefield.keyframe_files import dump_path
-from cagefield.keyframes import Keyframe, Timeline
-from cagefield.rendering.deformed_splats import changed_splats
-from cagefield.rendering.metrics import psnr
-from cagefield.scene import Scene
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.pages.page_file import bytes_until
+from cagefield.pages.page_splat_edits import encode_page_splat_edits
+from cagefield.pages.page_splats import encode_page_splats
+from cagefield.pages.scene_page import NAMES, ScenePage, write_folder
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.scene.scene import Scene
 from commands import printed, refused
 from exported_page import pixels, rendered, settle, shown, until, web_server
 from field_page import field_page
@@ -126,7 +126,7 @@ def test_the_more_splats_move_the_fewer_states_there_are(monkeypatch: pytest.Mon
     keys = (Keyframe(pose, 45.0, 2.0, {1: 0.0}), Keyframe(pose, 45.0, 1.0))
     many = ScenePage.of(scene, "splats", keys).along
     assert many is not None and many.split
-    monkeypatch.setattr("cagefield.exporting.splat_path_states.BUDGET", 250_000)
+    monkeypatch.setattr("cagefield.pages.splat_path_states.BUDGET", 250_000)
     few = ScenePage.of(scene, "splats", keys).along
     assert few is not None and not few.split
     assert many.states == 25 and 8 <= few.states < 20
@@ -137,7 +137,7 @@ def test_the_more_splats_move_the_fewer_states_there_are(monkeypatch: pytest.Mon
 def test_a_folder_shows_its_coarse_level_while_the_rest_loads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cagefield.formats.page_splats.FIRST", 1200)
+    monkeypatch.setattr("cagefield.pages.page_splats.FIRST", 1200)
     scene = splats_scene(MOVE)
     page_of = ScenePage.of(scene, "splats")
     write_folder(tmp_path / "splats", page_of.folder())

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
 from cagefield.errors import CageError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.extended_coordinates import Extended
 from cagefield.warps.trilinear_bend import bends_one_to_one, face_directions, forms

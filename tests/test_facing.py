@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.lighting.diffuse_irradiance import Facing, facing_of
+from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.facing import Facing, facing_of
-from cagefield.patches.surfels import Surfels
-from cagefield.scene import Scene
-from cagefield.sh import C0
+from cagefield.fields.sh import C0
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from solid_fields import db, solid_field
 
 FLOOR, RADIUS = -0.4, 0.3

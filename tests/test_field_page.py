@@ -7,12 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import EditError
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import (
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.images.render_result import RenderResult
+from cagefield.pages.page_edits import (
     FINEST_LATTICE,
     LATTICE,
     MAGIC,
@@ -21,11 +23,9 @@ from cagefield.formats.page_edits import (
     encode_page_edits,
     for_pages,
 )
-from cagefield.formats.page_field import encode_page_field
-from cagefield.formats.page_file import unpack
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.render_result import RenderResult
-from cagefield.rendering.renderer import Renderer
+from cagefield.pages.page_field import encode_page_field
+from cagefield.pages.page_file import unpack
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from field_page import Drawn, FieldPage, field_page
 from page_fields import lumps
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from cagefield.completion.inpainting.support_inpainting import rebuilt
+from cagefield.completion.lighting.ambient_occlusion import Lighting
+from cagefield.completion.surfaces.footprint import Footprint, footprint_of
+from cagefield.completion.surfaces.grid_block import Block, block_of
+from cagefield.completion.surfaces.support_plane import Support
+from cagefield.completion.surfaces.surfels import Surfels, surfels_of
 from cagefield.edits import EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import Block, block_of
-from cagefield.patches.footprint import Footprint, footprint_of
-from cagefield.patches.light import Lighting
-from cagefield.patches.rebuilding import rebuilt
-from cagefield.patches.support import Support
-from cagefield.patches.surfels import Surfels, surfels_of
+from cagefield.fields.voxel_field import VoxelField
 
 C0 = 0.28209479177387814
 VOXEL = 0.05

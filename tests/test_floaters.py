@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.fields.voxel import VoxelField
-from cagefield.training.floaters import LARGEST_SPECK, without_specks
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.training.voxels.floater_removal import LARGEST_SPECK, without_specks
 
 N = 64
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import DeviceError, EditError
 from cagefield.typing import Array
@@ -27,7 +27,7 @@ def device() -> None:
 
 
 def compare(edits: list[Edit], n: int) -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     stack = EditStack(edits)
     rng = np.random.default_rng(0)
@@ -69,7 +69,7 @@ def test_random_edits_against_the_reference(edit: Edit) -> None:
 
 @pytest.mark.parametrize("name", ["turn of 90", "bent cages", "linear, half"])
 def test_lattice_error_falls_with_its_order(name: str) -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     edit = EDITS[name]
     p = shell_points(shell_of(edit), 400).astype(np.float32)
@@ -87,7 +87,7 @@ def test_lattice_error_falls_with_its_order(name: str) -> None:
 
 def nodes_and_reference(edit: Edit, resolution: int) -> tuple[Array, Array]:
     """(displacements [R^3,3] by the lattice's kernel, those of the exact map)."""
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     nodes = DeviceStack.from_stack(EditStack([edit.replace(lattice=resolution)])).lattice
     warp = edit.exact_warp
@@ -116,7 +116,7 @@ def test_lattice_nodes_are_the_maps_values(name: str) -> None:
 def test_lattice_with_the_references_steps_is_the_reference(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cagefield.warps import edit_lattice
+    from cagefield.edits.device import edit_lattice
 
     monkeypatch.setattr(edit_lattice, "LATTICE_STRAIN", 0.125)
     nodes, expected = nodes_and_reference(EDITS[name], 9)

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from cagefield.cages import Axes, Cage
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.limits import along, flow_reach, largest_safe
 from cagefield.edits.operations import Operation, Rotate, Scale, Shear, Translate
+from cagefield.edits.safe_fraction import along, flow_reach, largest_safe
 from cagefield.errors import CageError, EditError
+from cagefield.geometry.cage import Axes, Cage
 from cagefield.typing import Array
 from cagefield.warps import Falloff
 from cagefield.warps.cage_motion import TIMES

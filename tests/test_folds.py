@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.cli import poses as poses_command
-from cagefield.datasets import View, folds
-from cagefield.datasets.pose_refinement import RefinedPoses
-from cagefield.datasets.pose_verification import describe
-from cagefield.datasets.procedural.textures import noise
+from cagefield.datasets import View
+from cagefield.datasets.sfm import ambiguity_check
+from cagefield.datasets.sfm.pose_refinement import RefinedPoses
+from cagefield.datasets.sfm.pose_verification import describe
 from cagefield.datasets.views import Dataset
-from cagefield.rendering.images import write_png
+from cagefield.images.image_files import write_png
+from cagefield.procedural.textures import noise
 from posed_photos import ring
 
 COUNT, WIDTH, HEIGHT = 24, 72, 48
@@ -68,12 +69,12 @@ def folded() -> list[Camera]:
 
 
 def test_right_poses_are_not_folded(photos, tmp_path):
-    assert folds.find_fold(dataset(tmp_path / "room", cameras(), photos)) is None
+    assert ambiguity_check.find_fold(dataset(tmp_path / "room", cameras(), photos)) is None
 
 
 def test_two_sides_that_lie_on_each_other_are_found(photos, tmp_path):
     steps = []
-    fold = folds.find_fold(
+    fold = ambiguity_check.find_fold(
         dataset(tmp_path / "room", folded(), photos), lambda done, note: steps.append((done, note))
     )
     assert fold is not None and fold.compared == COUNT and fold.photos >= COUNT // 2
@@ -88,20 +89,20 @@ def test_one_wrong_pose_blur_and_darkness_are_no_fold(photos, tmp_path):
     shown = list(photos)
     shown[9] = np.full_like(shown[9], 128)
     shown[13] = (shown[13] * 0.4).astype(np.uint8)
-    assert folds.find_fold(dataset(tmp_path / "room", poses, shown)) is None
+    assert ambiguity_check.find_fold(dataset(tmp_path / "room", poses, shown)) is None
 
 
 def test_few_photos_and_walls_without_texture_are_no_fold(photos, tmp_path):
-    assert folds.find_fold(dataset(tmp_path / "two", folded()[:2], photos[:2])) is None
+    assert ambiguity_check.find_fold(dataset(tmp_path / "two", folded()[:2], photos[:2])) is None
     plain = [np.full_like(pixels, 200) for pixels in photos]
-    assert folds.find_fold(dataset(tmp_path / "plain", folded(), plain)) is None
+    assert ambiguity_check.find_fold(dataset(tmp_path / "plain", folded(), plain)) is None
 
 
 def test_photos_that_agree_with_nobody_do_not_count():
     pairs = [(0, 1), (1, 2), (2, 3), (4, 5)]
     alike = np.array([0.9, 0.1, 0.9, 0.1])
-    assert folds.contradicting(pairs, alike, 6) == {1, 2}
-    assert folds.contradicting(pairs, np.full(4, np.nan), 6) == set()
+    assert ambiguity_check.contradicting(pairs, alike, 6) == {1, 2}
+    assert ambiguity_check.contradicting(pairs, np.full(4, np.nan), 6) == set()
 
 
 class _Solver:
@@ -130,8 +131,8 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
         dataset(tmp_path / "right", cameras(), photos),
     )
     solver = _Solver(right)
-    monkeypatch.setattr("cagefield.datasets.pose_verification.PoseSolver", solver)
-    monkeypatch.setattr("cagefield.datasets.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.PoseSolver", solver)
+    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.poses_cache", lambda: tmp_path / "cache")
     found = poses_command.verified(wrong).dataset
     said = capsys.readouterr().out
     assert len(solver.calls) == 1 and "poses are folded" in said and "--keep-poses" in said
@@ -146,8 +147,8 @@ def test_training_finds_folded_poses_anew_and_holds_out_the_same_photos(
 
 def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tmp_path, monkeypatch, capsys):
     wrong = dataset(tmp_path / "wrong", folded(), photos)
-    monkeypatch.setattr("cagefield.datasets.pose_verification.PoseSolver", _Solver(wrong))
-    monkeypatch.setattr("cagefield.datasets.pose_verification.poses_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.PoseSolver", _Solver(wrong))
+    monkeypatch.setattr("cagefield.datasets.sfm.pose_verification.poses_cache", lambda: tmp_path / "cache")
     assert poses_command.verified(wrong).dataset is wrong
     said = capsys.readouterr().out
     assert "poses look folded" in said and "structure from motion finds the same poses" in said
@@ -155,8 +156,8 @@ def test_a_fold_that_structure_from_motion_finds_too_is_kept_and_said(photos, tm
 
 def test_bundle_adjustment_that_stays_folded_confirms_no_fold(photos, tmp_path, monkeypatch):
     """Rough and folded poses: adjusted ones agree with them and are as folded; new ones are taken."""
-    from cagefield.datasets import pose_verification
-    from cagefield.datasets.pose_check import PoseError
+    from cagefield.datasets.sfm import pose_verification
+    from cagefield.datasets.sfm.epipolar_error import PoseError
 
     wrong, right = dataset(tmp_path / "a", folded(), photos), dataset(tmp_path / "b", cameras(), photos)
     solver = _Solver(right)
@@ -176,8 +177,8 @@ def test_poses_without_moving_things_win_though_matches_on_these_contradict_them
 ):
     from dataclasses import replace as changed
 
-    from cagefield.datasets import pose_verification
-    from cagefield.datasets.pose_check import PoseError
+    from cagefield.datasets.sfm import pose_verification
+    from cagefield.datasets.sfm.epipolar_error import PoseError
 
     data = changed(dataset(tmp_path / "a", cameras(), photos), unbounded=False)
     solver = _Solver(data)

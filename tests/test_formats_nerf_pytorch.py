@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
 from nerf_networks import (
     forward_krrish94,
     forward_yenchenlin,
@@ -25,7 +25,7 @@ from nerf_networks import (
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.formats.nerf_pytorch import read_checkpoint  # noqa: E402
+from cagefield.formats.nerf.nerf_pytorch import read_checkpoint  # noqa: E402
 
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "nerf-pytorch"
 BOX = [[-1.5] * 3, [1.5] * 3]

@@ -16,12 +16,12 @@ import pytest
 from cagefield import Scene
 from cagefield.errors import FieldError
 from cagefield.fields.meshing import Mesh
-from cagefield.fields.splat import SplatField
-from cagefield.formats.gltf_buffers import GltfAsset
+from cagefield.fields.sh import C0
+from cagefield.fields.splat_field import SplatField
+from cagefield.files.ply import read_ply
 from cagefield.formats.mesh_files import write_mesh, write_points
-from cagefield.formats.splat_files import convert_splats, read_splats, write_splats
-from cagefield.ply import read_ply
-from cagefield.sh import C0
+from cagefield.formats.splats.gltf_buffers import GltfAsset
+from cagefield.formats.splats.splat_files import convert_splats, read_splats, write_splats
 from commands import printed, refused
 from gltf_assets import scene_of
 from splat_damage import ksplat_of, sample_file
@@ -405,7 +405,7 @@ def test_the_editor_opens_them_and_tells_what_is_left_out(tmp_path: Path) -> Non
     finally:
         coordinator.close()
     asset = scene_of(random_splats(30)).write(tmp_path / "a.gltf", "a.bin")
-    from cagefield.server.web.opening import scene_of_file
+    from cagefield.server.web.splat_file_scene import scene_of_file
 
     before = scene_of_file(asset)
     content = bytearray((tmp_path / "a.bin").read_bytes())

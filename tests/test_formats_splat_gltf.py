@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.formats.splat_colour_space import srgb_encoded, srgb_harmonics
-from cagefield.formats.splat_files import read_splats, write_splats
-from cagefield.quaternions import rotation_matrices
-from cagefield.sh import C0, MAX_DEGREE, sh_basis
+from cagefield.fields.sh import C0, MAX_DEGREE, sh_basis
+from cagefield.formats.splats.color_space import srgb_encoded, srgb_harmonics
+from cagefield.formats.splats.splat_files import read_splats, write_splats
+from cagefield.geometry.quaternions import rotation_matrices
 from splat_scenes import assert_same_splats, random_splats
 
 EXTENSION = "KHR_gaussian_splatting"

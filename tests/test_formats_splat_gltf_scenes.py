@@ -13,12 +13,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import convert_splats, read_splats, write_splats
-from cagefield.formats.splat_spz_writer import write_spz
-from cagefield.formats.splat_table import FieldTable
-from cagefield.quaternions import rotation_matrices
-from cagefield.sh import C0, sh_basis
+from cagefield.fields.sh import C0, sh_basis
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import convert_splats, read_splats, write_splats
+from cagefield.formats.splats.splat_table import FieldTable
+from cagefield.formats.splats.spz_writer import write_spz
+from cagefield.geometry.quaternions import rotation_matrices
 from gltf_assets import EXTENSION, Asset, scene_of
 from splat_damage import old_spz
 from splat_scenes import assert_same_splats, random_splats

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import read_splats, write_splats
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats, write_splats
 from splat_scenes import random_splats
 
 NAMES = ("means", "log_scales", "quaternions", "opacities", "sh")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.formats.splat_files import read_splats, write_splats
-from cagefield.ply import read_ply
+from cagefield.files.ply import read_ply
+from cagefield.formats.splats.splat_files import read_splats, write_splats
 from scenes import SH_C0
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats
 

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats import splat_table
-from cagefield.formats.splat_axes import AXES, Axes, with_axes
-from cagefield.formats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
-from cagefield.formats.splat_sog_writer import codebook
-from cagefield.formats.splat_spz_writer import write_spz
-from cagefield.formats.splat_table import FieldTable, SplatBatch
-from cagefield.quaternions import rotation_matrices
+from cagefield.fields import sh as spherical_harmonics
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats import splat_table
+from cagefield.formats.splats.axes import AXES, Axes, with_axes
+from cagefield.formats.splats.sog_writer import codebook
+from cagefield.formats.splats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
+from cagefield.formats.splats.splat_table import FieldTable, SplatBatch
+from cagefield.formats.splats.spz_writer import write_spz
+from cagefield.geometry.quaternions import rotation_matrices
 from commands import printed, refused
 from splat_damage import SLACK, attack, ksplat_of, sample_files, splatfacto_tensors
 from splat_scenes import assert_same_splats, random_splats

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
-from cagefield.training.free_space import BALL_SHARE, SURFACE_SHARE, FreeSpace
-from cagefield.training.splat_state import SplatState
+from cagefield.cameras.camera import Camera
+from cagefield.training.splats.free_space import BALL_SHARE, SURFACE_SHARE, FreeSpace
+from cagefield.training.splats.splat_state import SplatState
 
 
 def splats(positions, sigma=0.01) -> SplatState:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from cagefield import Scene, datasets
-from cagefield.atomic_files import check_writable, replaced_file
 from cagefield.benchmarking.tables import write_texts
-from cagefield.datasets.procedural import make_scene
-from cagefield.formats.splat_files import write_splats
-from cagefield.rendering.images import video_writer
+from cagefield.files.atomic import check_writable, replaced_file
+from cagefield.formats.splats.splat_files import write_splats
+from cagefield.images.image_files import video_writer
+from cagefield.procedural import make_scene
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from cagefield.training.loop import run_to_end
 from commands import given_up, printed

@@ -11,7 +11,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from cagefield.benchmarking.full_resolution import full_camera, measure, table
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
 from cagefield.errors import CagefieldError
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.patches.grain import grain_of, streamed
-from cagefield.patches.rebuilding import membrane
+from cagefield.completion.inpainting.coherence_transport import grain_of, streamed
+from cagefield.completion.inpainting.support_inpainting import membrane
 from cagefield.typing import Array, Mask
 
 SIZE = 64

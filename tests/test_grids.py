@@ -12,7 +12,7 @@ from cagefield.benchmarking.grids import _RED, VIEW, Style, caption, grids, latt
 from cagefield.benchmarking.methods import exact_map
 from cagefield.cli import main
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
 
 SIDE = 172  # pixels of 0.01
 

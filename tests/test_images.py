@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from cagefield.errors import CagefieldError, DatasetError
-from cagefield.rendering import images
-from cagefield.rendering.images import read_image, side_by_side, write_png, write_video
-from cagefield.rendering.render_result import RenderResult, background_rgb, to_uint8
+from cagefield.images import image_files
+from cagefield.images.image_files import read_image, side_by_side, write_png, write_video
+from cagefield.images.render_result import RenderResult, background_rgb, to_uint8
 
 
 def gradient(height: int, width: int, channels: int = 3) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_pictures_are_converted_in_tiles(tmp_path, monkeypatch, mode):
     whole = read_image(tmp_path / "a.png")
     assert whole.shape == (41, 30, 4 if mode in ("RGBA", "LA", "P") else 3)
     for pixels in (1, 100, 300):
-        monkeypatch.setattr(images, "_TILE", pixels)
+        monkeypatch.setattr(image_files, "_TILE", pixels)
         np.testing.assert_array_equal(read_image(tmp_path / "a.png"), whole)
     monkeypatch.undo()
     picture.resize((1000, 1000), Image.Resampling.NEAREST).save(tmp_path / "b.png")
@@ -70,7 +70,7 @@ def test_pictures_are_converted_in_tiles(tmp_path, monkeypatch, mode):
 def test_tiles_cover_a_picture_once():
     for width, height, multiple in ((1, 1, 1), (500_000, 2, 2), (300, 900, 3), (5000, 4000, 8)):
         covered = np.zeros((height, width), np.uint8)
-        for x, y, end_x, end_y in images.tiles(width, height, multiple):
+        for x, y, end_x, end_y in image_files.tiles(width, height, multiple):
             covered[y:end_y, x:end_x] += 1
             assert x % multiple == y % multiple == 0 and (end_x - x) * (end_y - y) <= 1 << 16
         assert (covered == 1).all()

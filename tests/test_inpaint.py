@@ -7,14 +7,14 @@ import pytest
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from cagefield import devices
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.fields.frusta import in_frusta
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.renderer import Renderer
-from cagefield.training import inpaint
-from cagefield.training.inpaint import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
-from cagefield.training.visibility import LEAST_TRANSMITTANCE, unseen_vertices
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.training.voxels import inpainting
+from cagefield.training.voxels.inpainting import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
+from cagefield.training.voxels.vertex_visibility import LEAST_TRANSMITTANCE, unseen_vertices
 
 devices.start()
 
@@ -157,11 +157,11 @@ def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
 ) -> None:
     field, hidden = ball
     whole = filled(field, hidden)
-    swept = inpaint.jacobi_sweeps
+    swept = inpainting.jacobi_sweeps
     calls = []
     # Sweeps bring colours one voxel on each: DEPTH of them reach all that is filled of a ball.
-    monkeypatch.setattr(inpaint, "MOST_STEPS", DEPTH + 2)
-    monkeypatch.setattr(inpaint, "jacobi_sweeps", lambda *system: calls.append(1) or swept(*system))
+    monkeypatch.setattr(inpainting, "MOST_STEPS", DEPTH + 2)
+    monkeypatch.setattr(inpainting, "jacobi_sweeps", lambda *system: calls.append(1) or swept(*system))
     short = filled(field, hidden)
     assert len(calls) == 3  # each of the three axes
     np.testing.assert_array_equal(short.vertices, whole.vertices)
@@ -180,7 +180,7 @@ def block(n: int = 16) -> tuple[sparse.csr_matrix, np.ndarray]:
     number = np.arange(n**3).reshape(n, n, n)
     pull = sparse.csr_matrix((n**3, n**3))
     for axis, share in enumerate(REACH**2 * np.array([1.0, 1.0, ACROSS])):
-        a, b = inpaint.links_of(number, number, axis)
+        a, b = inpainting.links_of(number, number, axis)
         pull += sparse.csr_matrix((np.full(len(a), share), (a, b)), pull.shape)
     return pull, 1.0 + np.asarray(pull.sum(axis=1))[:, 0]
 
@@ -193,9 +193,9 @@ def test_the_bound_on_the_steps_holds_where_the_system_is_hardest(monkeypatch: p
     def never(*system):
         raise AssertionError("not solved within the bound")
 
-    monkeypatch.setattr(inpaint, "MOST_STEPS", 111)
-    monkeypatch.setattr(inpaint, "jacobi_sweeps", never)
-    found = inpaint.solve_diffusion(pull, diagonal, source)
+    monkeypatch.setattr(inpainting, "MOST_STEPS", 111)
+    monkeypatch.setattr(inpainting, "jacobi_sweeps", never)
+    found = inpainting.solve_diffusion(pull, diagonal, source)
     direct = spsolve((sparse.diags(diagonal) - pull).tocsc(), source[:, 0])
     # No eigenvalue is under 1, so the error is at most the residual.
     assert np.linalg.norm(found - direct[:, None] * source[0]) < TOLERANCE * np.linalg.norm(source[0])
@@ -205,8 +205,8 @@ def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: py
     pull, diagonal = block()
     source = np.zeros((len(diagonal), 2))
     source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
-    monkeypatch.setattr(inpaint, "MOST_STEPS", 40)
-    weight, colour = inpaint.solve_diffusion(pull, diagonal, source).T
+    monkeypatch.setattr(inpainting, "MOST_STEPS", 40)
+    weight, colour = inpainting.solve_diffusion(pull, diagonal, source).T
     # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
     assert (weight > 0).all()
     assert (colour >= 0).all() and (colour <= weight).all()

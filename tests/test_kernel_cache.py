@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cagefield import caches
-from cagefield import kernel_cache as kept
+from cagefield.compute import kernel_cache as kept
+from cagefield.files import user_cache
 
 MAP = """
 import json
@@ -173,7 +173,7 @@ def test_folders_of_other_versions_and_locks_go_when_nobody_uses_them(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     kernels = tmp_path / "cagefield" / "kernels"
-    for name, age in (("old", caches.KEPT_SECONDS + 60.0), ("recent", 60.0)):
+    for name, age in (("old", user_cache.KEPT_SECONDS + 60.0), ("recent", 60.0)):
         (kernels / name).mkdir(parents=True)
         os.utime(kernels / name, 2 * (time.time() - age,))
     lock = kept.kernel_cache() / "kernel_compilation_manager" / "qdcache.lock"  # type: ignore[operator]

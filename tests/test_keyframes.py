@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.camera_paths import load_camera_path
+from cagefield.cameras.camera_paths import load_camera_path
+from cagefield.cameras.keyframe_files import dump_path, is_path, load_keys
+from cagefield.cameras.keyframes import Keyframe, Timeline, stills
 from cagefield.errors import CameraError
-from cagefield.keyframe_files import dump_path, is_path, load_keys
-from cagefield.keyframes import Keyframe, Timeline, stills
 
 
 def key(x: float, turn_deg: float = 0.0, fov: float = 50.0, seconds: float = 1.0, **parts: float) -> Keyframe:

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield import leftovers
-from cagefield.atomic_files import recover_folder
 from cagefield.benchmarking.workbench import Settings, Workbench
-from cagefield.cameras import Camera
-from cagefield.datasets import points
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.sfm import sparse_points
 from cagefield.datasets.views import SparsePoints
-from cagefield.leftovers import hidden_name, remove_leftovers
+from cagefield.files import stale_files
+from cagefield.files.atomic import recover_folder
+from cagefield.files.stale_files import hidden_name, remove_leftovers
 
 LONG = "scene-" + "x" * 150
 
@@ -92,12 +92,12 @@ def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
     target = tmp_path / "ball"
     folder = left(target, "old", str(os.getpid()) if host == "this" else ended)
     if host == "another":
-        monkeypatch.setattr(leftovers, "host", lambda: "0a0a0a")
+        monkeypatch.setattr(stale_files, "host", lambda: "0a0a0a")
     assert recover_folder(target, lambda f: True) is None
     target.mkdir()
     remove_leftovers(target)
     target.rmdir()
-    monkeypatch.setattr(leftovers, "UNTOUCHED", -1.0)
+    monkeypatch.setattr(stale_files, "UNTOUCHED", -1.0)
     with pytest.warns(UserWarning, match="it is back"):
         assert recover_folder(target, lambda f: True) == folder
 
@@ -113,7 +113,7 @@ def test_half_a_file_with_a_digests_name_goes_with_the_next_that_is_written(
     assert [file.suffix for file in (tmp_path / "chair").iterdir()] == [".npz"]
 
     half = [left(tmp_path / "points" / "00.npz", "part", ended)]
-    points.write_cached_points(
+    sparse_points.write_cached_points(
         tmp_path / "points" / "01.npz", SparsePoints(np.zeros((1, 3)), np.zeros((1, 3), np.uint8))
     )
     assert [file.name for file in (tmp_path / "points").iterdir()] == ["01.npz"]

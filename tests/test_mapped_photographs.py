@@ -13,16 +13,16 @@ from cagefield.benchmarking.cases import chosen
 from cagefield.benchmarking.edits import eye
 from cagefield.benchmarking.exact import KernelSamples, exact
 from cagefield.benchmarking.mapped_photographs import MappedScene
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import SCENES, ProceduralScene, procedural_scene
-from cagefield.datasets.procedural.distance_cells import SPACING, DistanceCells
-from cagefield.datasets.procedural.parts import Part, Primitive, place
-from cagefield.datasets.procedural.shapes import Box, Cylinder, Sphere
-from cagefield.datasets.procedural.textures import Plain
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import SceneError
-from cagefield.rendering.metrics import psnr
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.procedural import SCENES, ProceduralScene, procedural_scene
+from cagefield.procedural.distance_cells import SPACING, DistanceCells
+from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.shapes import Box, Cylinder, Sphere
+from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import PointMap, intersect_box
 
 GREY = Plain((0.6, 0.5, 0.4))

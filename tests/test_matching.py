@@ -7,9 +7,9 @@ import contextlib
 import numpy as np
 import pytest
 
-from cagefield.datasets import features
-from cagefield.datasets.features import Photo
-from cagefield.datasets.matching import match
+from cagefield.datasets.sfm import features
+from cagefield.datasets.sfm.features import Photo
+from cagefield.datasets.sfm.matching import match
 from cagefield.errors import DatasetError
 from posed_photos import textured_capture
 

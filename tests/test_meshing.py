@@ -10,9 +10,9 @@ import pytest
 
 from cagefield.errors import FieldError
 from cagefield.fields.meshing import HALF, Mesh, mesh_of
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.files.ply import read_ply
 from cagefield.formats.mesh_files import linear, write_mesh, write_points
-from cagefield.ply import read_ply
 from scenes import SH_C0
 
 trimesh = pytest.importorskip("trimesh", reason="needs trimesh")

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from cagefield.errors import CagefieldError
-from cagefield.rendering.metrics import color_corrected, color_fit, gradient_ratio, mse, psnr, ssim
+from cagefield.images.metrics import color_corrected, color_fit, gradient_ratio, mse, psnr, ssim
 
 
 def pair(shape: tuple[int, ...], noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -7,10 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cameras import Camera
-from cagefield.datasets import features, structure_from_motion
-from cagefield.datasets.left_out import Matches
-from cagefield.datasets.moving_features import (
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.sfm import features, structure_from_motion
+from cagefield.datasets.sfm.moving_features import (
     MIN_MATCHES,
     MIN_PHOTOS,
     MatchedFeatures,
@@ -19,6 +18,7 @@ from cagefield.datasets.moving_features import (
     read_features,
     remove_features,
 )
+from cagefield.datasets.sfm.registration_report import Matches
 
 PHOTOS, OBJECT, BACKDROP = 12, 60, 150
 MOVED_FROM = 6

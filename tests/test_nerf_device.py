@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from cagefield import Cage, Edit, EditStack, load_dataset
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import make_scene
+from cagefield.cameras.camera import Camera
+from cagefield.procedural import make_scene
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.fields.nerf_torch import TorchNerf  # noqa: E402
-from cagefield.rendering import tensor_maps  # noqa: E402
-from cagefield.rendering.nerf import Jitter, Rays, march, trace  # noqa: E402
-from cagefield.training.nerf_config import NerfConfig  # noqa: E402
-from cagefield.training.nerf_run import NerfRun  # noqa: E402
+from cagefield.rendering.nerf import torch_edit_map  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import Jitter, Rays, march, trace  # noqa: E402
+from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
+from cagefield.training.nerf.nerf_run import NerfRun  # noqa: E402
 from nerf_networks import small_field  # noqa: E402
 
 FAR = torch.device("meta")
@@ -33,7 +33,7 @@ KINDS = [{}, {"lindisp": True}, {"ndc": (0.6, 0.5)}, {"bounded": True}]
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     """What the edits' kernel is called with, which the stand-in cannot run."""
     found: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(tensor_maps, "map_tensors", lambda *arguments: found.append(arguments))
+    monkeypatch.setattr(torch_edit_map, "map_tensors", lambda *arguments: found.append(arguments))
     # How many samples are in bounds is the one number that is asked for.
     monkeypatch.setattr(torch, "nonzero", lambda mask: torch.empty((len(mask), 1), dtype=int, device=FAR))
     return found

@@ -8,13 +8,13 @@ import sys
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import FieldError
 from cagefield.fields.mlp import Linear, Mlp
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.protocol import Field
+from cagefield.geometry.cage import Cage
 from nerf_networks import affine, gamma, hidden_of, relu, small_field, small_mlp
 
 
@@ -74,8 +74,8 @@ def test_networks_that_do_not_fit_together_are_refused() -> None:
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.fields.nerf_torch import TorchNerf, to_ndc  # noqa: E402
-from cagefield.rendering.nerf import Rays, march, render_nerf, sample_pdf, trace  # noqa: E402
-from cagefield.rendering.tensor_maps import TensorMap  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import Rays, march, render_nerf, sample_pdf, trace  # noqa: E402
+from cagefield.rendering.nerf.torch_edit_map import TensorMap  # noqa: E402
 
 
 def directions(count: int, seed: int = 0) -> np.ndarray:
@@ -338,7 +338,7 @@ def test_pixels_may_be_chosen() -> None:
 
 
 def test_lindisp_samples_are_even_in_disparity() -> None:
-    from cagefield.rendering.nerf import stratified_samples
+    from cagefield.rendering.nerf.nerf_renderer import stratified_samples
 
     field = small_field(lindisp=True, near=1.0, far=4.0, samples=(4, 0))
     s = stratified_samples(field, Rays.of(camera(1), field.torch.device), 4, None)

@@ -12,9 +12,9 @@ import pytest
 from cagefield import Cage, Edit, EditStack, Scene
 from cagefield.datasets import load_dataset
 from cagefield.errors import FieldError
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
-from cagefield.formats.nerf_pytorch_config import Settings, find_config, read_config
+from cagefield.formats.nerf.nerf_pytorch_config import Settings, find_config, read_config
 from commands import printed, refused
 from nerf_networks import krrish94_state, small_field, small_mlp, yenchenlin_state
 from posed_photos import save
@@ -166,11 +166,11 @@ def test_a_scene_of_voxels_alone_cannot_be_baked(tmp_path, capsys) -> None:
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.cameras import Camera  # noqa: E402
-from cagefield.formats.nerf_pytorch import Checkpoint, read_checkpoint  # noqa: E402
-from cagefield.formats.nerf_pytorch_import import import_nerf, shifted  # noqa: E402
+from cagefield.cameras.camera import Camera  # noqa: E402
+from cagefield.formats.nerf.nerf_pytorch import Checkpoint, read_checkpoint  # noqa: E402
 from cagefield.rendering.bake_fidelity import agreement  # noqa: E402
-from cagefield.rendering.nerf import Rays, render_nerf, trace  # noqa: E402
+from cagefield.rendering.nerf.nerf_renderer import Rays, render_nerf, trace  # noqa: E402
+from cagefield.scene.import_nerf_pytorch import import_nerf, shifted  # noqa: E402
 
 
 def checkpoint_file(path: Path, kind: str = "yenchenlin") -> Path:
@@ -262,7 +262,7 @@ def test_a_forward_facing_capture_is_scaled_and_centred_as_nerf_pytorch_does(tmp
 
 
 def make_scene_folder(path: Path) -> Path:
-    from cagefield.datasets.procedural import make_scene
+    from cagefield.procedural import make_scene
 
     return make_scene("plant", path, views=2, size=16, test_views=1)
 
@@ -324,7 +324,7 @@ def test_baking_anew_changes_the_voxels_alone(scene, tmp_path, capsys) -> None:
 
 
 def test_agreement_is_the_psnr_of_the_pictures(scene) -> None:
-    from cagefield.rendering.metrics import psnr
+    from cagefield.images.metrics import psnr
 
     opened = Scene.open(scene)
     camera = opened.cameras["test"][0].resized(8, 8)

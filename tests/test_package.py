@@ -38,7 +38,9 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 
 
 def test_kernel_modules_print_nothing() -> None:
-    done = in_new_process("import cagefield.warps.device_stack, cagefield.rendering.kernels.march")
+    done = in_new_process(
+        "import cagefield.edits.device.device_stack, cagefield.rendering.voxels.kernels.march"
+    )
     assert done.stdout == done.stderr == ""
 
 

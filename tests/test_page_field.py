@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cameras import turntable
+from cagefield.cameras.camera import turntable
 from cagefield.errors import FieldError
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_field import BRICK, FINEST, coarse_field, decode_page_field, encode_page_field
-from cagefield.formats.page_file import pack, unpack
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.metrics import psnr
+from cagefield.pages.page_field import BRICK, FINEST, coarse_field, decode_page_field, encode_page_field
+from cagefield.pages.page_file import pack, unpack
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 from page_fields import lumps
 from scenes import ball_field
 

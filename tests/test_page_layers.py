@@ -7,19 +7,19 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
+from cagefield.completion.pasting.paste_composite import joined
+from cagefield.completion.pasting.paste_content import SourceContent, pasted
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.layers import ALIGNED
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import MAGIC, VERSION, encode_changed_edits, encode_page_edits
-from cagefield.formats.page_field import BRICK, encode_page_field
-from cagefield.formats.page_file import from_byte_planes, unpack
-from cagefield.formats.page_layers import encode_layer
-from cagefield.patches.joining import joined
-from cagefield.patches.pasting import SourceContent, pasted
-from cagefield.rendering.metrics import psnr
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.fields.voxel_layers import ALIGNED
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.pages.page_edits import MAGIC, VERSION, encode_changed_edits, encode_page_edits
+from cagefield.pages.page_field import BRICK, encode_page_field
+from cagefield.pages.page_file import from_byte_planes, unpack
+from cagefield.pages.page_layers import encode_layer
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from field_page import FieldPage, field_page
 from page_fields import lumps
 from page_layers import block_layer, patch_by_hand

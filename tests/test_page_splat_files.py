@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_splat_edits import decode_page_splat_edits, encode_page_splat_edits
-from cagefield.formats.page_splats import (
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.pages.page_splat_edits import decode_page_splat_edits, encode_page_splat_edits
+from cagefield.pages.page_splats import (
     CHUNK,
     COLOUR_STEP,
     OFF,
@@ -22,9 +23,8 @@ from cagefield.formats.page_splats import (
     encode_page_splats,
     page_order,
 )
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
-from cagefield.rendering.splat_splitting import split_of
+from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
+from cagefield.rendering.splats.splitting import split_of
 from splat_scenes import random_splats
 
 
@@ -65,7 +65,7 @@ def test_splats_far_away_cost_a_byte_and_not_their_place() -> None:
 
 
 def test_what_covers_most_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cagefield.formats.page_splats.FIRST", 100)
+    monkeypatch.setattr("cagefield.pages.page_splats.FIRST", 100)
     field = random_splats(500, 0)
     found = decode_page_splats(encode_page_splats(field))
     assert found.ends == (100, 500)

@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.splat_patch import splat_patch_of
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_splat_edits import encode_page_splat_edits
-from cagefield.formats.page_splats import encode_page_splats
-from cagefield.formats.splat_files import read_splats
-from cagefield.patches.splats import splat_patch_of
-from cagefield.rendering.deformed_splats import changed_splats
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.render_result import RenderResult
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.rendering.splat_splitting import split_of
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import read_splats
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.images.render_result import RenderResult
+from cagefield.pages.page_splat_edits import encode_page_splat_edits
+from cagefield.pages.page_splats import encode_page_splats
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splitting import split_of
 from field_page import Drawn, FieldPage, field_page
 from splat_rooms import LIGHT, cage, room
 from splat_scenes import ball_of_splats, random_splats
@@ -93,8 +93,8 @@ def test_a_camera_amid_the_splats(page: FieldPage) -> None:
 
 
 def test_levels_add_up(page: FieldPage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cagefield.formats.page_splats.FIRST", 500)
-    monkeypatch.setattr("cagefield.formats.page_splats.GROWTH", 3)
+    monkeypatch.setattr("cagefield.pages.page_splats.FIRST", 500)
+    monkeypatch.setattr("cagefield.pages.page_splats.GROWTH", 3)
     field = splats(1)
     figures = page.load(encode_page_splats(field))
     assert figures["levels"] == [[1, 3], [2, 3], [3, 3]]

@@ -10,20 +10,20 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.pasting.paste_content import content_box
+from cagefield.completion.surfaces.grid_block import block_of
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.operations import Rotate, Scale
 from cagefield.errors import EditError, EditFileError, SceneError
 from cagefield.fields.analytic import AnalyticField, GaussianBlob, UniformSphere
 from cagefield.fields.baking import bake
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import block_of
-from cagefield.patches.pasting import content_box
-from cagefield.rendering.metrics import psnr
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 
 THING = AnalyticField(
     [
@@ -341,7 +341,7 @@ def test_a_scene_that_changed_is_read_again(folder: Path, tmp_path: Path) -> Non
 
 
 def test_half_of_a_paste_is_none() -> None:
-    from cagefield.edits.partial import partial_edit
+    from cagefield.edits.partial_edit import partial_edit
 
     edit = pasted(1.0)
     assert partial_edit(edit, 0.4) is None and partial_edit(edit, 0.6) is edit

@@ -8,25 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.completion.splat_patch import splat_patch_of
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Rotate
 from cagefield.errors import EditError
 from cagefield.exporting import baked
-from cagefield.exporting.page import ScenePage
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_splat_edits import decode_page_splat_edits
-from cagefield.formats.page_splats import decode_page_splats, page_order
-from cagefield.formats.splat_files import write_splats
-from cagefield.patches.splats import splat_patch_of
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
-from cagefield.rendering.deformed_splats_reference import deformed_splats_reference
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.pasted_splats import with_pasted
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import write_splats
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.pages.page_splat_edits import decode_page_splat_edits
+from cagefield.pages.page_splats import decode_page_splats, page_order
+from cagefield.pages.scene_page import ScenePage
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
+from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
+from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.scene import Scene
 from splat_rooms import LIGHT, cage, room
 from splat_scenes import random_splats, splat_scene
 from test_splat_patches import seen

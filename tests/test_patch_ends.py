@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.completion.edit_context import Work
+from cagefield.completion.inpainting.support_inpainting import rebuilt
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.continuous_relighting import bent_voxels
+from cagefield.completion.lighting.shadow_strength import STRONG, WEAK, strength_of
+from cagefield.completion.surfaces.footprint import Footprint
+from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.surfaces.support_plane import Support
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import bent_voxels
-from cagefield.patches.block import block_of
-from cagefield.patches.footprint import Footprint
-from cagefield.patches.light import Ambience
-from cagefield.patches.rebuilding import rebuilt
-from cagefield.patches.strength import STRONG, WEAK, strength_of
-from cagefield.patches.support import Support
-from cagefield.patches.work import Work
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from solid_fields import solid_field
 from test_bending_light import INNER, LIGHT, OUTER
 from test_bending_light import room as gap_room

@@ -11,25 +11,25 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.discrete_patch import patch_of
+from cagefield.completion.inpainting.support_inpainting import membrane
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.patcher import wants_patch
+from cagefield.completion.surfaces.footprint import Footprint
+from cagefield.completion.surfaces.grid_block import block_of, interpolated
+from cagefield.completion.surfaces.support_plane import Support
+from cagefield.completion.surfaces.visibility import sight_of
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
 from cagefield.errors import EditError, EditFileError
-from cagefield.fields.layers import ALIGNED, places_of, slices_of
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import block_of, interpolated
-from cagefield.patches.footprint import Footprint
-from cagefield.patches.light import Ambience
-from cagefield.patches.making import patch_of
-from cagefield.patches.patcher import wants_patch
-from cagefield.patches.rebuilding import membrane
-from cagefield.patches.seen import sight_of
-from cagefield.patches.support import Support
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.fields.voxel_layers import ALIGNED, places_of, slices_of
+from cagefield.geometry.cage import Cage
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 from solid_fields import db, solid_field
 
 C0 = 0.28209479177387814

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from cagefield.patches import pattern
-from cagefield.patches.pattern import patterned
-from cagefield.patches.rebuilding import membrane
+from cagefield.completion.inpainting import exemplar_inpainting
+from cagefield.completion.inpainting.exemplar_inpainting import patterned
+from cagefield.completion.inpainting.support_inpainting import membrane
 from cagefield.typing import Array, Mask
 
 SIZE = 96
@@ -54,7 +54,7 @@ def test_what_repeats_goes_on_as_it_is() -> None:
 def test_a_large_hole_goes_by_patches_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     colours, gap = tiles(), hole()
     start, found = filled(colours, gap)
-    monkeypatch.setattr(pattern, "MOST", 100)
+    monkeypatch.setattr(exemplar_inpainting, "MOST", 100)
     wrong, less, left = (
         np.abs(each - colours)[gap].mean() for each in (found, filled(colours, gap)[1], start)
     )

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from cagefield import trilinear_hex
 from cagefield.benchmarking.distortion import distortion, shell_points
 from cagefield.benchmarking.methods import MAPS, METHODS, check_known, exact_map, peers
 from cagefield.benchmarking.peers import PEERS, HarmonicShell
 from cagefield.benchmarking.peers.harmonic import RESOLUTION, conjugate_gradients
 from cagefield.benchmarking.peers.mean_value import ClosedMesh, cube_surface
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.errors import CagefieldError, EditError
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.device_stack import DeviceStack
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 EDIT = Edit(INNER, OUTER)
@@ -154,8 +154,8 @@ def test_shells_are_the_identity_outside_and_phi_inside(name: str, edit: Edit) -
     # mean value: read 3e-7 of the mesh beside the face; harmonic: the box's faces are rows of nodes
     off = 5e-6 if name == "mean value" else 1e-12
     np.testing.assert_allclose(to_canonical(outside)[0], outside, atol=off)
-    canonical = trilinear_hex.points(edit.inner.corners, u)
-    inside = trilinear_hex.points(edit.deformed.corners, u)
+    canonical = hexahedron.points(edit.inner.corners, u)
+    inside = hexahedron.points(edit.deformed.corners, u)
     error = np.linalg.norm(to_canonical(inside)[0] - canonical, axis=1)
     on_edge = (np.abs(u - 0.5) > 0.4).sum(axis=1) > 1
     if name == "harmonic":  # a fifth of the spacing of 0.025; more at edges, where slopes are not bounded

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cagefield.benchmarking.perturbation import perturbed
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.cli.bench_captures import BenchCaptures
 from cagefield.datasets import Dataset, View, load_dataset
-from cagefield.datasets.procedural import make_capture
+from cagefield.procedural import make_capture
 
 
 @pytest.fixture

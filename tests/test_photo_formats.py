@@ -15,7 +15,7 @@ from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import find_photo, read_header, read_photo, report_conversions
 from cagefield.datasets.raw_photos import find_raw_photos, upright
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
 from heic_photos import BLUE, HEIC, RED, TURNED_HEIC, WHITE
 from icc_profiles import DISPLAY_P3, SRGB, matrix_profile
 from posed_photos import ring

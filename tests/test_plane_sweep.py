@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
-from cagefield.training.plane_sweep import CLEAR, Surfaces, find_surfaces, neighbours_of
+from cagefield.cameras.camera import Camera
+from cagefield.training.splats.plane_sweep import CLEAR, Surfaces, find_surfaces, neighbours_of
 
 DISTANCE, NEAR = 4.0, 2.2
 LENSES = {

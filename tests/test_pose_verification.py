@@ -9,14 +9,21 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.benchmarking.perturbation import perturbed
-from cagefield.cameras import Camera
-from cagefield.datasets import load_dataset, pose_verification
+from cagefield.cameras.camera import Camera
+from cagefield.datasets import load_dataset
 from cagefield.datasets.natural_order import natural_key
-from cagefield.datasets.pose_alignment import align_poses
-from cagefield.datasets.pose_check import PoseError, epipolar_errors, focal_spread, match_photos, pose_error
-from cagefield.datasets.pose_refinement import camera_groups
-from cagefield.datasets.pose_verification import all_views, describe, verify_poses
-from cagefield.datasets.transforms_writer import write_transforms
+from cagefield.datasets.sfm import pose_verification
+from cagefield.datasets.sfm.epipolar_error import (
+    PoseError,
+    epipolar_errors,
+    focal_spread,
+    match_photos,
+    pose_error,
+)
+from cagefield.datasets.sfm.pose_alignment import align_poses
+from cagefield.datasets.sfm.pose_refinement import camera_groups
+from cagefield.datasets.sfm.pose_verification import all_views, describe, verify_poses
+from cagefield.datasets.transforms.transforms_writer import write_transforms
 from cagefield.datasets.views import Dataset
 from posed_photos import ring, textured_capture
 

@@ -13,21 +13,11 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.cli import main
 from cagefield.cli import poses as poses_command
-from cagefield.datasets import (
-    features,
-    left_out,
-    load_dataset,
-    pose_verification,
-    poses_work,
-    structure_from_motion,
-)
-from cagefield.datasets.dataset import has_photos_alone
-from cagefield.datasets.folds import Fold
-from cagefield.datasets.pose_verification import Verification
-from cagefield.datasets.poses_work import work_folder
+from cagefield.datasets import load_dataset
+from cagefield.datasets.dataset_loader import has_photos_alone
 from cagefield.datasets.raw_photos import (
     RawPhoto,
     find_raw_photos,
@@ -36,7 +26,17 @@ from cagefield.datasets.raw_photos import (
     upright,
     video_frames,
 )
-from cagefield.datasets.structure_from_motion import PosesReport, is_made_of, make_poses
+from cagefield.datasets.sfm import (
+    features,
+    pose_verification,
+    registration_report,
+    sfm_workspace,
+    structure_from_motion,
+)
+from cagefield.datasets.sfm.ambiguity_check import Fold
+from cagefield.datasets.sfm.pose_verification import Verification
+from cagefield.datasets.sfm.sfm_workspace import work_folder
+from cagefield.datasets.sfm.structure_from_motion import PosesReport, is_made_of, make_poses
 from cagefield.errors import DatasetError
 from commands import refused
 from posed_photos import distance_to_textures, photo_of_textures, ring, save
@@ -170,7 +170,7 @@ def test_an_interrupted_run_goes_on(photos, tmp_path, monkeypatch, capfd):
         make_poses(source, target, on_progress=stop)
     assert work_folder(target).is_dir() and not target.exists()
     notes = []
-    monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
+    monkeypatch.setattr(sfm_workspace, "upright", None)  # no photo is read again
     report = make_poses(source, target, on_progress=lambda done, note: notes.append(note))
     assert report.placed == 4 and not any("read" in note for note in notes)
     assert capfd.readouterr() == ("", "")  # COLMAP's log stays silent
@@ -265,7 +265,9 @@ def test_reasons_why_photos_found_no_place():
         def reg_image_ids(self):
             return [7]
 
-    found = left_out.reasons_left_out(raw, {0, 1}, [Other()], left_out.Matches(counts, flat))
+    found = registration_report.reasons_left_out(
+        raw, {0, 1}, [Other()], registration_report.Matches(counts, flat)
+    )
     assert found == {
         "2": "blurred (10% of the sharpness of the others)",
         "3": "too few matches (at most 12 with a photo that found its place)",

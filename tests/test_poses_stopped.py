@@ -19,18 +19,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield.datasets import colmap_process, features, load_dataset, poses_work, structure_from_motion
-from cagefield.datasets.colmap_process import StoppedError
-from cagefield.datasets.database_check import check_database
-from cagefield.datasets.poses_work import (
+from cagefield.datasets import load_dataset
+from cagefield.datasets.raw_photos import RawPhoto, upright
+from cagefield.datasets.sfm import colmap_process, features, sfm_workspace, structure_from_motion
+from cagefield.datasets.sfm.colmap_process import StoppedError
+from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.sfm_workspace import (
     plainly_named,
     prepare_work,
     remove_work,
     work_folder,
     work_photos,
 )
-from cagefield.datasets.raw_photos import RawPhoto, upright
-from cagefield.datasets.structure_from_motion import camera_guesses, make_poses
+from cagefield.datasets.sfm.structure_from_motion import camera_guesses, make_poses
 from cagefield.errors import DatasetError
 from posed_photos import photos_alone
 
@@ -114,7 +115,7 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
         ):
             make_poses(photos, target)
     assert not target.exists()
-    monkeypatch.setattr(poses_work, "upright", None)  # no photo is read again
+    monkeypatch.setattr(sfm_workspace, "upright", None)  # no photo is read again
     assert make_poses(photos, target).placed == 4
     assert not work_folder(target).exists()
 
@@ -274,7 +275,7 @@ def test_a_database_that_may_not_be_written_says_what_helps(
     shutil.copytree(stopped, folder)
     database = folder / "data.work" / "database.db"
     with monkeypatch.context() as patch:  # root may write whatever its mode says
-        patch.setattr(poses_work.os, "access", lambda path, mode: path != database)
+        patch.setattr(sfm_workspace.os, "access", lambda path, mode: path != database)
         with pytest.raises(DatasetError, match=r"may not be written; make it and .* writable, or move"):
             make_poses(folder / "photos", folder / "data")
     database.rename(tmp_path / "away.db")

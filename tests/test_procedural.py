@@ -8,12 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import SCENES, ProceduralScene, make_scene, procedural_scene, viewpoints
-from cagefield.datasets.procedural.parts import Part, Primitive, affine, place
-from cagefield.datasets.procedural.shapes import (
+from cagefield.edits import Edit, EditStack
+from cagefield.errors import DatasetError, SceneError
+from cagefield.geometry.cage import Cage
+from cagefield.images.image_files import read_image
+from cagefield.images.metrics import psnr
+from cagefield.procedural import SCENES, ProceduralScene, make_scene, procedural_scene, viewpoints
+from cagefield.procedural.parts import Part, Primitive, affine, place
+from cagefield.procedural.shapes import (
     Box,
     Cylinder,
     Extrusion,
@@ -24,11 +28,7 @@ from cagefield.datasets.procedural.shapes import (
     Tube,
     polygon_distance,
 )
-from cagefield.datasets.procedural.textures import Plain
-from cagefield.edits import Edit, EditStack
-from cagefield.errors import DatasetError, SceneError
-from cagefield.rendering.images import read_image
-from cagefield.rendering.metrics import psnr
+from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import render_sampled
 
 ELL = ((-0.4, -0.3), (0.4, -0.3), (0.4, 0.0), (0.0, 0.0), (0.0, 0.35), (-0.4, 0.35))

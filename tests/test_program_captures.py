@@ -14,7 +14,7 @@ from PIL import Image
 
 import program_folders as write
 from cagefield.datasets import Dataset, View, load_dataset
-from cagefield.datasets.dataset import has_photos_alone
+from cagefield.datasets.dataset_loader import has_photos_alone
 from cagefield.errors import DatasetError
 from program_folders import HEIGHT, WIDTH, Y_UP, Shot, shots
 

@@ -16,7 +16,7 @@ import json, sys
 import numpy as np
 from cagefield import Cage, Edit
 from cagefield.edits import EditStack
-from cagefield.warps.device_stack import DeviceStack
+from cagefield.edits.device.device_stack import DeviceStack
 
 inner = Cage.box((0, 0, 0), 0.5)
 stack = EditStack([Edit(inner, inner.grown(0.5), shell="trilinear").translate((0.1, 0, 0))])
@@ -27,8 +27,8 @@ found = ["torch" in sys.modules, mapped.tolist()]
 
 TENSORS = """
 import torch
-from cagefield.rendering.kernels.tensor_maps import map_tensors
-from cagefield.rendering.tensor_maps import TensorMap
+from cagefield.rendering.nerf.kernels.torch_edit_map import map_tensors
+from cagefield.rendering.nerf.torch_edit_map import TensorMap
 
 mapped = TensorMap(stack, torch.device("cpu"), as_tensors=True)(*map(torch.from_numpy, (points, along)))[0]
 found += [mapped.tolist(), map_tensors._primal.src_ll_cache_observations.cache_loaded]

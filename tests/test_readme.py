@@ -10,7 +10,7 @@ import pytest
 
 from cagefield import Scene
 from cagefield.cli import parse
-from cagefield.edits.files import parse_edits
+from cagefield.edits.edit_files import parse_edits
 from scenes import ball_scene
 
 ROOT = Path(__file__).parents[1]

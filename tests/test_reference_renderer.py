@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import FieldError
 from cagefield.fields.analytic import AnalyticField, GaussianBlob, UniformBox, UniformSphere
+from cagefield.geometry.cage import Cage
 from cagefield.rendering import compositing
 from cagefield.rendering.reference_renderer import intersect_box, render_sampled
 

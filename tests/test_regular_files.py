@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from cagefield.errors import CagefieldError, DatasetError, SceneError
-from cagefield.npz import DEFLATED, read_array, read_arrays
-from cagefield.regular_files import MOST_TEXT, UnreadableError, check_regular, open_regular, read_text
-from cagefield.scene import Scene
+from cagefield.files.npz import DEFLATED, read_array, read_arrays
+from cagefield.files.safe_open import MOST_TEXT, UnreadableError, check_regular, open_regular, read_text
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.pasted_sources import sources_under
 from cagefield.server.editor.persistence import SceneStore
 from commands import refused
@@ -84,14 +84,14 @@ def test_what_takes_the_place_of_a_file_meanwhile_is_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     os.mkfifo(tmp_path / "pipe")
-    monkeypatch.setattr("cagefield.regular_files.check_regular", lambda *_: 0)
+    monkeypatch.setattr("cagefield.files.safe_open.check_regular", lambda *_: 0)
     with pytest.raises(UnreadableError, match="a pipe"):
         open_regular(tmp_path / "pipe")
 
 
 def test_a_file_that_grows_is_read_no_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a").write_bytes(bytes(MOST_TEXT + 1))
-    monkeypatch.setattr("cagefield.regular_files.check_regular", lambda *_: 0)
+    monkeypatch.setattr("cagefield.files.safe_open.check_regular", lambda *_: 0)
     with pytest.raises(UnreadableError, match="at most"):
         read_text(tmp_path / "a")
 
@@ -111,7 +111,7 @@ def test_arrays_take_no_more_than_their_files(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(ValueError, match="it says that it unpacks to"):
         read_arrays(tmp_path / "a.npz")
     assert read_arrays(tmp_path / "a.npz", DEFLATED)["pictures"].shape == (100, 100)
-    monkeypatch.setattr("cagefield.devices.free_memory", lambda: 1000)
+    monkeypatch.setattr("cagefield.compute.devices.free_memory", lambda: 1000)
     with pytest.raises(ValueError, match=r"GB of memory, 0\.0 are free; end other programs"):
         read_arrays(tmp_path / "a.npz", DEFLATED)
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering import occupancy
-from cagefield.rendering.metrics import psnr
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
 from cagefield.rendering.reference_renderer import render_sampled
-from cagefield.rendering.renderer import Renderer
+from cagefield.rendering.voxels import occupancy
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 
 devices.start()
 

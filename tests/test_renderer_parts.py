@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.occupancy import FEW, Occupancy, encode, masks_of
-from cagefield.rendering.renderer import Renderer
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.voxels.occupancy import FEW, Occupancy, encode, masks_of
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from scenes import ball_field
 
 CAMERA = Camera.look_at((0, -3, 0.8), (0, 0, 0), width=37, height=29, fov_x=0.8)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.datasets import repeated_views, structure_from_motion
-from cagefield.datasets.left_out import Matches
-from cagefield.datasets.repeated_views import are_in_order, contradicting, far_pairs, neighbourhood
+from cagefield.datasets.sfm import disambiguation, structure_from_motion
+from cagefield.datasets.sfm.disambiguation import are_in_order, contradicting, far_pairs, neighbourhood
+from cagefield.datasets.sfm.registration_report import Matches
 
 pycolmap = pytest.importorskip("pycolmap", reason="poses are found by pycolmap")
 
@@ -66,8 +66,8 @@ def _all_pairs(count: int) -> set[tuple[int, int]]:
 
 def test_relative_rotations_of_true_matches_agree_with_the_model(synthetic):
     path, model = synthetic
-    relative = repeated_views.relative_rotations(path, model, _all_pairs(12))
-    rotations = repeated_views.rotations_of(model)
+    relative = disambiguation.relative_rotations(path, model, _all_pairs(12))
+    rotations = disambiguation.rotations_of(model)
     assert len(relative) > 40
     for (i, j), rotation in relative.items():
         np.testing.assert_allclose(rotation, rotations[j] @ rotations[i].T, atol=0.02)
@@ -100,10 +100,10 @@ def test_the_unfolded_model_must_not_lose_photos_or_points(tmp_path, monkeypatch
     mapped = iter(models.values())
     removed = []
     monkeypatch.setattr(structure_from_motion, "_map", lambda *_: [next(mapped)])
-    monkeypatch.setattr(repeated_views, "remove_pairs", lambda _, pairs: removed.append(pairs))
-    monkeypatch.setattr(repeated_views, "relative_rotations", lambda *_: {})
-    monkeypatch.setattr(repeated_views, "rotations_of", lambda _: {})
-    monkeypatch.setattr(repeated_views, "contradicting", lambda *_: {(2, 20)})
+    monkeypatch.setattr(disambiguation, "remove_pairs", lambda _, pairs: removed.append(pairs))
+    monkeypatch.setattr(disambiguation, "relative_rotations", lambda *_: {})
+    monkeypatch.setattr(disambiguation, "rotations_of", lambda _: {})
+    monkeypatch.setattr(disambiguation, "contradicting", lambda *_: {(2, 20)})
     counts = _counts(40, 6, period=20)
     matches = Matches(counts, np.zeros_like(counts, dtype=bool))
     (found,), _ = structure_from_motion.unfolded_models(tmp_path, matches, 0, lambda *_: None)

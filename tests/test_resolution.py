@@ -5,7 +5,11 @@ from __future__ import annotations
 import pytest
 
 from cagefield.datasets import load_dataset
-from cagefield.datasets.resolution import at_training_resolution, describe_resolution, training_factor
+from cagefield.datasets.training_resolution import (
+    at_training_resolution,
+    describe_resolution,
+    training_factor,
+)
 from posed_photos import textured_capture
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.rendering.kernels.splat_projection import TILE
-from cagefield.rendering.splat_rasterizer import tiled, untiled
-from cagefield.training.robust_weights import MIN_SCALE, MIN_WEIGHT, SCALE_MEDIANS, RobustWeights
+from cagefield.rendering.splats.kernels.projection import TILE
+from cagefield.rendering.splats.rasterizer import tiled, untiled
+from cagefield.training.splats.robust_weights import MIN_SCALE, MIN_WEIGHT, SCALE_MEDIANS, RobustWeights
 
 DOWN, ACROSS = 4, 6
 SIZE = ACROSS * TILE, DOWN * TILE

@@ -8,19 +8,19 @@ import json
 import numpy as np
 import pytest
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import CAPTURES, ProceduralScene, capture, make_capture
-from cagefield.datasets.procedural.hand_held import Phone, developed, exposures, picture
-from cagefield.datasets.procedural.parts import Part, Primitive, place
-from cagefield.datasets.procedural.room_light import Room
-from cagefield.datasets.procedural.rooms import ROOMS
-from cagefield.datasets.procedural.shapes import Box, Sphere
-from cagefield.datasets.procedural.srgb import encoded, linear
-from cagefield.datasets.procedural.textures import Plain
-from cagefield.datasets.procedural.tracks import NOISE, tracks
 from cagefield.errors import DatasetError, SceneError
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
+from cagefield.procedural import CAPTURES, ProceduralScene, capture, make_capture
+from cagefield.procedural.hand_held import Phone, developed, exposures, picture
+from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.room_light import Room
+from cagefield.procedural.rooms import ROOMS
+from cagefield.procedural.shapes import Box, Sphere
+from cagefield.procedural.srgb import encoded, linear
+from cagefield.procedural.textures import Plain
+from cagefield.procedural.tracks import NOISE, tracks
 
 RED, GREY = Plain((0.8, 0.1, 0.1), 0.0), Plain((0.3, 0.3, 0.3), 0.0)
 

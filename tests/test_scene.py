@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from cagefield import Cage, Edit, EditStack, Scene, load_dataset
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import make_scene
+from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
-from cagefield.fields.voxel import VoxelField
-from cagefield.scene_files import check_destination
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.procedural import make_scene
+from cagefield.scene.scene_files import check_destination
 from cagefield.training.evaluation import Evaluation
-from cagefield.training.voxel import TrainResult
+from cagefield.training.voxels.train_voxels import TrainResult
 from scenes import ball_field, ball_scene, files_of
 
 
@@ -105,7 +105,7 @@ def test_failed_write_leaves_the_old_scene(tmp_path: Path, monkeypatch: pytest.M
     def disk_full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("cagefield.scene.dump_edits", disk_full)
+    monkeypatch.setattr("cagefield.scene.scene.dump_edits", disk_full)
     with pytest.raises(OSError, match="No space left"):
         ball_scene().save(path, overwrite=True)
     assert files_of(path) == before
@@ -124,7 +124,7 @@ def test_failed_swap_puts_the_old_scene_back(tmp_path: Path, monkeypatch: pytest
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", refuse_new)
-    monkeypatch.setattr("cagefield.atomic_files.exchanged", lambda one, other: False)
+    monkeypatch.setattr("cagefield.files.atomic.exchanged", lambda one, other: False)
     with pytest.raises(PermissionError):
         Scene(ball_field(density=3.0)).save(path, overwrite=True)
     assert files_of(path) == before

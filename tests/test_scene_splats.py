@@ -10,14 +10,14 @@ import pytest
 
 import cagefield
 from cagefield import Cage, Edit, EditStack, Scene, load_dataset
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import make_scene
+from cagefield.cameras.camera import Camera
 from cagefield.errors import FieldError
 from cagefield.fields.baking import _Grid, bake, surrounding, widened
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering.metrics import psnr
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.images.metrics import psnr
+from cagefield.procedural import make_scene
 from cagefield.rendering.renderers import renderer_of
 from scenes import ball_field, ball_scene
 from splat_scenes import assert_same_splats, ball_of_splats, random_splats, splat_scene

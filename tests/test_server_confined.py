@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.cli import main
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.keyframes import Keyframe
-from cagefield.leftovers import hidden_name
-from cagefield.rendering.images import write_video
-from cagefield.scene import Scene
+from cagefield.files.stale_files import hidden_name
+from cagefield.images.image_files import write_video
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session

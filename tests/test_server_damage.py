@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.completion.lighting.ambient_occlusion import Ambience, reaches_of
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
-from cagefield.patches.light import Ambience, reaches_of
-from cagefield.rendering.renderer import Renderer
-from cagefield.scene import Scene
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
 from cagefield.server.render_queue.damage import WHOLE, Rect, Showing, pixels, screen_bounds, tiles, union
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import Request
 from cagefield.server.render_queue.scheduler import SETTLE_SECONDS, Scheduler
-from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.tasks import PictureDone, PictureTask, Shown, Stopped, values_of
+from cagefield.server.render_worker.view import Display, Region
 from scenes import ball_field, ball_scene
 from sent_pictures import pixels_of
 

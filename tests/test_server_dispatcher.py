@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError
 from cagefield.server.render_queue import dispatcher as module
 from cagefield.server.render_queue.damage import WHOLE, Rect
@@ -21,7 +21,6 @@ from cagefield.server.render_queue.dispatcher import (
     TooManyError,
 )
 from cagefield.server.render_queue.requests import Request
-from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import (
     Answered,
     Failed,
@@ -37,6 +36,7 @@ from cagefield.server.render_worker.tasks import (
     WarmStage,
     WarmTask,
 )
+from cagefield.server.render_worker.view import Display
 
 CAMERA = Camera.look_at((0, -3, 0), (0, 0, 0), width=64, height=64, fov_x=0.8)
 

@@ -15,17 +15,17 @@ import numpy as np
 import pytest
 from starlette.types import Message
 
+from cagefield.compute.kernel_cache import kernel_cache
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.formats.splat_files import read_splats, write_splats
-from cagefield.kernel_cache import kernel_cache
-from cagefield.scene import Scene
+from cagefield.formats.splats.splat_files import read_splats, write_splats
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore, stem_of
-from cagefield.server.render_worker.own_process import in_own_process
-from cagefield.server.web import opening, uploads
+from cagefield.server.render_worker.subprocess_task import in_own_process
+from cagefield.server.web import splat_file_scene, uploads
 from cagefield.server.web.app import application
 from cagefield.server.web.launch import open_scene
-from cagefield.server.web.opening import KEPT_DAYS, opened_folder, scene_of_file
 from cagefield.server.web.security import Guard
+from cagefield.server.web.splat_file_scene import KEPT_DAYS, opened_folder, scene_of_file
 from editor_server import EditorServer, PageClient, editor_server, page
 from scenes import ball_scene
 from splat_damage import ksplat_of
@@ -132,15 +132,17 @@ def test_what_memory_cannot_hold_is_refused_before_its_digest(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A file of 20 GB, all holes, would take minutes to go through; one that fits is opened as others are."""
-    monkeypatch.setattr(opening, "_LARGE", 1)
+    monkeypatch.setattr(splat_file_scene, "_LARGE", 1)
     scene = scene_of_file(file)
     assert len(read_splats(file)) == len(Scene.open(scene).field) and scene_of_file(file) == scene
     huge = tmp_path / "huge.splat"
     huge.touch()
     os.truncate(huge, 20 << 30)
-    monkeypatch.setattr("cagefield.devices.free_memory", lambda: 16 << 30)
-    monkeypatch.setattr(opening, "_digest", lambda *_: pytest.fail("it was gone through"))
-    monkeypatch.setattr("cagefield.formats.splat_rows._plausible", lambda *_: True)  # zeros are no splats
+    monkeypatch.setattr("cagefield.compute.devices.free_memory", lambda: 16 << 30)
+    monkeypatch.setattr(splat_file_scene, "_digest", lambda *_: pytest.fail("it was gone through"))
+    monkeypatch.setattr(
+        "cagefield.formats.splats.antimatter15_splat._plausible", lambda *_: True
+    )  # zeros are no splats
     with pytest.raises(CagefieldError, match=r"its 671088640 splats are too many: it takes 37\.6 GB"):
         scene_of_file(huge)
 
@@ -158,7 +160,7 @@ def test_of_a_file_that_ends_in_a_hole_only_what_it_declares_is_gone_through(
         write_splats(random_splats(300, degree=1), file)
     size = file.stat().st_size
     os.truncate(file, 20 << 30)
-    whole = opening.open_regular
+    whole = splat_file_scene.open_regular
 
     @contextlib.contextmanager
     def counted(path: Path) -> Iterator[BinaryIO]:
@@ -166,7 +168,7 @@ def test_of_a_file_that_ends_in_a_hole_only_what_it_declares_is_gone_through(
             yield stream
             read.append(stream.tell())
 
-    monkeypatch.setattr(opening, "open_regular", counted)
+    monkeypatch.setattr(splat_file_scene, "open_regular", counted)
     scene = scene_of_file(file)
     assert read == [size]
     os.truncate(file, size)
@@ -181,11 +183,13 @@ def test_a_large_file_of_few_splats_is_refused_before_its_digest(
     packed = file.with_suffix(".spz")
     write_splats(read_splats(file), packed)
     size = packed.stat().st_size
-    monkeypatch.setattr(opening, "_LARGE", 1)
+    monkeypatch.setattr(splat_file_scene, "_LARGE", 1)
     scene_of_file(packed)
-    monkeypatch.setattr(opening, "_MOST_OF_ONE", 1)
-    monkeypatch.setattr(opening, "_digest", lambda *_: pytest.fail("it was gone through"))
-    monkeypatch.setattr("cagefield.formats.splat_rows._plausible", lambda *_: True)  # zeros are no splats
+    monkeypatch.setattr(splat_file_scene, "_MOST_OF_ONE", 1)
+    monkeypatch.setattr(splat_file_scene, "_digest", lambda *_: pytest.fail("it was gone through"))
+    monkeypatch.setattr(
+        "cagefield.formats.splats.antimatter15_splat._plausible", lambda *_: True
+    )  # zeros are no splats
     with pytest.raises(CagefieldError, match=f"it has {size} bytes for 600 splats; it is damaged"):
         scene_of_file(packed)
 

@@ -12,7 +12,7 @@ import pytest
 
 from cagefield.edits import Edit, parse_edits
 from cagefield.errors import EditFileError
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 from cagefield.server.editor import edit_texts, session, validity
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.persistence import SceneStore
@@ -20,7 +20,7 @@ from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import state_of
 from cagefield.server.web import patience, websocket
 from cagefield.server.web.security import Allowance
-from cagefield.server.web.threads import in_thread
+from cagefield.server.web.worker_threads import in_thread
 from scenes import ball_scene
 
 EDIT = {

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from cagefield import devices
+from cagefield.cameras.keyframes import Keyframe
+from cagefield.compute import devices
 from cagefield.errors import CagefieldError, line_of
-from cagefield.keyframes import Keyframe
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.client_messages import RenderJob

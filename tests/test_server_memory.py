@@ -12,15 +12,15 @@ import weakref
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
 from cagefield.edits import Edit
+from cagefield.geometry.cage import Cage
 from cagefield.server.render_worker import page_files, renderer_cache, unused_memory
 from cagefield.server.render_worker.renderer_cache import KEPT_EDITS, RendererCache
 from cagefield.server.render_worker.tasks import PageEditsTask, Shown, values_of
 from cagefield.server.render_worker.unused_memory import UnusedMemory
-from cagefield.server.web.threads import all_started, in_thread
+from cagefield.server.web.worker_threads import all_started, in_thread
 from scenes import ball_scene
 
 INNER = Cage.box((0, 0, 0), 1.2)

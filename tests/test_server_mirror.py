@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.mirror import mirrored, mirrored_cage
 
 INNER = Cage.box((0.2, 0.1, -0.1), (0.5, 0.4, 0.3), (0.3, -0.2, 0.5))

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframe_files import dump_path
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack, dump_edits
 from cagefield.errors import CagefieldError, CameraError
-from cagefield.keyframe_files import dump_path
-from cagefield.keyframes import Keyframe
+from cagefield.geometry.cage import Cage
 from cagefield.server.protocol import client_messages, server_messages
 from cagefield.server.protocol.validation_errors import refusal
 from cagefield.server.render_queue.coordinator import Coordinator

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframe_files import load_keys
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack, Translate, dump_edits, load_edits, save_edits
 from cagefield.errors import SceneError
-from cagefield.keyframe_files import load_keys
-from cagefield.keyframes import Keyframe
-from cagefield.scene import Scene
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from cagefield.server.editor import persistence
 from cagefield.server.editor.persistence import CAMERA_PATH, SceneStore
 from cagefield.server.editor.session import Session

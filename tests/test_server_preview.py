@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframes import Keyframe, stills
 from cagefield.edits import Edit, EditStack, Translate, dump_edits
 from cagefield.errors import CagefieldError, CameraError, EditError
-from cagefield.keyframes import Keyframe, stills
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.editor.session import Session

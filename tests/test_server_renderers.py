@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Keyframe, Still
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError, EditError
-from cagefield.keyframes import Keyframe, Still
-from cagefield.rendering.images import write_video
+from cagefield.geometry.cage import Cage
+from cagefield.images.image_files import write_video
 from cagefield.server.editor.cage_placement import PROBES, fitted, probes
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
@@ -25,7 +25,6 @@ from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.background import BackgroundWork
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import MARK
-from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.task_handlers import SAMPLES, TaskHandlers
 from cagefield.server.render_worker.tasks import (
@@ -42,16 +41,17 @@ from cagefield.server.render_worker.tasks import (
     WarmTask,
     values_of,
 )
+from cagefield.server.render_worker.view import Display, Region
 from scenes import ball_scene
 from sent_pictures import pixels_of
 
 # Kernels: imported once a device runs.
 devices.start()
 
-from cagefield.rendering.kernels.mapped_points import map_points  # noqa: E402
-from cagefield.rendering.kernels.march import march_tiles  # noqa: E402
-from cagefield.rendering.kernels.occupancy_continuous import occupied_points  # noqa: E402
-from cagefield.rendering.kernels.occupancy_discontinuous import occupied_corners  # noqa: E402
+from cagefield.rendering.voxels.kernels.mapped_lattice import map_points  # noqa: E402
+from cagefield.rendering.voxels.kernels.march import march_tiles  # noqa: E402
+from cagefield.rendering.voxels.kernels.occupancy_continuous import occupied_points  # noqa: E402
+from cagefield.rendering.voxels.kernels.occupancy_discontinuous import occupied_corners  # noqa: E402
 
 SIDE = 48
 INNER = Cage.box((0, 0, 0), 1.2)

@@ -14,7 +14,7 @@ from cagefield.server.render_queue.scheduler import (
     SETTLE_SECONDS,
     Scheduler,
 )
-from cagefield.server.render_worker.pictures import Display
+from cagefield.server.render_worker.view import Display
 
 SIDE = 800
 RATE = 1e6

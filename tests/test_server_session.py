@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack, MoveCorner, Rotate, Scale, Translate, dump_edits
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.errors import CageError, EditError
-from cagefield.keyframes import Keyframe
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor import validity
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.drag_solver import Target, move_corners

@@ -9,23 +9,22 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield import devices
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Still
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import EditError
-from cagefield.fields.splat import SplatField
-from cagefield.keyframes import Still
-from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.metrics import psnr
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.cage_placement import fitted
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.render_queue.scheduler import Scheduler
 from cagefield.server.render_queue.splat_extent import spread
-from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
 from cagefield.server.render_worker.task_handlers import TaskHandlers
@@ -43,6 +42,7 @@ from cagefield.server.render_worker.tasks import (
     WarmTask,
     values_of,
 )
+from cagefield.server.render_worker.view import Display, Region
 from cagefield.server.web.launch import hello_of, open_scene
 from sent_pictures import pixels_of
 from splat_scenes import ball_of_splats, splat_scene

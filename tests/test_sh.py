@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.special
 
-from cagefield import sh
 from cagefield.errors import FieldError
+from cagefield.fields import sh
 
 
 def _directions(n: int) -> np.ndarray:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cagefield.sh import MAX_DEGREE, sh_basis
-from cagefield.sh_rotation import rotated_sh, wigner_matrices
+from cagefield.fields.sh import MAX_DEGREE, sh_basis
+from cagefield.fields.sh_rotation import rotated_sh, wigner_matrices
 
 
 @pytest.mark.parametrize("degree", range(MAX_DEGREE + 1))

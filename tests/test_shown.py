@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cagefield.completion.surfaces.grid_block import Block, block_of
+from cagefield.completion.surfaces.surface_color import FROM, TO, shown, steadied
+from cagefield.completion.surfaces.surfels import surfels_of
 from cagefield.edits import EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import Block, block_of
-from cagefield.patches.shown import FROM, TO, shown, steadied
-from cagefield.patches.surfels import surfels_of
-from cagefield.sh import C0
+from cagefield.fields.sh import C0
+from cagefield.fields.voxel_field import VoxelField
 
 VERTICES, TOP = 24, 12
 

@@ -13,22 +13,23 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cagefield import devices, json_text
-from cagefield.camera_paths import load_camera_path
+from cagefield.cameras.camera_paths import load_camera_path
+from cagefield.cameras.keyframe_files import load_keys
+from cagefield.compute import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.edits import EditStack, parse_edits
+from cagefield.edits.device.edit_lattice import nodes_of
 from cagefield.errors import CagefieldError, DatasetError, EditError, EditFileError, FieldError
-from cagefield.fields.files import write_tensors
+from cagefield.fields.field_files import write_tensors
 from cagefield.fields.nerf_file import load_nerf
-from cagefield.fields.voxel import VoxelField
-from cagefield.keyframe_files import load_keys
-from cagefield.rendering import images
-from cagefield.rendering.images import read_image
-from cagefield.scene_files import is_scene, read_cameras
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.files import json_text
+from cagefield.images import image_files
+from cagefield.images.image_files import read_image
+from cagefield.scene.scene_files import is_scene, read_cameras
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.session import Session
-from cagefield.warps.edit_lattice import nodes_of
 
 
 def grid(folder: Path, side: int, stored: int) -> Path:
@@ -61,7 +62,7 @@ def test_a_picture_is_not_asked_for_more_than_its_file_holds(tmp_path: Path) -> 
     at = content.index(b"IDAT") - 4
     content[at : at + 4] = struct.pack(">I", 0xFFFF0017)
     (tmp_path / "a.png").write_bytes(content)
-    with images.opened_picture(tmp_path / "a.png") as picture:
+    with image_files.opened_picture(tmp_path / "a.png") as picture:
         file = picture.fp
         file.seek(0)
         assert file.read(1 << 50) == bytes(content) and file.read(1 << 50) == b""
@@ -193,7 +194,7 @@ def test_layers_with_astronomic_numbers_are_refused(tmp_path: Path) -> None:
 
 def test_checkpoints_that_claim_more_than_they_hold_are_refused(tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
-    from cagefield.formats.nerf_pytorch import read_checkpoint
+    from cagefield.formats.nerf.nerf_pytorch import read_checkpoint
 
     file = tmp_path / "a.tar"
     wide = torch.zeros(1).expand(32_768, 32_768)

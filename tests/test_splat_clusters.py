@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from scipy.special import spence
 
 from cagefield import Cage, Edit
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.rendering import splat_clusters, splat_renderer
-from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.kernels.splat_clusters import dilogarithm
-from cagefield.rendering.kernels.splat_projection import ALPHA_MAX, DEEPEST
-from cagefield.rendering.splat_clusters import CLUSTER, Clusters, View
-from cagefield.rendering.splat_rasterizer import DEPTH, intrinsics, project, world_to_camera
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.fields.splat_field import SplatField
+from cagefield.rendering.splats import splat_lod, splat_renderer
+from cagefield.rendering.splats.kernels.projection import ALPHA_MAX, DEEPEST
+from cagefield.rendering.splats.kernels.splat_lod import dilogarithm
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.rasterizer import DEPTH, intrinsics, project, world_to_camera
+from cagefield.rendering.splats.splat_lod import CLUSTER, Clusters, View
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from splat_scenes import ball_of_splats, random_splats
 from splat_views import LENSES, all_kinds, camera
 
@@ -187,4 +187,4 @@ def test_clusters_are_made_once_and_in_the_order_of_others() -> None:
     assert len(first.boxes) == -(-1000 // CLUSTER) and sorted(first.order) == list(range(1000))
     none = DeformedSplats(splats.means[:0], splats.covariances[:0], splats.opacities[:0], splats.sh[:0])
     assert project(none, camera(), near=NEAR, clusters=Clusters.of(none), detail=1.0).pairs == 0
-    assert splat_clusters.LEAST > CLUSTER
+    assert splat_lod.LEAST > CLUSTER

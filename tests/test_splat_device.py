@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield import Cage, Edit, devices
+from cagefield import Cage, Edit
+from cagefield.compute import devices
 from cagefield.edits import EditStack
-from cagefield.rendering import splat_device, splat_reference
-from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.kernels.splat_blending import T_MIN
-from cagefield.rendering.splat_device import SplatArrays
-from cagefield.rendering.splat_rasterizer import COLOUR, DEPTH, NORMALS, Projection, intrinsics, project
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splats import device_rasterizer, reference_rasterizer
+from cagefield.rendering.splats.device_rasterizer import SplatArrays
+from cagefield.rendering.splats.kernels.blending import T_MIN
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.rasterizer import COLOUR, DEPTH, NORMALS, Projection, intrinsics, project
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from splat_scenes import random_splats
 from splat_views import NEAR, all_kinds, camera, parameters, single, splats_of, unit
 
@@ -25,8 +26,8 @@ def db(error: NDArray) -> float:
     return float(-10.0 * np.log10(max(np.mean(np.square(error)), 1e-30)))
 
 
-def on_device(splats: DeformedSplats, view, **options) -> splat_device.DeviceProjection:
-    return splat_device.project(SplatArrays(splats), view, near=NEAR, **options)
+def on_device(splats: DeformedSplats, view, **options) -> device_rasterizer.DeviceProjection:
+    return device_rasterizer.project(SplatArrays(splats), view, near=NEAR, **options)
 
 
 @pytest.mark.parametrize(
@@ -43,8 +44,8 @@ def test_pictures_are_those_of_the_oracle(lens: str, antialiased: bool, degree: 
     view = camera(lens)
     splats = all_kinds(view.origin, degree, antialiased, turned)
     got = on_device(splats, view).picture(DEPTH)
-    seen = splat_reference.project(splats, view, NEAR, intrinsics(view).limits)
-    colour, through, depth = splat_reference.blend(seen, view.width, view.height)
+    seen = reference_rasterizer.project(splats, view, NEAR, intrinsics(view).limits)
+    colour, through, depth = reference_rasterizer.blend(seen, view.width, view.height)
     assert db(got[..., 0] - through) > 50.0
     assert db(got[..., 1:4] - colour) > 50.0
     assert db((got[..., 4] - depth) / np.linalg.norm(view.origin)) > 50.0
@@ -57,7 +58,7 @@ def test_regions_normals_and_opacities_are_those_of_the_cpu(region) -> None:
     chance = np.random.default_rng(0)
     normals = unit(chance.normal(size=(len(splats), 3))).astype(np.float32)
     here = project(splats, view, near=NEAR, region=region, normals=normals)
-    there = splat_device.project(SplatArrays(splats, normals), view, near=NEAR, region=region)
+    there = device_rasterizer.project(SplatArrays(splats, normals), view, near=NEAR, region=region)
     assert db(there.picture(NORMALS) - here.picture(NORMALS)) > 60.0
     pixels = chance.uniform(0, (here.width, here.height), (200, 2))
     distances = chance.uniform(0.2, 6.0, 200)
@@ -158,7 +159,7 @@ def test_a_gpu_draws_the_renderers_pictures(monkeypatch: pytest.MonkeyPatch) -> 
     want = [r.render(view, normals=True, near=0.5) for r in (plain, plain.with_edits(edits))]
     monkeypatch.setattr(devices, "is_gpu", lambda: True)
     renderer = SplatRenderer(field)
-    assert isinstance(renderer.project(view), splat_device.DeviceProjection)
+    assert isinstance(renderer.project(view), device_rasterizer.DeviceProjection)
     got = [r.render(view, normals=True, near=0.5) for r in (renderer, renderer.with_edits(edits))]
     for a, b in zip(got, want, strict=True):
         assert db(a.rgb - b.rgb) > 50.0

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.lenses import Lens
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.formats.splat_files import convert_splats, read_splats, write_splats
-from cagefield.lenses import Lens
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.rendering.deformed_splats import deformed_splats
-from cagefield.rendering.deformed_splats_reference import deformed_splats_reference
-from cagefield.rendering.splat_disc_reference import FILTER, render_discs
-from cagefield.rendering.splat_rasterizer import near_depth
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.fields.splat_field import SplatField
+from cagefield.formats.splats.splat_files import convert_splats, read_splats, write_splats
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.raster_splats import deformed_splats
+from cagefield.rendering.splats.rasterizer import near_depth
+from cagefield.rendering.splats.reference_discs import FILTER, render_discs
+from cagefield.rendering.splats.reference_raster_splats import deformed_splats_reference
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.typing import AnyArray
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cagefield.errors import FieldError
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
 from splat_scenes import assert_same_splats, random_splats
 
 

@@ -5,19 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.fields.baking import bake
-from cagefield.fields.splat import SplatField
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.render_result import RenderResult
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.images.metrics import psnr
+from cagefield.images.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
-from cagefield.training.plane_sweep import CLEAR
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.splat_fitting import (
+from cagefield.training.splats.fit_splats import (
     EMPTY_STEP,
     FIRST_OPACITY,
     SOLID,
@@ -31,6 +29,8 @@ from cagefield.training.splat_fitting import (
     surface_splats,
     turns_to,
 )
+from cagefield.training.splats.plane_sweep import CLEAR
+from cagefield.training.splats.splat_config import SplatConfig
 from scenes import ball_field
 
 BOX = np.array([[-1.0] * 3, [1.0] * 3])

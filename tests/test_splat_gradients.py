@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield import sh as harmonics
-from cagefield.cameras import Camera
-from cagefield.quaternions import rotation_matrices
-from cagefield.rendering import splat_reference as reference
-from cagefield.rendering.splat_rasterizer import (
+from cagefield.cameras.camera import Camera
+from cagefield.fields import sh as harmonics
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.rendering.splats import reference_rasterizer as reference
+from cagefield.rendering.splats.rasterizer import (
     intrinsics,
     kernels,
 )
-from cagefield.training.kernels.splat_chain import shapes
+from cagefield.training.splats.kernels.splat_backward import shapes
 from splat_gradients import Values, analytic, pictures, rounded, settled
 from splat_views import LENSES, NEAR, camera, covariances, parameters, splats_of, unit
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cagefield import compiling
+from cagefield.compute import numba_cache
 
 # `overlaps` is the kernel that compiles fastest.
 ASK = """
@@ -20,7 +20,7 @@ from cagefield.errors import warnings_in_one_line
 with warnings_in_one_line():
     exec(sys.argv[1])
     import numpy as np
-    from cagefield.rendering.kernels.splat_tiles import overlaps
+    from cagefield.rendering.splats.kernels.tile_binning import overlaps
 
     packed = np.zeros(16, np.float32)
     packed[:6] = 8.0, 8.0, 1.0, 0.0, 1.0, 1.0
@@ -73,14 +73,14 @@ def test_a_change_of_what_a_module_imports_is_another_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "cagefield"
-    source = Path(compiling.__file__).parent
-    names = ["rendering/kernels/splat_blending.py", "rendering/kernels/splat_projection.py", "sh.py"]
+    source = Path(numba_cache.__file__).parent
+    names = ["rendering/splats/kernels/blending.py", "rendering/splats/kernels/projection.py", "sh.py"]
     for name in names:
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(source / name, package / name)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(compiling, "_PACKAGE", package)
-    folder_of = compiling._folder_of.__wrapped__
+    monkeypatch.setattr(numba_cache, "_PACKAGE", package)
+    folder_of = numba_cache._folder_of.__wrapped__
     blending, projection = (str(package / name) for name in names[:2])
     before = [folder_of(blending), folder_of(projection)]
     assert folder_of(blending) == before[0] and before[0] != before[1]

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cagefield import sh
 from cagefield.errors import FieldError
+from cagefield.fields import sh
 from cagefield.fields.protocol import Field
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
 from cagefield.fields.splat_mixture import LEAST, MAX_OPACITY
-from cagefield.quaternions import rotation_matrices
+from cagefield.geometry.quaternions import rotation_matrices
 from splat_scenes import random_splats
 
 

@@ -8,29 +8,29 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.continuous_relighting import light_edit
+from cagefield.completion.patcher import Patcher
+from cagefield.completion.splat_patch import splat_patch_of
+from cagefield.completion.surfaces.splat_voxelization import voxelised
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import NewLight, SplatPatch
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_splat_edits import (
+from cagefield.fields.sh import C0
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
+from cagefield.pages.page_splat_edits import (
     decode_page_splat_edits,
     encode_page_splat_edits,
 )
-from cagefield.patches.bending import light_edit
-from cagefield.patches.light import Ambience
-from cagefield.patches.patcher import Patcher
-from cagefield.patches.splats import splat_patch_of
-from cagefield.patches.voxelised import voxelised
-from cagefield.rendering import splat_splitting
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.rendering.deformed_splats import changed_splats, deformed_splats
-from cagefield.rendering.moved_splats import moved_splats
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.rendering.splat_splitting import split_of
-from cagefield.scene import Scene
-from cagefield.sh import C0
+from cagefield.rendering.splats import splitting
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.raster_splats import changed_splats, deformed_splats
+from cagefield.rendering.splats.splat_motion import moved_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splitting import split_of
+from cagefield.scene.scene import Scene
 from solid_fields import db
 from splat_rooms import LIGHT, REACH, STEP, STRENGTH, cage, room
 
@@ -131,12 +131,12 @@ def test_a_shadow_has_an_edge_on_splats_that_are_longer_than_that(
     wanted = plain.rgb * np.exp(np.interp(where, x, log))[..., None]
 
     def off() -> float:
-        splat_splitting.known_splits.clear()
+        splitting.known_splits.clear()
         shown = SplatRenderer(field).with_edits(EditStack([edit])).render(camera, background="black")
         return db(shown.rgb, wanted)
 
     split = off()
-    monkeypatch.setattr(splat_splitting, "SHADE", np.inf)
+    monkeypatch.setattr(splitting, "SHADE", np.inf)
     whole = off()
     assert split > 30.0 and split > whole + 2.0
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cagefield import sh as harmonics
-from cagefield.rendering import splat_reference as reference
-from cagefield.rendering.deformed_splats import DeformedSplats
-from cagefield.rendering.kernels.splat_blending import T_MIN
-from cagefield.rendering.splat_rasterizer import (
+from cagefield.fields import sh as harmonics
+from cagefield.rendering.splats import reference_rasterizer as reference
+from cagefield.rendering.splats.kernels.blending import T_MIN
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.rasterizer import (
     COLOUR,
     DEPTH,
     NORMALS,
@@ -22,7 +22,7 @@ from cagefield.rendering.splat_rasterizer import (
     tiled,
     untiled,
 )
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from splat_scenes import random_splats
 from splat_views import LENSES, NEAR, all_kinds, camera, parameters, single, splats_of, unit
 

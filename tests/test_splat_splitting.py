@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from cagefield import Cage, Camera, Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.quaternions import quaternions_of, rotation_matrices
-from cagefield.rendering import splat_splitting
-from cagefield.rendering.baked_splats import baked_splats
-from cagefield.rendering.deformed_splats import deformed_splats
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.splat_profile import part_between
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.rendering.splat_splitting import split_for_edits
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.images.metrics import psnr
+from cagefield.rendering.splats import splitting
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.rendering.splats.gaussian_profile import part_between
+from cagefield.rendering.splats.raster_splats import deformed_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.rendering.splats.splitting import split_for_edits
 from splat_scenes import assert_same_splats, random_splats
 
 CAMERA = Camera.look_at((0.3, -4.5, 0.6), (0.1, 0, 0.1), width=100, height=120, fov_x=0.6)
@@ -73,15 +73,15 @@ def test_split_splats_follow_the_edit_more_closely(name: str, monkeypatch: pytes
         return renderer.render(CAMERA, background="black").rgb
 
     whole, split = shown(field), shown(split_for_edits(field, edits))
-    monkeypatch.setattr(splat_splitting, "BEND", 0.04)
-    monkeypatch.setattr(splat_splitting, "ROUNDS", 6)
+    monkeypatch.setattr(splitting, "BEND", 0.04)
+    monkeypatch.setattr(splitting, "ROUNDS", 6)
     fine = shown(split_for_edits(dataclasses.replace(field), edits))
     assert psnr(split, fine) > psnr(whole, fine) + 1.0
 
 
 def test_a_row_of_children_has_the_width_of_the_splat() -> None:
     # Faint ones: optical depths add up, so the row is the splat but for its ripple and its ends, 1 %.
-    row = splat_splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([0.3]), np.array([1e-4]))
+    row = splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([0.3]), np.array([1e-4]))
     mass = row.opacity * row.r
     assert np.sum(mass) == pytest.approx(1e-4, rel=0.01)
     variance = np.sum(mass * (row.r**2 + row.x**2)) / np.sum(mass)
@@ -91,7 +91,7 @@ def test_a_row_of_children_has_the_width_of_the_splat() -> None:
 @pytest.mark.parametrize("opacity", [0.2, 0.9, 0.99])
 @pytest.mark.parametrize("r", [0.35, 0.7])
 def test_a_row_is_as_thick_as_the_splat(r: float, opacity: float) -> None:
-    row = splat_splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([r]), np.array([opacity]))
+    row = splitting._row(np.zeros(1, np.int64), np.eye(3)[:1], np.array([r]), np.array([opacity]))
     u = np.linspace(-6.0, 6.0, 2001)[:, None]
     for x in (0.0, row.x[len(row.x) // 2 + 1]):
         each = row.opacity * np.exp(-0.5 * ((x - row.x) / r) ** 2 - 0.5 * (u / row.across) ** 2)
@@ -128,11 +128,11 @@ def test_a_cut_keeps_mass_mean_and_covariance(offset: float) -> None:
         [[0.3 + 0.03 * offset, 0, 0]], np.log([[0.03, 0.02, 0.01]]), q, [1e-3], np.zeros((1, 1, 3))
     )
     edit = EditStack([Edit(INNER, adjustment="discrete").translate((0, 2, 0))])
-    rounds, splat_splitting.CUTS = splat_splitting.CUTS, 1
+    rounds, splitting.CUTS = splitting.CUTS, 1
     try:
         parts = split_for_edits(field, edit)
     finally:
-        splat_splitting.CUTS = rounds
+        splitting.CUTS = rounds
     assert len(parts) == 2 and sorted(parts.means[:, 0] > 0.3) == [False, True]
     mass = parts.opacities * np.exp(parts.log_scales.sum(axis=1))
     mass = mass.astype(np.float64) / mass.sum()
@@ -211,7 +211,7 @@ def test_edits_that_bend_nothing_split_nothing() -> None:
 
 
 def test_there_are_never_many_times_as_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(splat_splitting, "MORE", 10)
+    monkeypatch.setattr(splitting, "MORE", 10)
     field = rod(15)
     assert len(field) < len(split_for_edits(field, EditStack([BENDS["bend"]]))) <= 3 * len(field) + 20
 

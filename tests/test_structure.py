@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield.rendering.metrics import WINDOW as METRIC_WINDOW
-from cagefield.rendering.metrics import ssim
-from cagefield.rendering.splat_rasterizer import kernels, tiled, untiled
-from cagefield.training.kernels.structure import MOMENTS, WINDOW, structure
+from cagefield.images.metrics import WINDOW as METRIC_WINDOW
+from cagefield.images.metrics import ssim
+from cagefield.rendering.splats.rasterizer import kernels, tiled, untiled
+from cagefield.training.splats.kernels.ssim import MOMENTS, WINDOW, structure
 
 WEIGHT, GAIN, BEHIND = 0.3, np.array([0.9, 1.0, 1.2], np.float32), np.array([0.2, 0.5, 0.7], np.float32)
 

@@ -7,15 +7,23 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.surfaces.grid_block import block_of
+from cagefield.completion.surfaces.plane_snapping import flattened
+from cagefield.completion.surfaces.surfels import (
+    FAR,
+    Surfels,
+    cut_through,
+    gridded,
+    joined,
+    surfels_of,
+    with_seen,
+)
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.block import block_of
-from cagefield.patches.light import Ambience
-from cagefield.patches.planes import flattened
-from cagefield.patches.surfels import FAR, Surfels, cut_through, gridded, joined, surfels_of, with_seen
-from cagefield.scene import Scene
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.scene.scene import Scene
 from cagefield.typing import Array
 
 C0 = 0.28209479177387814

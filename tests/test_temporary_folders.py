@@ -11,17 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from cagefield import temporary_folders
-from cagefield.scene import Scene
+from cagefield.files import temporary_folders
+from cagefield.files.temporary_folders import TemporaryFolder, remove_abandoned
+from cagefield.scene.scene import Scene
 from cagefield.server.editor.persistence import SceneStore
-from cagefield.temporary_folders import TemporaryFolder, remove_abandoned
 from scenes import ball_scene
 
 pytest.importorskip("fcntl", reason="without locks nothing is removed")
 
 _KILLED = """
     import os, signal
-    from cagefield.temporary_folders import TemporaryFolder
+    from cagefield.files.temporary_folders import TemporaryFolder
     with TemporaryFolder("copy") as folder:
         (folder / "scene").mkdir()
         (folder / "scene" / "half").write_text("h")

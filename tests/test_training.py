@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError
-from cagefield.training import batches
-from cagefield.training.inpaint import OPAQUE
+from cagefield.procedural import make_scene
 from cagefield.training.progress import Snapshots
-from cagefield.training.voxel import train_voxel
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.voxels import batches
+from cagefield.training.voxels.inpainting import OPAQUE
+from cagefield.training.voxels.train_voxels import train_voxel
+from cagefield.training.voxels.voxel_config import VoxelConfig
 
 devices.start()
 

@@ -5,20 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cagefield import devices
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
+from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.devices import floats
 from cagefield.datasets.views import View
-from cagefield.devices import floats
-from cagefield.loops import deal_of
 
 devices.start()
 
-from cagefield.rendering.grid import to_device  # noqa: E402
-from cagefield.rendering.kernels.grid import ivec3  # noqa: E402
-from cagefield.training.grid_state import GridState, cell_sizes  # noqa: E402
-from cagefield.training.kernels.accumulators import HEAD  # noqa: E402
-from cagefield.training.kernels.gauss_newton_voxels import gauss_newton, laplacian  # noqa: E402
-from cagefield.training.kernels.march import (  # noqa: E402
+from cagefield.rendering.voxels.device_grid import to_device  # noqa: E402
+from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
+from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
+from cagefield.training.voxels.kernels.accumulators import HEAD  # noqa: E402
+from cagefield.training.voxels.kernels.gauss_newton_voxels import gauss_newton, laplacian  # noqa: E402
+from cagefield.training.voxels.kernels.ray_batches import PatchArgs  # noqa: E402
+from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
     MOST_SAMPLES,
     SAMPLE,
     BatchArgs,
@@ -26,8 +27,7 @@ from cagefield.training.kernels.march import (  # noqa: E402
     WorkerArgs,
     march_batch,
 )
-from cagefield.training.kernels.photos import PatchArgs  # noqa: E402
-from cagefield.training.photos import Photos  # noqa: E402
+from cagefield.training.voxels.ray_batches import Photos  # noqa: E402
 
 SIZE = 8
 N = 9

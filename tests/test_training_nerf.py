@@ -9,16 +9,16 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.cli import bake, main
-from cagefield.datasets.procedural import make_scene
 from cagefield.errors import CagefieldError, FieldError
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
+from cagefield.procedural import make_scene
 from commands import printed, refused
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.training.nerf import evaluate_nerf, train_nerf  # noqa: E402
-from cagefield.training.nerf_config import NerfConfig  # noqa: E402
-from cagefield.training.nerf_run import NerfRun, initial_network  # noqa: E402
+from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
+from cagefield.training.nerf.nerf_run import NerfRun, initial_network  # noqa: E402
+from cagefield.training.nerf.train_nerf import evaluate_nerf, train_nerf  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -10,19 +10,19 @@ import pytest
 
 from cagefield import Scene, load_dataset
 from cagefield.datasets import Dataset
-from cagefield.datasets.normalisation import in_ndc_world, in_unit_cube, ndc_box, why_not_ndc
-from cagefield.datasets.procedural import make_scene
+from cagefield.datasets.nerf_normalization import in_ndc_world, in_unit_cube, ndc_box, why_not_ndc
 from cagefield.errors import CagefieldError, DatasetError
 from cagefield.fields.contraction import contract
+from cagefield.procedural import make_scene
 from commands import printed, refused
 from posed_photos import room_capture
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
-from cagefield.training.nerf import train_nerf  # noqa: E402
-from cagefield.training.nerf_config import NerfConfig  # noqa: E402
-from cagefield.training.nerf_run import PHOTOS, NerfRun  # noqa: E402
-from cagefield.training.nerf_space import space_of  # noqa: E402
+from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
+from cagefield.training.nerf.nerf_run import PHOTOS, NerfRun  # noqa: E402
+from cagefield.training.nerf.nerf_space import space_of  # noqa: E402
+from cagefield.training.nerf.train_nerf import train_nerf  # noqa: E402
 
 SMALL = NerfConfig.small
 

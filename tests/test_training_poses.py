@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cagefield.scene import Scene
-from cagefield.training.splat import train_splat
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.splat_poses import PoseRefinement, moved, pose_sums
-from cagefield.training.splat_state import SplatState
+from cagefield.scene.scene import Scene
+from cagefield.training.splats.pose_optimization import PoseRefinement, moved, pose_sums
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_state import SplatState
+from cagefield.training.splats.train_splats import train_splat
 from splat_captures import around, as_dataset, painted_ball, photos_of, points_near, write_views
 from splat_gradients import analytic, pictures, rounded, settled
 from splat_views import camera, parameters

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from cagefield.training.schedule import LARGEST_FIRST, Schedule, stages
-from cagefield.training.voxel_config import VoxelConfig
-from cagefield.training.voxel_defaults import BATCH, LARGEST, SMALLEST, Settings, settings
+from cagefield.training.voxels.schedule import LARGEST_FIRST, Schedule, stages
+from cagefield.training.voxels.voxel_config import VoxelConfig
+from cagefield.training.voxels.voxel_defaults import BATCH, LARGEST, SMALLEST, Settings, settings
 
 
 def chosen(config: VoxelConfig, side: int, threads: int | None = 2, *, unbounded: bool = False) -> Settings:

@@ -9,21 +9,21 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from cagefield.cameras import turntable
-from cagefield.datasets.normalisation import Similarity
+from cagefield.cameras.camera import turntable
+from cagefield.datasets.nerf_normalization import Similarity
 from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.errors import CagefieldError
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.splat_renderer import SplatRenderer
+from cagefield.images.metrics import psnr
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.training.checkpoint import write_checkpoint
 from cagefield.training.evaluation import evaluate_views
-from cagefield.training.splat import train_splat
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.splat_growth import fading, split
-from cagefield.training.splat_run import SplatRun
-from cagefield.training.splat_seeds import first_splats, spread, swept_points
-from cagefield.training.splat_state import SplatState
-from cagefield.training.splat_views import load_views
+from cagefield.training.splats.densification import fading, split
+from cagefield.training.splats.initialization import first_splats, spread, swept_points
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_run import SplatRun
+from cagefield.training.splats.splat_state import SplatState
+from cagefield.training.splats.train_splats import train_splat
+from cagefield.training.splats.training_views import load_views
 from splat_captures import BOX, around, as_dataset, painted_ball, photos_of, points_near, write_views
 from splat_scenes import assert_same_splats
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
-from cagefield.cameras import Camera, turntable
-from cagefield.datasets.procedural.parts import Part, Primitive, place
-from cagefield.datasets.procedural.scene import ProceduralScene
-from cagefield.datasets.procedural.shapes import Box
-from cagefield.datasets.procedural.textures import Plain
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.procedural.parts import Part, Primitive, place
+from cagefield.procedural.scene import ProceduralScene
+from cagefield.procedural.shapes import Box
+from cagefield.procedural.textures import Plain
 
 GREY = Plain(np.array([0.5, 0.5, 0.5]))
 

@@ -9,7 +9,7 @@ import pytest
 
 from cagefield.errors import FieldError
 from cagefield.fields.contraction import contract, uncontract
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
 
 BOUNDS = np.array([[-1.0, -0.5, 0.0], [1.0, 0.5, 2.0]])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from cagefield import devices
-from cagefield.cages import Cage
+from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
+from cagefield.geometry.cage import Cage
 from random_cages import edits, examples, seeds, unit_vectors
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
@@ -42,7 +42,7 @@ def off_faces(stack: EditStack, p: np.ndarray, margin: float = 1e-4) -> np.ndarr
 
 
 def compare(stack: EditStack, p: np.ndarray, d: np.ndarray) -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     expected = stack.to_canonical(p, d)
     points, viewdirs, stretch, places = DeviceStack.from_stack(stack).to_canonical(p, d)
@@ -107,7 +107,7 @@ def test_lattice_path_against_the_reference(name: str) -> None:
 
 
 def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     edits_ = [
         STACKS["affine"][0].replace(lattice=9),
@@ -120,7 +120,7 @@ def test_lattices_of_a_stack_lie_one_after_the_other() -> None:
 
 
 def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     stack = EditStack(STACKS["chain"])
     packed = DeviceStack.from_stack(stack)
@@ -140,7 +140,7 @@ def test_what_is_outside_all_boxes_is_returned_bit_for_bit() -> None:
 
 
 def test_boxes() -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     move = STACKS["move"][0]
     packed = DeviceStack.from_stack(
@@ -157,7 +157,7 @@ def test_boxes() -> None:
 
 @pytest.mark.parametrize("turn", [1.0, np.pi])
 def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     folded = EditStack([Edit(INNER, OUTER, shell="trilinear", allow_folding=True).rotate((0, 0, turn))])
     p, d = samples(5000)
@@ -169,8 +169,8 @@ def test_folded_shells_that_are_allowed_give_finite_values(turn: float) -> None:
 
 
 def test_lattices_are_kept_with_their_edit(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cagefield.warps import edit_lattice
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device import edit_lattice
+    from cagefield.edits.device.device_stack import DeviceStack
 
     edit = STACKS["affine"][0].replace(lattice=8)
     DeviceStack.from_stack(EditStack([edit]))

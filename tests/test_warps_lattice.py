@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
+from cagefield.geometry.cage import Cage
 from cagefield.warps.lattice import Lattice
 
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0.1, 0, 0), 1.8, (0.2, 0.1, 0.1))

@@ -6,12 +6,12 @@ from hypothesis import assume, given
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from cagefield import trilinear_hex
-from cagefield.cages import FACES, Cage
 from cagefield.edits.edit import Edit
 from cagefield.edits.operations import euler_degrees
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.trilinear_shell import SIDES, TrilinearShell
 from random_cages import edits, examples, seeds, trilinear
 
@@ -38,8 +38,8 @@ def conditioning(shell: TrilinearShell, u: Array, side: Array) -> Array:
     out = np.empty(len(u))
     for s in range(6):
         rows = side == s
-        J_d = trilinear_hex.jacobian(shell.deformed_hexahedra[s], u[rows])
-        J_c = trilinear_hex.jacobian(shell.canonical_hexahedra[s], u[rows])
+        J_d = hexahedron.jacobian(shell.deformed_hexahedra[s], u[rows])
+        J_c = hexahedron.jacobian(shell.canonical_hexahedra[s], u[rows])
         out[rows] = np.linalg.norm(J_c, axis=(1, 2)) * np.linalg.norm(np.linalg.inv(J_d), axis=(1, 2))
     return out
 
@@ -94,8 +94,8 @@ def test_continuous_across_every_face(edit: Edit, seed: int) -> None:
     side, u = np.repeat(np.arange(6), len(u)), np.tile(u, (6, 1))
     p, expected = np.empty_like(u), np.empty_like(u)
     for n in range(6):
-        p[side == n] = trilinear_hex.points(shell.deformed_hexahedra[n], u[side == n])
-        expected[side == n] = trilinear_hex.points(shell.canonical_hexahedra[n], u[side == n])
+        p[side == n] = hexahedron.points(shell.deformed_hexahedra[n], u[side == n])
+        expected[side == n] = hexahedron.points(shell.canonical_hexahedra[n], u[side == n])
     tolerance = 1e-11 * (1.0 + conditioning(shell, u, side))
     # On the face itself, whichever of its two hexahedra is chosen, and a hair on either side (where the
     # hexahedron is the neighbour, whose conditioning may be worse).
@@ -137,7 +137,7 @@ def test_least_ratio_against_a_dense_sample(edit: Edit) -> None:
     g = np.linspace(0.0, 1.0, 13)
     u = np.stack(np.meshgrid(g, g, g), axis=-1).reshape(-1, 3)
     ratios = [
-        np.linalg.det(trilinear_hex.jacobian(d, u)) / np.linalg.det(trilinear_hex.jacobian(c, u))
+        np.linalg.det(hexahedron.jacobian(d, u)) / np.linalg.det(hexahedron.jacobian(c, u))
         for c, d in zip(shell.canonical_hexahedra, shell.deformed_hexahedra, strict=True)
     ]
     # The net's spacing of 1/12 misses a minimum between its nodes by about (1/24)^2 of the variation.
@@ -154,7 +154,7 @@ def test_rotation_of_concentric_boxes_folds_where_a_dense_sample_says() -> None:
 
     def least(degrees: float) -> float:
         shell = TrilinearShell(INNER, INNER.rotate((0, 0, np.radians(degrees))), OUTER)
-        return float(min(np.linalg.det(trilinear_hex.jacobian(h, u)).min() for h in shell.deformed_hexahedra))
+        return float(min(np.linalg.det(hexahedron.jacobian(h, u)).min() for h in shell.deformed_hexahedra))
 
     assert least(29.0) > 0.0 > least(30.5)
     edit = Edit(INNER, OUTER, shell="trilinear").rotate((0, 0, np.radians(60.0)))

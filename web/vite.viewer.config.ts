@@ -4,7 +4,7 @@ import { defineConfig } from "vite";
 export default defineConfig({
   publicDir: false,
   build: {
-    outDir: "../src/cagefield/exporting/viewer",
+    outDir: "../src/cagefield/pages/viewer",
     emptyOutDir: true,
     target: "es2022",
     lib: { entry: "src/viewer/main.ts", formats: ["iife"], name: "cagefield", fileName: () => "viewer.js" },

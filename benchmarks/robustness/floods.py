@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield import devices
 from cagefield.benchmarking.machine import cpu_model
+from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]

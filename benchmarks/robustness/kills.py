@@ -28,8 +28,8 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield import devices
 from cagefield.benchmarking.machine import cpu_model
+from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
@@ -40,7 +40,7 @@ import kills  # noqa: E402
 import write_points  # noqa: E402
 
 from cagefield import Scene  # noqa: E402
-from cagefield.rendering.images import read_image  # noqa: E402
+from cagefield.images.image_files import read_image  # noqa: E402
 from cagefield.server.editor.persistence import SceneStore  # noqa: E402
 from cagefield.server.editor.session import Session  # noqa: E402
 from editor_server import PageClient, editor_server, page  # noqa: E402

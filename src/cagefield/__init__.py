@@ -19,25 +19,25 @@ os.environ.setdefault("ENABLE_QUADRANTS_HEADER_PRINT", "0")
 renamed_modules.install()
 
 if TYPE_CHECKING:
-    from cagefield.cages import Cage as Cage
-    from cagefield.cameras import Camera as Camera
-    from cagefield.cameras import turntable as turntable
-    from cagefield.datasets.dataset import Dataset as Dataset
-    from cagefield.datasets.dataset import load_dataset as load_dataset
+    from cagefield.cameras.camera import Camera as Camera
+    from cagefield.cameras.camera import turntable as turntable
+    from cagefield.datasets.dataset_loader import Dataset as Dataset
+    from cagefield.datasets.dataset_loader import load_dataset as load_dataset
     from cagefield.edits import Edit as Edit
     from cagefield.edits import EditStack as EditStack
-    from cagefield.edits.files import load_edits as load_edits
-    from cagefield.edits.files import save_edits as save_edits
+    from cagefield.edits.edit_files import load_edits as load_edits
+    from cagefield.edits.edit_files import save_edits as save_edits
     from cagefield.errors import CagefieldError as CagefieldError
     from cagefield.fields.baking import bake as bake
-    from cagefield.fields.nerf import NerfField as NerfField
+    from cagefield.fields.nerf_field import NerfField as NerfField
     from cagefield.fields.protocol import Field as Field
-    from cagefield.fields.splat import SplatField as SplatField
-    from cagefield.fields.voxel import VoxelField as VoxelField
+    from cagefield.fields.splat_field import SplatField as SplatField
+    from cagefield.fields.voxel_field import VoxelField as VoxelField
+    from cagefield.geometry.cage import Cage as Cage
+    from cagefield.images.render_result import RenderResult as RenderResult
     from cagefield.rendering.reference_renderer import render_sampled as render_sampled
-    from cagefield.rendering.render_result import RenderResult as RenderResult
-    from cagefield.rendering.renderer import Renderer as Renderer
-    from cagefield.scene import Scene as Scene
+    from cagefield.rendering.voxels.voxel_renderer import Renderer as Renderer
+    from cagefield.scene.scene import Scene as Scene
 
 __all__ = [
     "Cage",
@@ -63,25 +63,25 @@ __all__ = [
 ]
 
 _HOME = {
-    "Cage": "cagefield.cages",
+    "Cage": "cagefield.geometry.cage",
     "CagefieldError": "cagefield.errors",
-    "Camera": "cagefield.cameras",
-    "Dataset": "cagefield.datasets.dataset",
+    "Camera": "cagefield.cameras.camera",
+    "Dataset": "cagefield.datasets.dataset_loader",
     "Edit": "cagefield.edits",
     "EditStack": "cagefield.edits",
     "Field": "cagefield.fields.protocol",
-    "RenderResult": "cagefield.rendering.render_result",
-    "NerfField": "cagefield.fields.nerf",
-    "Renderer": "cagefield.rendering.renderer",
-    "Scene": "cagefield.scene",
-    "SplatField": "cagefield.fields.splat",
-    "VoxelField": "cagefield.fields.voxel",
+    "RenderResult": "cagefield.images.render_result",
+    "NerfField": "cagefield.fields.nerf_field",
+    "Renderer": "cagefield.rendering.voxels.voxel_renderer",
+    "Scene": "cagefield.scene.scene",
+    "SplatField": "cagefield.fields.splat_field",
+    "VoxelField": "cagefield.fields.voxel_field",
     "bake": "cagefield.fields.baking",
-    "load_dataset": "cagefield.datasets.dataset",
-    "load_edits": "cagefield.edits.files",
+    "load_dataset": "cagefield.datasets.dataset_loader",
+    "load_edits": "cagefield.edits.edit_files",
     "render_sampled": "cagefield.rendering.reference_renderer",
-    "save_edits": "cagefield.edits.files",
-    "turntable": "cagefield.cameras",
+    "save_edits": "cagefield.edits.edit_files",
+    "turntable": "cagefield.cameras.camera",
 }
 
 

@@ -13,10 +13,10 @@ from reader_seeds import Read, Reader
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
-from cagefield.datasets.point_files import read_points
-from cagefield.datasets.raw_masks import RawMasks
 from cagefield.datasets.raw_photos import upright
-from cagefield.rendering.images import read_image
+from cagefield.datasets.sfm.raw_masks import RawMasks
+from cagefield.datasets.transforms.point_files import read_points
+from cagefield.images.image_files import read_image
 from posed_photos import room_capture, save_llff
 from scenes import ball_cameras
 

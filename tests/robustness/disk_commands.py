@@ -9,8 +9,8 @@ from pathlib import Path
 from torch_files import write_checkpoints
 
 from cagefield import Scene
-from cagefield.datasets.procedural import make_scene
-from cagefield.formats.splat_files import write_splats
+from cagefield.formats.splats.splat_files import write_splats
+from cagefield.procedural import make_scene
 from posed_photos import photos_alone
 from scenes import ball_scene
 from splat_scenes import ball_of_splats

@@ -18,7 +18,7 @@ from unittest import mock
 from disks import BYTES, Filled, contents, disk
 from shortages import Names, Shortage
 
-from cagefield.formats.splat_files import write_splats
+from cagefield.formats.splats.splat_files import write_splats
 from editor_server import EditorServer, PageClient, editor_server, page
 from own_cache import cache_of_its_own
 from splat_scenes import ball_of_splats

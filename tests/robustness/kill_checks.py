@@ -40,7 +40,7 @@ def new_problem(folder: Path, said: int) -> str | None:
 
 def file_problem(ending: str) -> Check:
     def problem(folder: Path, said: int) -> str | None:
-        from cagefield.formats.splat_files import read_splats
+        from cagefield.formats.splats.splat_files import read_splats
 
         out = folder / f"out{ending}"
         if not out.exists():
@@ -71,7 +71,7 @@ def trained_problem(folder: Path, said: int) -> str | None:
 
 def pictures_problem(folder: Path, said: int) -> str | None:
     """What is wrong with pictures over old ones of 4 x 4 pixels: all old, or all new and 32 pixels wide."""
-    from cagefield.rendering.images import read_image
+    from cagefield.images.image_files import read_image
 
     out = folder / "out"
     if not (out / "mine" / "notes.txt").is_file():
@@ -133,13 +133,13 @@ def _read_with(name: str, read: Callable[[Path], object]) -> Check:
 
 
 def ply_problem(name: str) -> Check:
-    from cagefield.ply import read_ply
+    from cagefield.files.ply import read_ply
 
     return _read_with(name, read_ply)
 
 
 def picture_problem(name: str) -> Check:
-    from cagefield.rendering.images import read_image
+    from cagefield.images.image_files import read_image
 
     return _read_with(name, read_image)
 
@@ -174,7 +174,7 @@ def page_folder_problem(name: str) -> Check:
 def photos_problem(name: str) -> Check:
     def problem(folder: Path, said: int) -> str | None:
         from cagefield import datasets
-        from cagefield.rendering.images import read_image
+        from cagefield.images.image_files import read_image
 
         out = folder / name
         if said < 1 and not any(
@@ -197,7 +197,7 @@ def demo_problem(folder: Path, said: int) -> str | None:
     import imageio.v3 as imageio
 
     from cagefield.edits import load_edits
-    from cagefield.rendering.images import read_image
+    from cagefield.images.image_files import read_image
 
     out = folder / "demo"
     try:
@@ -233,8 +233,8 @@ def posed_problem(folder: Path, said: int) -> str | None:
 def poses_problem(folder: Path, said: int) -> str | None:
     """What is wrong with the data set, of which an old one was there: not whole, or the user's file gone."""
     from cagefield import datasets
-    from cagefield.datasets.colmap_files import check_whole
-    from cagefield.rendering.images import read_image
+    from cagefield.datasets.colmap.colmap_files import check_whole
+    from cagefield.images.image_files import read_image
 
     data = folder / "data"
     if not (data / "notes.txt").is_file():

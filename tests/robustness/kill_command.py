@@ -13,7 +13,7 @@ from kill_checks import Check
 from kill_points import Say
 
 from cagefield import Scene
-from cagefield.leftovers import put_aside
+from cagefield.files.stale_files import put_aside
 from scenes import ball_scene
 from splat_scenes import ball_of_splats
 
@@ -57,7 +57,7 @@ def put_scene(folder: Path) -> None:
 
 
 def put_splats(folder: Path) -> None:
-    from cagefield.formats.splat_files import write_splats
+    from cagefield.formats.splats.splat_files import write_splats
 
     put_scene(folder)
     shutil.rmtree(folder / "scene")
@@ -73,9 +73,9 @@ def renamed(command: Command, target: str | None = None) -> Command:
     """
 
     def work(folder: Path, say: Say) -> None:
-        from cagefield import atomic_files
+        from cagefield.files import atomic
 
-        atomic_files.exchanged = lambda one, other: False
+        atomic.exchanged = lambda one, other: False
         command.work(folder, say)
 
     def problem(folder: Path, said: int) -> str | None:

@@ -29,9 +29,9 @@ from kill_points import Say
 
 from cagefield import Scene
 from cagefield.datasets import load_dataset
-from cagefield.datasets.procedural import make_scene
-from cagefield.datasets.transforms_writer import write_transforms
-from cagefield.rendering.images import write_png
+from cagefield.datasets.transforms.transforms_writer import write_transforms
+from cagefield.images.image_files import write_png
+from cagefield.procedural import make_scene
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from posed_photos import photos_alone
@@ -122,7 +122,7 @@ def _train(folder: Path, say: Say) -> None:
 
 
 def _make_photos(folder: Path) -> None:
-    from cagefield.datasets.procedural import make_scene as photograph
+    from cagefield.procedural import make_scene as photograph
 
     put_scene(folder)
     photograph("chair", folder / "photos", views=4, size=16, test_views=1)
@@ -181,7 +181,7 @@ def _make_posed(folder: Path) -> None:
 
 
 def _poses(folder: Path, say: Say) -> None:
-    from cagefield.datasets import matching
+    from cagefield.datasets.sfm import matching
 
     matching._FEW = 3  # six pairs are matched in two processes, as those of many photos are
     cli("poses", folder / "photos", "-o", folder / "data", "--overwrite")
@@ -191,8 +191,8 @@ def _poses(folder: Path, say: Say) -> None:
 @cache
 def _posed_video() -> tempfile.TemporaryDirectory[str]:
     """The photos as a video, and the data set that was made of it; made once, by another process."""
-    from cagefield.rendering.images import read_image
-    from cagefield.rendering.video_encoder import encoder
+    from cagefield.images.image_files import read_image
+    from cagefield.images.video import encoder
 
     folder = tempfile.TemporaryDirectory(prefix="cagefield-posed-video-")
     video = Path(folder.name) / "v.mp4"

@@ -28,7 +28,7 @@ from kill_points import Say
 from torch_files import write_checkpoints
 
 from cagefield import Scene
-from cagefield.formats.splat_files import write_splats
+from cagefield.formats.splats.splat_files import write_splats
 from splat_scenes import ball_of_splats
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from reader_seeds import Reader, written
 
-from cagefield.formats.nerf_pytorch_config import read_config
+from cagefield.formats.nerf.nerf_pytorch_config import read_config
 from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
 from nerf_networks import krrish94_state, yenchenlin_state
 
@@ -30,7 +30,7 @@ def _torch_file(content: Callable[[], dict[str, Any]], old: bool) -> Callable[[P
 
 
 def _read_networks(folder: Path) -> None:
-    from cagefield.formats.nerf_pytorch import read_checkpoint as read
+    from cagefield.formats.nerf.nerf_pytorch import read_checkpoint as read
 
     read(folder / "a.tar")
 
@@ -66,9 +66,9 @@ nerf:
 
 def _import_networks(folder: Path) -> None:
     """What `cagefield import` makes of a checkpoint, but for the baking."""
-    from cagefield.formats.nerf_pytorch import read_checkpoint as read
-    from cagefield.formats.nerf_pytorch_config import Settings
-    from cagefield.formats.nerf_pytorch_import import import_nerf
+    from cagefield.formats.nerf.nerf_pytorch import read_checkpoint as read
+    from cagefield.formats.nerf.nerf_pytorch_config import Settings
+    from cagefield.scene.import_nerf_pytorch import import_nerf
 
     import_nerf(read(folder / "a.tar"), Settings(), None, None)
 

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from reader_seeds import Reader
 
-from cagefield.datasets import left_out, points, poses_work, raw_photos, structure_from_motion
-from cagefield.datasets.database_check import check_database
-from cagefield.datasets.features import Photo
+from cagefield.datasets import raw_photos
+from cagefield.datasets.sfm import registration_report, sfm_workspace, sparse_points, structure_from_motion
+from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.features import Photo
 from cagefield.errors import CagefieldError
-from cagefield.rendering.video_encoder import encoder, is_ours
+from cagefield.images.video import encoder, is_ours
 from posed_photos import photos_alone
 
 
@@ -35,17 +36,17 @@ def _make_photos(count: int, folder: Path) -> None:
     for n in range(4, count):
         shutil.copy(photos / "00.png", photos / f"{n:02}.png")
     (folder / "work").mkdir()
-    poses_work.work_photos(photos, folder / "work", 3, _no_progress)
+    sfm_workspace.work_photos(photos, folder / "work", 3, _no_progress)
 
 
 def _read_photos(folder: Path) -> None:
     """The list, copies for COLMAP, and its guesses of cameras."""
     work = folder / "work"
-    known = poses_work._known_photos(work / "photos.json", work / "images")
+    known = sfm_workspace._known_photos(work / "photos.json", work / "images")
     if known is None:
         raise CagefieldError("it is damaged, and the photos are read again")
     shutil.rmtree(work / "colmap", ignore_errors=True)
-    poses_work.plainly_named(known[0], work)
+    sfm_workspace.plainly_named(known[0], work)
     structure_from_motion.camera_guesses(known[0])
 
 
@@ -54,7 +55,7 @@ def _record_reader(files: int) -> Reader:
     record = {"version": 1, "files": [["a.png", 12, 34 + n] for n in range(files)]}
 
     def prepare(folder: Path) -> None:
-        poses_work.prepare_work(folder / "work", record)
+        sfm_workspace.prepare_work(folder / "work", record)
 
     return Reader(prepare, prepare, {"work/made_of.json": "json"})
 
@@ -63,7 +64,7 @@ def _make_poses(left_out: int, folder: Path) -> None:
     photos = photos_alone(folder / "photos")
     (folder / "data").mkdir()
     blurred = {f"a{n}": "blurred" for n in range(left_out)}
-    made = {"made_of": poses_work.record_of(photos, 80), "photos": 4, "left_out": blurred}
+    made = {"made_of": sfm_workspace.record_of(photos, 80), "photos": 4, "left_out": blurred}
     (folder / "data" / "poses.json").write_text(json.dumps(made))
 
 
@@ -79,11 +80,11 @@ def _make_points(count: int, folder: Path) -> None:
     seen = tuple(frozenset((f"photo {n % 3}", f"photo {n % 5}")) for n in range(count))
     rgb = chance.integers(0, 256, (count, 3)).astype(np.uint8)
     found = SparsePoints(chance.normal(size=(count, 3)), rgb, seen, np.ones(count))
-    points.write_cached_points(folder / "points-1.npz", found)
+    sparse_points.write_cached_points(folder / "points-1.npz", found)
 
 
 def _read_points(folder: Path) -> None:
-    found = points.read_cached_points(folder / "points-1.npz")
+    found = sparse_points.read_cached_points(folder / "points-1.npz")
     if found is None:
         raise CagefieldError("it is damaged, and the points are found again")
     found.take(np.arange(len(found)) % 2 == 0)
@@ -100,7 +101,7 @@ def _make_database(count: int, folder: Path) -> None:
     """Three photos of `count` features each, all matched."""
     import pycolmap
 
-    from cagefield.datasets import features
+    from cagefield.datasets.sfm import features
 
     features.create_database(folder / "database.db", *_cameras_and_photos())
     chance, pairs = np.random.default_rng(0), np.stack([np.arange(count, dtype=np.uint32)] * 2, axis=1)
@@ -119,7 +120,7 @@ def _make_database(count: int, folder: Path) -> None:
 
 
 def _read_database(folder: Path) -> None:
-    from cagefield.datasets import features
+    from cagefield.datasets.sfm import features
 
     for journal in folder.glob("database.db-*"):
         journal.unlink()
@@ -129,7 +130,7 @@ def _read_database(folder: Path) -> None:
     if not (folder / "database.db").exists():
         raise CagefieldError("it is damaged, and the features are found again")
     features.likely_pairs(folder / "database.db", 3)
-    left_out.verified_matches(folder / "database.db", 3)
+    registration_report.verified_matches(folder / "database.db", 3)
 
 
 def _make_video(folder: Path) -> None:

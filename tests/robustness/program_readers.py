@@ -14,7 +14,7 @@ import program_folders as write
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.datasets.raw_photos import upright
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
 from heic_photos import TURNED_HEIC
 from icc_profiles import DISPLAY_P3, matrix_profile
 

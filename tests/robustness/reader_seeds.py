@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import MoveCorner, Rotate, Scale, Translate
-from cagefield.keyframes import Keyframe
+from cagefield.geometry.cage import Cage
 from scenes import ball_cameras
 
 Read = Callable[[Path], Any]

@@ -11,11 +11,11 @@ import numpy as np
 from reader_seeds import Reader, example_edits, example_keys, written
 
 from cagefield import Scene
-from cagefield.camera_paths import load_camera_path
+from cagefield.cameras.camera_paths import load_camera_path
+from cagefield.cameras.keyframe_files import dump_path, load_keys
 from cagefield.edits import EditStack, dump_edits, load_edits
 from cagefield.errors import CagefieldError
 from cagefield.fields.nerf_file import load_nerf, save_nerf
-from cagefield.keyframe_files import dump_path, load_keys
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from nerf_networks import small_field

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from reader_seeds import Reader
 
-from cagefield.formats.splat_files import read_splats, write_splats
-from cagefield.formats.splat_import import import_splats
+from cagefield.formats.splats.splat_files import read_splats, write_splats
+from cagefield.scene.import_splats import import_splats
 from gltf_assets import Asset
 from splat_damage import old_spz, sample_file
 from splat_scenes import random_splats

@@ -16,14 +16,14 @@ from typing import Any
 import pytest
 from kill_command import EDITS
 
-from cagefield.datasets import colmap
+from cagefield.datasets.colmap import colmap_model
 from cagefield.edits import EditStack, load_edits
-from cagefield.edits.files import save_edits
+from cagefield.edits.edit_files import save_edits
 from cagefield.errors import CagefieldError, DatasetError, FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
-from cagefield.formats.splat_files import open_splats, read_opened, write_splats
-from cagefield.scene import Scene
-from cagefield.scene_files import field_states
+from cagefield.formats.splats.splat_files import open_splats, read_opened, write_splats
+from cagefield.scene.scene import Scene
+from cagefield.scene.scene_files import field_states
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
@@ -39,7 +39,7 @@ FIELD = "field.safetensors"
 _READ = """
 import sys, time
 from cagefield.errors import FieldError
-from cagefield.scene_files import read_field
+from cagefield.scene.scene_files import read_field
 end = time.monotonic() + 3
 while time.monotonic() < end:
     try:
@@ -142,7 +142,7 @@ def test_a_colmap_model_that_changes_while_it_is_read_is_refused(
 ) -> None:
     """pycolmap reads zeros from a file that ends before, and says nothing."""
     shutil.copytree(model, tmp_path, dirs_exist_ok=True)
-    assert colmap.read_model(tmp_path)[1]
+    assert colmap_model.read_model(tmp_path)[1]
 
     def read(folder: Path) -> Any:
         os.truncate(folder / "cameras.bin", 30)
@@ -155,7 +155,7 @@ def test_a_colmap_model_that_changes_while_it_is_read_is_refused(
     whole = pycolmap.Reconstruction(tmp_path)
     monkeypatch.setattr(pycolmap, "Reconstruction", read)
     with pytest.raises(DatasetError, match=r"cameras\.bin: it has changed while it was read; wait until"):
-        colmap.read_model(tmp_path)
+        colmap_model.read_model(tmp_path)
 
 
 def _opened(folder: Path) -> tuple[SceneStore, Session]:

@@ -19,9 +19,9 @@ from hypothesis import strategies as st
 from large_readers import READERS as LARGE_READERS
 from readers import NEED_OPENSSL, NEED_TORCH, READERS
 
-from cagefield import json_text, yaml_text
 from cagefield.edits import dump_edits, parse_edits
 from cagefield.errors import CagefieldError
+from cagefield.files import json_text, yaml_text
 
 INPUTS = 8
 

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from kill_points import Say, forked
 
-from cagefield import atomic_files
-from cagefield.atomic_files import merged_folder, recover_folder
 from cagefield.cli import main
 from cagefield.cli.demo import Demo
 from cagefield.errors import CagefieldError
-from cagefield.leftovers import hidden_name
+from cagefield.files import atomic
+from cagefield.files.atomic import merged_folder, recover_folder
+from cagefield.files.stale_files import hidden_name
 from cagefield.server.editor.document import Document
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_worker.job_files import MARK
@@ -52,7 +52,7 @@ def test_killed_pictures_are_all_old_or_all_new(
 ) -> None:
     """At every call that changes something, with the user's own files; the next run leaves nothing else."""
     if way == "renames":
-        monkeypatch.setattr(atomic_files, "exchanged", lambda one, other: False)
+        monkeypatch.setattr(atomic, "exchanged", lambda one, other: False)
     outcomes, recovered = set(), 0
     for at in range(1, 200):
         out = tmp_path / str(at) / "out"
@@ -113,7 +113,7 @@ def test_pictures_go_one_after_another_where_the_folder_must_stay(
 
         monkeypatch.setattr(os, "link", refuse)
     elif why == "many files":
-        monkeypatch.setattr(atomic_files, "MOST_LINKED", len(old))
+        monkeypatch.setattr(atomic, "MOST_LINKED", len(old))
     else:
         other, walk = tmp_path / "out" / "mine", os.stat
         elsewhere = os.stat_result((0o40755, 1, 99, 1, 0, 0, 0, 0, 0, 0))
@@ -235,9 +235,10 @@ def test_poses_that_a_training_used_come_back(
 ) -> None:
     """`train` on photos alone finds them again, and does not begin anew."""
     from cagefield.cli import poses
-    from cagefield.datasets import dataset, structure_from_motion
+    from cagefield.datasets import dataset_loader
+    from cagefield.datasets.sfm import structure_from_motion
 
-    monkeypatch.setattr(dataset, "has_photos_alone", lambda photos: True)
+    monkeypatch.setattr(dataset_loader, "has_photos_alone", lambda photos: True)
     monkeypatch.setattr(
         structure_from_motion,
         "is_made_of",

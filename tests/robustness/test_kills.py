@@ -18,8 +18,8 @@ import write_points
 from kill_points import Ended, Say, adopted, children, forked
 from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
 
-from cagefield.leftovers import hidden_name
-from cagefield.rendering.images import write_png
+from cagefield.files.stale_files import hidden_name
+from cagefield.images.image_files import write_png
 from scenes import files_of
 
 pytestmark = [

@@ -18,26 +18,26 @@ def _run(kind: str, size: int, photos: Path) -> Any:
 
     `size` is a grid's resolution, a number of splats, or the width of networks.
     """
-    from cagefield import devices
+    from cagefield.compute import devices
     from cagefield.datasets import load_dataset
 
     devices.start()
     dataset = load_dataset(photos)
     if kind == "voxel":
-        from cagefield.training.voxel_config import VoxelConfig
-        from cagefield.training.voxel_run import VoxelRun
+        from cagefield.training.voxels.voxel_config import VoxelConfig
+        from cagefield.training.voxels.voxel_run import VoxelRun
 
         run: Any = VoxelRun(dataset, VoxelConfig(steps=4, resolution=size))
     elif kind == "splat":
-        from cagefield.training.splat_config import SplatConfig
-        from cagefield.training.splat_run import SplatRun
+        from cagefield.training.splats.splat_config import SplatConfig
+        from cagefield.training.splats.splat_run import SplatRun
 
         run = SplatRun(dataset, SplatConfig(steps=4, splats=size))
         if size > len(run.state):
             run.state.take(np.resize(np.arange(len(run.state)), size))
     else:
-        from cagefield.training.nerf_config import NerfConfig
-        from cagefield.training.nerf_run import NerfRun
+        from cagefield.training.nerf.nerf_config import NerfConfig
+        from cagefield.training.nerf.nerf_run import NerfRun
 
         run = NerfRun(dataset, NerfConfig(steps=4, width=size, depth=2, samples=(4, 4), batch_rays=16))
     for _ in range(2):
@@ -47,7 +47,7 @@ def _run(kind: str, size: int, photos: Path) -> Any:
 
 def _training(kind: str, size: int) -> Reader:
     def make(folder: Path) -> None:
-        from cagefield.datasets.procedural import make_scene
+        from cagefield.procedural import make_scene
 
         make_scene("chair", folder / "photos", views=3, size=12, test_views=1, depth="none")
         _run(kind, size, folder / "photos").store(folder / STATE)

@@ -548,8 +548,8 @@ export interface PictureHeader {
 /**
  * Heads a binary message to a page that draws itself as PictureHeader does; a file of the edits follows.
  *
- * The file is one of `cagefield.formats.page_edits`, without what was sent before, or of
- * `cagefield.formats.page_splat_edits`; it is empty where the edits cannot be drawn by a page, and `why`
+ * The file is one of `cagefield.pages.page_edits`, without what was sent before, or of
+ * `cagefield.pages.page_splat_edits`; it is empty where the edits cannot be drawn by a page, and `why`
  * says why. The page answers `presented` when it shows them.
  */
 export interface EditsHeader {

@@ -20,11 +20,11 @@ from cagefield.benchmarking.figures import Figures, compare
 from cagefield.benchmarking.strips import Panel, difference, strip
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.rendering.metrics import psnr
-from cagefield.scene import Scene
+from cagefield.geometry.cage import Cage
+from cagefield.images.metrics import psnr
+from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray
 
 RESOLUTIONS = (64, 128, 256)

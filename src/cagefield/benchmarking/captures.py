@@ -24,10 +24,10 @@ from cagefield.datasets import Dataset, View
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.datasets.views import SparsePoints
 from cagefield.errors import CagefieldError
-from cagefield.npz import read_array
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.metrics import color_corrected
-from cagefield.rendering.render_result import RenderResult
+from cagefield.files.npz import read_array
+from cagefield.images.image_files import side_by_side, write_png
+from cagefield.images.metrics import color_corrected
+from cagefield.images.render_result import RenderResult
 from cagefield.training.evaluation import Evaluation, ViewFigures, collected, composited, view_figures
 from cagefield.typing import Array, Float32
 
@@ -144,7 +144,7 @@ def sighted_points(dataset: Dataset) -> SparsePoints | None:
     """
     if dataset.points is not None and dataset.points.seen_by:
         return dataset.points
-    from cagefield.datasets.colmap import find_model, load_colmap
+    from cagefield.datasets.colmap.colmap_model import find_model, load_colmap
 
     folder = find_model(dataset.path) if dataset.path.is_dir() else None
     if folder is None:

@@ -13,10 +13,10 @@ from importlib.resources import files
 
 import numpy as np
 
-from cagefield.datasets.procedural import ProceduralScene
 from cagefield.edits import EditStack
-from cagefield.edits.files import parse_edits
+from cagefield.edits.edit_files import parse_edits
 from cagefield.errors import CagefieldError
+from cagefield.procedural import ProceduralScene
 
 WEIGHT_CENTER = (-0.6493, 0.0, 0.142)
 PINECONE_CENTER = (0.419, -0.3, -0.211)

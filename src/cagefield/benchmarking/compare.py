@@ -19,13 +19,13 @@ from cagefield.benchmarking.figures import Figures, compare, stacked, supersampl
 from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
+from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.render_result import RenderResult
-from cagefield.scene import Scene
+from cagefield.images.render_result import RenderResult
+from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray
-from cagefield.warps.device_stack import DeviceStack
 
 _TIMED_POINTS = 1 << 17
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cagefield.benchmarking.methods import BackwardMap
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell

@@ -17,11 +17,11 @@ from cagefield.benchmarking.naive_splats import seen_naively
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.timing import interleaved
 from cagefield.benchmarking.workbench import Workbench
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural.writer import FOV_X
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.scene import Scene
+from cagefield.cameras.camera import Camera
+from cagefield.fields.splat_field import SplatField
+from cagefield.images.image_files import side_by_side, write_png
+from cagefield.procedural.writer import FOV_X
+from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray
 
 _TIMED_VIEWS, _ROUNDS = 2, 3

@@ -15,9 +15,9 @@ from cagefield.benchmarking.naive_splats import NAIVE
 from cagefield.benchmarking.perceptual import lpips
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Settings
-from cagefield.training.nerf_config import NerfConfig
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.nerf.nerf_config import NerfConfig
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.voxels.voxel_config import VoxelConfig
 
 TIMED_EXACTLY = 40
 """Width and height at which exact frames are timed: a picture of a NeRF takes seconds."""

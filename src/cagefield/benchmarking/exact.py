@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
+from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.rendering.reference_renderer import PointMap
 from cagefield.typing import Array
-from cagefield.warps.device_stack import DeviceStack
 
 _WITH_KERNEL = ("flow", "trilinear")
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.cameras import Camera
-from cagefield.rendering.metrics import mse, psnr, ssim
+from cagefield.cameras.camera import Camera
+from cagefield.images.metrics import mse, psnr, ssim
 from cagefield.typing import AnyArray
 
 CHANGED = 4 / 255

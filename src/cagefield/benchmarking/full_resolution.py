@@ -10,10 +10,10 @@ import numpy as np
 
 from cagefield.benchmarking.perceptual import Distance
 from cagefield.benchmarking.tables import Table, number
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
 from cagefield.errors import CagefieldError
-from cagefield.rendering.metrics import color_corrected, gradient_ratio
+from cagefield.images.metrics import color_corrected, gradient_ratio
 from cagefield.training.evaluation import Evaluation, ViewFigures, composited, view_figures
 from cagefield.typing import Float32
 

@@ -15,9 +15,9 @@ from scipy import ndimage
 
 from cagefield.benchmarking.distortion import Distortion, distortion
 from cagefield.benchmarking.methods import BackwardMap, exact_map
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, UInt8
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.trilinear_shell import TrilinearShell

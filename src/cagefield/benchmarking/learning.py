@@ -9,12 +9,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.rendering.render_result import Background, RenderResult
-from cagefield.training.splat_config import SplatConfig
+from cagefield.images.render_result import Background, RenderResult
+from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.typing import Float32
 
 Show = Callable[[Camera], RenderResult]
@@ -68,8 +68,8 @@ def learn(dataset: Dataset, kind: str, budget: Budget, on_progress: Callable[[An
 
 
 def _splats(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
-    from cagefield.rendering.splat_renderer import SplatRenderer
-    from cagefield.training.splat import train_splat
+    from cagefield.rendering.splats.splat_renderer import SplatRenderer
+    from cagefield.training.splats.train_splats import train_splat
 
     result = train_splat(dataset, splat_config(budget), on_progress=on_progress, evaluate=False)
     if not result.finished:
@@ -110,8 +110,8 @@ def splat_config(budget: Budget) -> SplatConfig:
 
 
 def _voxels(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]) -> Learnt:
-    from cagefield.training.voxel import train_voxel
-    from cagefield.training.voxel_config import VoxelConfig
+    from cagefield.training.voxels.train_voxels import train_voxel
+    from cagefield.training.voxels.voxel_config import VoxelConfig
 
     config = VoxelConfig(
         steps=VoxelConfig.steps if budget.steps is None else budget.steps,
@@ -123,7 +123,7 @@ def _voxels(dataset: Dataset, budget: Budget, on_progress: Callable[[Any], None]
     result = train_voxel(dataset, config, on_progress=on_progress, evaluate=False)
     if not result.finished:
         raise KeyboardInterrupt
-    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import Renderer
 
     renderer = Renderer(result.field)
 

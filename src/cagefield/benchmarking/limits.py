@@ -18,11 +18,11 @@ from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psn
 from cagefield.benchmarking.strips import strip
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.workbench import Workbench, beside
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import ProceduralScene, procedural_scene
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
+from cagefield.procedural import ProceduralScene, procedural_scene
 from cagefield.typing import AnyArray
 
 REACH = 60.0

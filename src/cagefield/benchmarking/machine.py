@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import cagefield
-from cagefield import devices
+from cagefield.compute import devices
 
 
 @dataclass(frozen=True)

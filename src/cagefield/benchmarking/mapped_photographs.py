@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.benchmarking.exact import BoxedMap
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural import ProceduralScene
-from cagefield.datasets.procedural.distance_cells import DistanceCells
-from cagefield.datasets.procedural.supersampling import photograph
-from cagefield.datasets.procedural.tracing import TOLERANCE, Hits, along, trace
+from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
+from cagefield.images.render_result import Background, RenderResult
+from cagefield.procedural import ProceduralScene
+from cagefield.procedural.distance_cells import DistanceCells
+from cagefield.procedural.supersampling import photograph
+from cagefield.procedural.tracing import TOLERANCE, Hits, along, trace
 from cagefield.rendering.reference_renderer import intersect_box
-from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import Array, Float32, Int, Mask
 
 SHORTEST = 1e-4

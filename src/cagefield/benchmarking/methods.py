@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from cagefield.benchmarking.peers import PEERS, PeerShell
-from cagefield.cages import Cage
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps import SHELLS, Falloff, Shell
 from cagefield.warps.interfaces import Mapped

@@ -1,6 +1,7 @@
 """Edits on splats done more simply than `SplatRenderer` does them, for comparison.
 
-Notation as in `cagefield.rendering.deformed_splats`: an edit takes a splat's mean along, its covariance C
+Notation as in `cagefield.rendering.splats.raster_splats`: an edit takes a splat's mean along, its covariance
+C
 to J C J^T, and its harmonics through R, J = R S. All ways here move, copy, hide and delete by the means, and
 keep opacity; none splits.
 """
@@ -12,15 +13,15 @@ from dataclasses import replace
 from typing import cast
 
 from cagefield.benchmarking.figures import stacked, supersampled
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.deformed_splats import DeformedSplats, Places, deformed_splats
-from cagefield.rendering.moved_splats import moved_splats
-from cagefield.rendering.render_result import RenderResult
-from cagefield.rendering.splat_renderer import SplatRenderer
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import SplatField
+from cagefield.images.render_result import RenderResult
+from cagefield.rendering.splats.raster_splats import DeformedSplats, Places, deformed_splats
+from cagefield.rendering.splats.splat_motion import moved_splats
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
+from cagefield.scene.scene import Scene
 from cagefield.typing import AnyArray, Float32
 
 NAIVE = ("means only", "no turned SH", "not split")

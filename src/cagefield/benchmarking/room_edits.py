@@ -20,13 +20,13 @@ from cagefield.benchmarking.figures import Figures, compare
 from cagefield.benchmarking.learning import Learnt
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset
-from cagefield.datasets.procedural import capture
-from cagefield.datasets.procedural.hand_held import picture
 from cagefield.errors import CagefieldError
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.metrics import color_fit
+from cagefield.images.image_files import side_by_side, write_png
+from cagefield.images.metrics import color_fit
+from cagefield.procedural import capture
+from cagefield.procedural.hand_held import picture
 from cagefield.typing import Float32
 
 _ROUNDS = 5

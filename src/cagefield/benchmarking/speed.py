@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from cagefield.benchmarking.machine import Machine
 from cagefield.benchmarking.tables import Table, number
 from cagefield.benchmarking.timing import interleaved
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
 from cagefield.rendering.reference_renderer import intersect_box
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 
 COVERED = 0.25
 """Share of the picture that the default edit's outer cage covers."""

@@ -8,8 +8,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
+from cagefield.files.atomic import replaced_file
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from cagefield.benchmarking.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.errors import CagefieldError
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.progress import Progress, Snapshots
-from cagefield.training.voxel import TrainResult, train_voxel
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.training.voxels.train_voxels import TrainResult, train_voxel
+from cagefield.training.voxels.voxel_config import VoxelConfig
 
 SHARES = (0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
 """Shares of the training at which the curve has a point, before the last at its end."""

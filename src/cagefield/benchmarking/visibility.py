@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cagefield.cameras import Camera
-from cagefield.datasets.procedural.parts import Part, apply
-from cagefield.datasets.procedural.scene import ProceduralScene
-from cagefield.datasets.procedural.tracing import trace
+from cagefield.cameras.camera import Camera
+from cagefield.procedural.parts import Part, apply
+from cagefield.procedural.scene import ProceduralScene
+from cagefield.procedural.tracing import trace
 from cagefield.typing import Mask
 
 REACH = 0.008

@@ -23,24 +23,24 @@ from typing import Any
 import numpy as np
 
 import cagefield
-from cagefield.atomic_files import replaced_file
 from cagefield.benchmarking.cases import Case
 from cagefield.benchmarking.exact import exact
 from cagefield.benchmarking.mapped_photographs import MappedScene
 from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset, load_dataset
-from cagefield.datasets.procedural import ProceduralScene, make_scene, procedural_scene
 from cagefield.edits import EditStack
-from cagefield.edits.files import dump_edits
+from cagefield.edits.edit_files import dump_edits
 from cagefield.errors import CagefieldError
-from cagefield.leftovers import remove_unfinished
-from cagefield.npz import DEFLATED, read_arrays
-from cagefield.scene import Scene
-from cagefield.training.nerf_config import NerfConfig
-from cagefield.training.splat_config import SplatConfig
-from cagefield.training.voxel import train_voxel
-from cagefield.training.voxel_config import VoxelConfig
+from cagefield.files.atomic import replaced_file
+from cagefield.files.npz import DEFLATED, read_arrays
+from cagefield.files.stale_files import remove_unfinished
+from cagefield.procedural import ProceduralScene, make_scene, procedural_scene
+from cagefield.scene.scene import Scene
+from cagefield.training.nerf.nerf_config import NerfConfig
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.voxels.train_voxels import train_voxel
+from cagefield.training.voxels.voxel_config import VoxelConfig
 from cagefield.typing import Mask, UInt8
 
 Move = Callable[[float, float, str], None]
@@ -253,7 +253,7 @@ def trained(
 ) -> Scene:
     """The scene trained on a bounded data set; a NeRF's holds its voxels too."""
     if isinstance(config, SplatConfig):
-        from cagefield.training.splat import train_splat
+        from cagefield.training.splats.train_splats import train_splat
 
         splats = train_splat(dataset, config, on_progress=on_progress, evaluate=False)
         if not splats.finished:
@@ -264,7 +264,7 @@ def trained(
         if not result.finished:
             raise KeyboardInterrupt
         return Scene.trained(result, dataset)
-    from cagefield.training.nerf import train_nerf
+    from cagefield.training.nerf.train_nerf import train_nerf
 
     learnt = train_nerf(dataset, config, on_progress=on_progress)
     if not learnt.finished:

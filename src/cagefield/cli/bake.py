@@ -12,13 +12,13 @@ import tyro
 
 from cagefield.cli.options import Baking, BakingOptions, Device, Flag, OptionalOutput, progress_bar
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.cameras import Camera
-    from cagefield.fields.nerf import NerfField
-    from cagefield.fields.splat import SplatField
-    from cagefield.scene import Scene
+    from cagefield.cameras.camera import Camera
+    from cagefield.fields.nerf_field import NerfField
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Bake:
 
     def run(self) -> None:
         """Bakes, writes the scene, prints the PSNR between the two fields."""
-        from cagefield import devices
-        from cagefield.fields.splat import SplatField
-        from cagefield.scene import Scene
-        from cagefield.scene_files import check_destination
+        from cagefield.compute import devices
+        from cagefield.fields.splat_field import SplatField
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import check_destination
 
         destination = self.out or self.scene
         if self.out is None and not self.overwrite:
@@ -87,10 +87,10 @@ def bake_scene(
     import time
     from typing import cast
 
-    from cagefield.fields.splat import SplatField
-    from cagefield.fields.voxel import VoxelField
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.fields.voxel_field import VoxelField
     from cagefield.rendering.bake_fidelity import agreement
-    from cagefield.scene import Scene
+    from cagefield.scene.scene import Scene
 
     began = time.perf_counter()
     with progress_bar("Baking") as move:

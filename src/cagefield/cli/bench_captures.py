@@ -78,13 +78,13 @@ class BenchCaptures:
 
     def run(self) -> None:
         """Makes the photos that are missing, trains, measures, shows the table, says where the files are."""
-        from cagefield import devices
         from cagefield.benchmarking import room_edits
         from cagefield.benchmarking.captures import table
         from cagefield.benchmarking.learning import Budget
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_texts
         from cagefield.cli.bench_command import command_line, work_folder
+        from cagefield.compute import devices
 
         if not self.data:
             raise CagefieldError("no capture to measure; give folders, or names of built-in rooms")
@@ -145,8 +145,8 @@ class BenchCaptures:
         from cagefield.benchmarking.workbench import digest
         from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.procedural import is_capture, make_capture
-        from cagefield.datasets.resolution import at_training_resolution
+        from cagefield.datasets.training_resolution import at_training_resolution
+        from cagefield.procedural import is_capture, make_capture
 
         path = Path(name)
         if is_capture(name) and not path.exists():

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cagefield.regular_files import real_path
-from cagefield.temporary_folders import TemporaryFolder
+from cagefield.files.safe_open import real_path
+from cagefield.files.temporary_folders import TemporaryFolder
 
 if TYPE_CHECKING:
     pass

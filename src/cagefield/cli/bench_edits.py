@@ -23,9 +23,9 @@ from cagefield.errors import CagefieldError
 if TYPE_CHECKING:
     from cagefield.benchmarking.cases import Case
     from cagefield.benchmarking.workbench import Workbench
-    from cagefield.training.nerf_config import NerfConfig
-    from cagefield.training.splat_config import SplatConfig
-    from cagefield.training.voxel_config import VoxelConfig
+    from cagefield.training.nerf.nerf_config import NerfConfig
+    from cagefield.training.splats.splat_config import SplatConfig
+    from cagefield.training.voxels.voxel_config import VoxelConfig
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ class BenchEdits:
 
     def run(self) -> None:
         """Trains what is missing, measures, shows the table, says where the files are."""
-        from cagefield import devices
         from cagefield.benchmarking.cases import chosen
         from cagefield.benchmarking.edits import picture_path
         from cagefield.benchmarking.methods import check_known
         from cagefield.benchmarking.workbench import Settings, Workbench
+        from cagefield.compute import devices
 
         cases = chosen(self.scenes, self.edits)
         check_known(self.methods)

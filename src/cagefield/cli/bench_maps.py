@@ -10,7 +10,7 @@ import tyro
 
 from cagefield.cli.options import Device, Flag, Output, Training, TrainingOptions, check_file, progress_bar
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
     from cagefield.benchmarking.ablations import Ablation
@@ -37,7 +37,7 @@ class BenchGrids:
         """Draws, says what was measured, writes the file."""
         from cagefield.benchmarking.grids import Style, grids
         from cagefield.benchmarking.methods import MAPS, check_known
-        from cagefield.rendering.images import write_png
+        from cagefield.images.image_files import write_png
 
         check_known(self.methods, MAPS)
         if self.out.suffix.lower() != ".png":
@@ -82,15 +82,15 @@ class BenchAblation:
 
     def run(self) -> None:
         """Trains what is missing, measures, writes both files."""
-        from cagefield import devices
-        from cagefield.atomic_files import replaced_file
         from cagefield.benchmarking.ablations import with_notes
         from cagefield.benchmarking.cases import chosen
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import write_text
         from cagefield.benchmarking.workbench import Settings, Workbench
         from cagefield.cli.bench_command import command_line
-        from cagefield.rendering.images import write_png
+        from cagefield.compute import devices
+        from cagefield.files.atomic import replaced_file
+        from cagefield.images.image_files import write_png
 
         usual = ("plant", "move_pinecone") if self.what == "limits" else ("microphone", "push_head")
         if bool(self.scene) != bool(self.edit):

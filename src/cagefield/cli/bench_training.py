@@ -52,12 +52,12 @@ class BenchSpeed:
         """Measures, shows the table, writes the files."""
         import json
 
-        from cagefield import devices
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.speed import measure
         from cagefield.benchmarking.tables import write_texts
-        from cagefield.edits.files import load_edits
-        from cagefield.scene import Scene
+        from cagefield.compute import devices
+        from cagefield.edits.edit_files import load_edits
+        from cagefield.scene.scene import Scene
 
         if self.out is not None:
             if self.out.suffix.lower() != ".json":
@@ -100,12 +100,12 @@ class BenchTraining:
 
     def run(self) -> None:
         """Trains, evaluates on the way, shows the table, writes the files."""
-        from cagefield import devices
         from cagefield.benchmarking.machine import Machine
         from cagefield.benchmarking.tables import drafted_texts
         from cagefield.benchmarking.training import Point, measure
-        from cagefield.scene import Scene
-        from cagefield.scene_files import check_destination
+        from cagefield.compute import devices
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import check_destination
 
         if self.out.suffix.lower() != ".csv":
             raise CagefieldError(f"{self.out} must end in .csv; the Markdown table goes beside it")

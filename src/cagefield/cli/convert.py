@@ -7,9 +7,9 @@ from pathlib import Path
 
 import tyro
 
-from cagefield.atomic_files import check_writable
 from cagefield.cli.options import Axes, Flag, SpzVersion, progress_bar
 from cagefield.errors import CagefieldError
+from cagefield.files.atomic import check_writable
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Convert:
 
     def run(self) -> None:
         """Converts; prints what was written."""
-        from cagefield.formats.splat_files import convert_splats, writer_of
+        from cagefield.formats.splats.splat_files import convert_splats, writer_of
 
         writer_of(self.out, self.spz_version)
         if self.out.exists() and not self.overwrite:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cagefield.cli.options import Device, Flag, Output, check_folder, check_number, progress_bar, track
-from cagefield.regular_files import real_path
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.scene import Scene
+    from cagefield.scene.scene import Scene
 
 _OWN = (
     "photos", "scene", "edited", "edits.yaml",
@@ -46,8 +46,8 @@ class Demo:
 
     def run(self) -> None:
         """Runs the chain and says where the results are."""
-        from cagefield.atomic_files import replaced_folder
-        from cagefield.training.voxel_config import VoxelConfig
+        from cagefield.files.atomic import replaced_folder
+        from cagefield.training.voxels.voxel_config import VoxelConfig
 
         for name, value, high in (("views", self.views, 10_000), ("size", self.size, 4096),
                                   ("frames", self.frames, 10_000)):  # fmt: skip
@@ -90,7 +90,7 @@ class Demo:
             View(scene, device=self.device).run()
 
     def _photograph(self, folder: Path) -> None:
-        from cagefield.datasets.procedural import make_scene
+        from cagefield.procedural import make_scene
 
         with progress_bar("Photos") as move:
             make_scene(
@@ -103,10 +103,10 @@ class Demo:
             )
 
     def _train(self, folder: Path) -> tuple[Scene, str]:
-        from cagefield import devices
         from cagefield.cli.train import summary, train_scene
+        from cagefield.compute import devices
         from cagefield.datasets import load_dataset
-        from cagefield.training.voxel_config import VoxelConfig
+        from cagefield.training.voxels.voxel_config import VoxelConfig
 
         devices.start(self.device)
         dataset = load_dataset(folder / "photos")
@@ -119,7 +119,7 @@ class Demo:
     def _edit(self, scene: Scene, folder: Path) -> Scene:
         from importlib.resources import files
 
-        from cagefield.edits.files import load_edits
+        from cagefield.edits.edit_files import load_edits
 
         text = files("cagefield").joinpath("examples").joinpath("digger.yaml").read_text(encoding="utf-8")
         (folder / "edits.yaml").write_text(text, encoding="utf-8")
@@ -128,9 +128,9 @@ class Demo:
         return edited
 
     def _render(self, scene: Scene, edited: Scene, folder: Path) -> None:
-        from cagefield.camera_paths import orbit
-        from cagefield.cameras import Camera
-        from cagefield.rendering.images import side_by_side, write_png, write_video
+        from cagefield.cameras.camera import Camera
+        from cagefield.cameras.camera_paths import orbit
+        from cagefield.images.image_files import side_by_side, write_png, write_video
 
         camera = Camera.look_at(_EYE, _TARGET, width=480, height=480, fov_x=_FOV_X)
         before, after = (one.render(camera).rgb8() for one in (scene, edited))

@@ -32,10 +32,10 @@ class ApplyEdits:
         """Checks every edit, writes the scene, prints what changes."""
         from cagefield.cli.report import describe_edits
         from cagefield.edits import EditStack
-        from cagefield.edits.files import load_edits
-        from cagefield.edits.sources import rebased
-        from cagefield.scene import Scene
-        from cagefield.scene_files import check_destination
+        from cagefield.edits.edit_files import load_edits
+        from cagefield.edits.paste_paths import rebased
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import check_destination
 
         destination = self.out or self.scene
         if self.out is None and not (self.overwrite or self.check):

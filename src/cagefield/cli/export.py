@@ -22,13 +22,13 @@ from cagefield.cli.options import (
     stages,
 )
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.cages import Cage
-    from cagefield.exporting.path_states import PathEdits
-    from cagefield.fields.splat import SplatField
-    from cagefield.scene import Scene
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.geometry.cage import Cage
+    from cagefield.pages.path_states import PathEdits
+    from cagefield.scene.scene import Scene
 
 What = Literal["splats", "mesh", "points", "page"]
 
@@ -85,9 +85,9 @@ class Export:
         if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
         self._check()
-        from cagefield import devices
+        from cagefield.compute import devices
         from cagefield.exporting import cages_of
-        from cagefield.scene import Scene
+        from cagefield.scene.scene import Scene
 
         scene = Scene.open(self.scene)
         cages = () if self.selection is None else cages_of(self.selection, scene.edits)
@@ -97,11 +97,11 @@ class Export:
 
     def _page(self) -> None:
         """Writes a page; prints what is in it."""
-        from cagefield import devices
-        from cagefield.atomic_files import replaced_file
-        from cagefield.exporting.page import INDEX, SCRIPT, ScenePage, write_folder
-        from cagefield.keyframe_files import load_keys
-        from cagefield.scene import Scene
+        from cagefield.cameras.keyframe_files import load_keys
+        from cagefield.compute import devices
+        from cagefield.files.atomic import replaced_file
+        from cagefield.pages.scene_page import INDEX, SCRIPT, ScenePage, write_folder
+        from cagefield.scene.scene import Scene
 
         if self.what not in ("splats", "page"):
             raise CagefieldError(f"{self.out}: {self.what} are not written as a page; give another name")
@@ -156,7 +156,7 @@ class Export:
     def _check(self) -> None:
         """Refuses what cannot be written before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
-        from cagefield.formats.splat_files import writer_of
+        from cagefield.formats.splats.splat_files import writer_of
 
         check_file(self.out, self.overwrite)
         suffix = self.out.suffix.lower()
@@ -181,9 +181,9 @@ class Export:
         """Writes splats; a line of figures."""
         from cagefield.exporting import baked, inside, upright
         from cagefield.exporting.source_coordinates import splats_in_source, world_to_source
-        from cagefield.fields.splat import SplatField
-        from cagefield.formats.splat_files import write_splats
-        from cagefield.formats.splat_import import axis_of, nearest_up
+        from cagefield.fields.splat_field import SplatField
+        from cagefield.formats.splats.splat_files import write_splats
+        from cagefield.scene.import_splats import axis_of, nearest_up
 
         if isinstance(scene.field, SplatField):
             splats, figures = baked(scene), "edits baked in" if scene.edits.active else "without edits"
@@ -206,7 +206,7 @@ class Export:
     def _fitted(self, scene: Scene) -> tuple[SplatField, str]:
         """Splats fitted to voxels, and how well."""
         from cagefield.exporting import fitted_splats
-        from cagefield.training.splat_config import SplatConfig
+        from cagefield.training.splats.splat_config import SplatConfig
 
         config = SplatConfig(
             steps=SplatConfig.steps if self.steps is None else self.steps,

@@ -14,7 +14,7 @@ from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
-    from cagefield.scene import Scene
+    from cagefield.scene.scene import Scene
 
 Unbounded = Literal["auto", "on", "off"]
 
@@ -51,8 +51,8 @@ class ImportField:
 
     def run(self) -> None:
         """Reads, bakes where it must, and writes; prints what it found."""
-        from cagefield.formats.splat_opening import holds_splats
-        from cagefield.scene_files import check_destination
+        from cagefield.formats.splats.open_splats import holds_splats
+        from cagefield.scene.scene_files import check_destination
 
         check_destination(self.out, self.overwrite)
         if self.fov_deg is not None and not 1.0 <= self.fov_deg <= 170.0:
@@ -66,9 +66,9 @@ class ImportField:
 
     def _splats(self) -> tuple[Scene, str]:
         """The scene of a splat file, and lines that say what it holds."""
-        from cagefield.formats.splat_files import read_splats
-        from cagefield.formats.splat_import import import_splats
-        from cagefield.scene import Scene
+        from cagefield.formats.splats.splat_files import read_splats
+        from cagefield.scene.import_splats import import_splats
+        from cagefield.scene.scene import Scene
 
         if self.config is not None or self.fov_deg is not None:
             raise CagefieldError("--config and --fov-deg are for NeRFs; leave them out for splats")
@@ -91,11 +91,11 @@ class ImportField:
 
     def _nerf(self) -> tuple[Scene, str]:
         """The baked scene of a checkpoint, and lines that say what it holds."""
-        from cagefield import devices
         from cagefield.cli.bake import bake_scene
-        from cagefield.formats.nerf_pytorch import read_checkpoint
-        from cagefield.formats.nerf_pytorch_config import Settings, find_config, read_config
-        from cagefield.formats.nerf_pytorch_import import import_nerf
+        from cagefield.compute import devices
+        from cagefield.formats.nerf.nerf_pytorch import read_checkpoint
+        from cagefield.formats.nerf.nerf_pytorch_config import Settings, find_config, read_config
+        from cagefield.scene.import_nerf_pytorch import import_nerf
 
         if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
             raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")

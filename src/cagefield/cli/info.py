@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import tyro
 
 if TYPE_CHECKING:
-    from cagefield.fields.splat import SplatField
-    from cagefield.fields.voxel import VoxelField
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.fields.voxel_field import VoxelField
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Info:
         """Prints one line per fact."""
         from cagefield.cli.dataset_report import describe_world
         from cagefield.cli.report import describe_edits
-        from cagefield.fields.splat import SplatField
-        from cagefield.scene import Scene
-        from cagefield.scene_files import is_scene
+        from cagefield.fields.splat_field import SplatField
+        from cagefield.scene.scene import Scene
+        from cagefield.scene.scene_files import is_scene
 
         if not is_scene(self.scene) and _is_dataset(self.scene):
             from cagefield.cli.dataset_report import describe_dataset
@@ -70,9 +70,9 @@ class Info:
 
 def _is_dataset(path: Path) -> bool:
     """Whether there is a file of cameras: anything else is reported as a scene."""
-    from cagefield.datasets.colmap import find_model
+    from cagefield.datasets.colmap.colmap_model import find_model
     from cagefield.datasets.llff import POSES_FILE
-    from cagefield.datasets.transforms import camera_file
+    from cagefield.datasets.transforms.transforms_json_dataset import camera_file
 
     if not path.is_dir():
         return path.is_file()

@@ -9,7 +9,7 @@ import tyro
 
 from cagefield.cli.options import SEEDS, Flag, Output, check_folder, check_number, progress_bar
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
+from cagefield.files.safe_open import real_path
 
 _MARK = "transforms_train.json"
 _OWN = (_MARK, "transforms_test.json", "transforms_val.json", "train", "test", "val")
@@ -47,15 +47,15 @@ class MakeScene:
         for name, value, high in (("views", self.views, 100_000), ("test-views", self.test_views, 100_000),
                                   ("size", self.size, 8192)):  # fmt: skip
             check_number(f"--{name}", value, 1, high)
-        from cagefield.datasets.procedural import is_capture
+        from cagefield.procedural import is_capture
 
         parts = self._capture() if is_capture(self.name) else self._scene()
         print(f"photos of {self.name} (parts: {', '.join(parts)}) in {self.out}")
 
     def _scene(self) -> tuple[str, ...]:
         """Writes the photos of a scene alone; the names of its parts."""
-        from cagefield.atomic_files import replaced_folder
-        from cagefield.datasets.procedural import make_scene, procedural_scene
+        from cagefield.files.atomic import replaced_folder
+        from cagefield.procedural import make_scene, procedural_scene
 
         scene = procedural_scene(self.name)
         if self.no_points:
@@ -80,9 +80,9 @@ class MakeScene:
 
     def _capture(self) -> tuple[str, ...]:
         """Writes the capture of a room; the names of its parts."""
-        from cagefield.atomic_files import replaced_folder
-        from cagefield.datasets.procedural import capture, make_capture
-        from cagefield.datasets.procedural.capture_writer import OWN
+        from cagefield.files.atomic import replaced_folder
+        from cagefield.procedural import capture, make_capture
+        from cagefield.procedural.capture_writer import OWN
 
         if self.test_views is not None:
             raise CagefieldError(

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
-from cagefield.atomic_files import check_writable, recover_folder
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import real_path
+from cagefield.files.atomic import check_writable, recover_folder
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.training.splat_config import SplatConfig
-    from cagefield.training.voxel_config import VoxelConfig
+    from cagefield.training.splats.splat_config import SplatConfig
+    from cagefield.training.voxels.voxel_config import VoxelConfig
 
 Device = Annotated[
     Literal["auto", "cpu", "cuda", "metal", "vulkan"], tyro.conf.arg(help="Where kernels run.")
@@ -60,7 +60,7 @@ class TrainingOptions:
 
     def config(self) -> VoxelConfig:
         """The configuration of the voxels' trainer."""
-        from cagefield.training.voxel_config import VoxelConfig
+        from cagefield.training.voxels.voxel_config import VoxelConfig
 
         check_number("--seed", self.seed, *SEEDS)
         return VoxelConfig(
@@ -75,7 +75,7 @@ class TrainingOptions:
         self, splats: int | None = None, refine_poses: bool = False, robust: bool = False
     ) -> SplatConfig:
         """The configuration of the splats' trainer; at most so many `splats`, None for its own choice."""
-        from cagefield.training.splat_config import SplatConfig
+        from cagefield.training.splats.splat_config import SplatConfig
 
         check_number("--seed", self.seed, *SEEDS)
         return SplatConfig(

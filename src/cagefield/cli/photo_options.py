@@ -37,7 +37,7 @@ class PhotoOptions:
         For a training of `minutes` the photos are shrunk as `at_training_resolution` says.
         """
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.resolution import at_training_resolution
+        from cagefield.datasets.training_resolution import at_training_resolution
 
         data = self.data if posed_in is None else posed(self.data, posed_in, self.masks)
         masks = self.masks if data.expanduser() == self.data.expanduser() else None
@@ -51,8 +51,8 @@ class PhotoOptions:
 
         Wrong poses are corrected unless `keep_poses`, or where they were found by `load`.
         """
-        from cagefield.datasets.dataset import has_photos_alone
-        from cagefield.datasets.resolution import describe_resolution
+        from cagefield.datasets.dataset_loader import has_photos_alone
+        from cagefield.datasets.training_resolution import describe_resolution
 
         print(describe_resolution(dataset), file=sys.stderr, flush=True)
         given = not has_photos_alone(self.data.expanduser())

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.atomic_files import replaced_file
-from cagefield.rendering.images import side_by_side, write_png
-from cagefield.rendering.render_result import RenderResult
+from cagefield.files.atomic import replaced_file
+from cagefield.images.image_files import side_by_side, write_png
+from cagefield.images.render_result import RenderResult
 from cagefield.typing import AnyArray
 
 Pictures = dict[str, AnyArray]

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, TextIO
 
 import tyro
 
-from cagefield.atomic_files import recover_folder
 from cagefield.cli.options import Flag, Output, check_folder, check_number, progress_bar, stages
-from cagefield.regular_files import real_path
+from cagefield.files.atomic import recover_folder
+from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
-    from cagefield.datasets.pose_verification import Verification
-    from cagefield.datasets.structure_from_motion import PosesReport
+    from cagefield.datasets.sfm.pose_verification import Verification
+    from cagefield.datasets.sfm.structure_from_motion import PosesReport
 
 _LISTED = 20  # photos named at the end, at most
 
@@ -43,8 +43,8 @@ class Poses:
     def run(self) -> None:
         """Makes the data set; prints what became of the photos."""
         from cagefield.datasets import load_dataset
-        from cagefield.datasets.dataset import has_photos_alone
-        from cagefield.datasets.transforms_writer import RECORD, write_transforms
+        from cagefield.datasets.dataset_loader import has_photos_alone
+        from cagefield.datasets.transforms.transforms_writer import RECORD, write_transforms
 
         check_number("--frames", self.frames, 3, 10_000)
         check_folder(self.out, self.overwrite, RECORD)
@@ -60,8 +60,8 @@ class Poses:
 
 def make(photos: Path, target: Path, frames: int = 80, masks: Path | None = None) -> str:
     """Writes the data set `target` of photos or a video, with a progress bar; returns lines about it."""
-    from cagefield.datasets.poses_work import work_folder
-    from cagefield.datasets.structure_from_motion import make_poses
+    from cagefield.datasets.sfm.sfm_workspace import work_folder
+    from cagefield.datasets.sfm.structure_from_motion import make_poses
 
     start = time.monotonic()
     try:
@@ -85,9 +85,9 @@ def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
 
     A data set that was made of the same photos before is used again.
     """
-    from cagefield.datasets.dataset import has_photos_alone
-    from cagefield.datasets.structure_from_motion import is_made_of
-    from cagefield.datasets.transforms_writer import RECORD
+    from cagefield.datasets.dataset_loader import has_photos_alone
+    from cagefield.datasets.sfm.structure_from_motion import is_made_of
+    from cagefield.datasets.transforms.transforms_writer import RECORD
 
     photos = photos.expanduser()
     if not has_photos_alone(photos):
@@ -107,7 +107,7 @@ def verified(dataset: Dataset, correct: bool = True, stream: TextIO | None = Non
 
     Lines about it go to `stream`, by default stdout.
     """
-    from cagefield.datasets.pose_verification import describe, poses_cache, verify_poses
+    from cagefield.datasets.sfm.pose_verification import describe, poses_cache, verify_poses
 
     with stages() as move:
         found = verify_poses(dataset, correct=correct, cache=poses_cache(), on_stage=move)

@@ -22,9 +22,9 @@ from cagefield.cli.options import (
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
-    from cagefield.cameras import Camera
+    from cagefield.cameras.camera import Camera
     from cagefield.cli.pictures import Pictures
-    from cagefield.scene import Scene
+    from cagefield.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,11 @@ class Render:
             for end in ["_depth.png", "_depth.npy"] * self.depth + ["_normals.png"] * self.normals:
                 check_file(self.out.with_name(self.out.stem + end), self.overwrite)
 
-        from cagefield import devices
-        from cagefield.atomic_files import merged_folder
         from cagefield.cli.pictures import in_one_row, write_pictures
-        from cagefield.rendering.images import write_video
-        from cagefield.scene import Scene
+        from cagefield.compute import devices
+        from cagefield.files.atomic import merged_folder
+        from cagefield.images.image_files import write_video
+        from cagefield.scene.scene import Scene
 
         scene = Scene.open(self.scene)
         cameras, fps = self._cameras(scene)
@@ -102,7 +102,7 @@ class Render:
         print(f"{count} in {self.out}")
 
     def _check_options(self) -> None:
-        from cagefield.camera_paths import LEAST_FPS, MOST_FPS
+        from cagefield.cameras.camera_paths import LEAST_FPS, MOST_FPS
 
         if not 0 <= self.turntable <= 100_000:
             raise CagefieldError(
@@ -124,7 +124,7 @@ class Render:
 
     def _cameras(self, scene: Scene) -> tuple[list[Camera], float]:
         """The cameras to render, at their final size, and the frame rate."""
-        from cagefield.camera_paths import load_camera_path, orbit
+        from cagefield.cameras.camera_paths import load_camera_path, orbit
 
         fps = 24.0
         if self.camera_path:

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import hex_determinant
-from cagefield.cage_checks import format_vector
 from cagefield.edits.options import Clone
 from cagefield.errors import EditError
 from cagefield.fields.contraction import uncontract
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry import hexahedron_determinant
+from cagefield.geometry.cage_checks import format_vector
 from cagefield.typing import Array
 from cagefield.warps.continuous import ContinuousWarp
 
 if TYPE_CHECKING:
-    from cagefield.cages import Cage
     from cagefield.edits import Edit
-    from cagefield.fields.voxel import VoxelField
+    from cagefield.fields.voxel_field import VoxelField
+    from cagefield.geometry.cage import Cage
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _details(edit: Edit, content: _Content) -> Iterable[str]:
 
 def _volume(cage: Cage) -> float:
     """Volume of a hexahedron: the mean of the Bernstein coefficients of its Jacobian determinant."""
-    return float(hex_determinant.determinant_coefficients(cage.corners).mean())
+    return float(hexahedron_determinant.determinant_coefficients(cage.corners).mean())
 
 
 def _vertex_positions(field: VoxelField) -> Array:

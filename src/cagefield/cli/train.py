@@ -26,12 +26,12 @@ from cagefield.errors import CagefieldError, line_of
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
-    from cagefield.scene import Scene
-    from cagefield.training.nerf_config import NerfConfig
-    from cagefield.training.splat import SplatTrainResult
-    from cagefield.training.splat_config import SplatConfig
-    from cagefield.training.voxel import TrainResult
-    from cagefield.training.voxel_config import VoxelConfig
+    from cagefield.scene.scene import Scene
+    from cagefield.training.nerf.nerf_config import NerfConfig
+    from cagefield.training.splats.splat_config import SplatConfig
+    from cagefield.training.splats.train_splats import SplatTrainResult
+    from cagefield.training.voxels.train_voxels import TrainResult
+    from cagefield.training.voxels.voxel_config import VoxelConfig
 
 FieldKind = Literal["auto", "splat", "voxel", "nerf"]
 Preset = Literal["auto", "paper", "small"]
@@ -77,8 +77,8 @@ class Train:
 
     def run(self) -> None:
         """Trains, writes the scene, prints the test PSNR."""
-        from cagefield import devices
-        from cagefield.scene_files import check_destination
+        from cagefield.compute import devices
+        from cagefield.scene.scene_files import check_destination
 
         if self.field != "nerf" and (self.preset != "auto" or self.ndc != "auto"):
             raise CagefieldError("--preset and --ndc are for the original NeRF; give --field nerf too")
@@ -157,7 +157,7 @@ class Train:
     def _train_nerf(self, dataset: Dataset, config: NerfConfig, checkpoint: Path) -> tuple[Scene, str, bool]:
         """(scene, lines of figures, whether the training got to its end) of the original NeRF, baked."""
         from cagefield.cli.bake import bake_scene
-        from cagefield.training.nerf import train_nerf
+        from cagefield.training.nerf.train_nerf import train_nerf
 
         with progress_bar("Training") as move:
             result = train_nerf(
@@ -219,8 +219,8 @@ class Train:
 
 def nerf_config(training: TrainingOptions, preset: Preset, ndc: Ndc = "auto") -> NerfConfig:
     """The configuration of a NeRF's trainer. Raises CagefieldError where PyTorch is missing."""
-    from cagefield import devices
-    from cagefield.training.nerf_config import NerfConfig
+    from cagefield.compute import devices
+    from cagefield.training.nerf.nerf_config import NerfConfig
 
     try:
         import torch  # noqa: F401
@@ -241,8 +241,8 @@ def train_scene(
     dataset: Dataset, config: VoxelConfig, checkpoint: Path | None = None, *, resume: bool = False
 ) -> tuple[Scene, TrainResult]:
     """The trained scene, with a progress bar on stderr, and the figures of the training."""
-    from cagefield.scene import Scene
-    from cagefield.training.voxel import train_voxel
+    from cagefield.scene.scene import Scene
+    from cagefield.training.voxels.train_voxels import train_voxel
 
     with progress_bar("Training") as move:
         result = train_voxel(
@@ -259,8 +259,8 @@ def train_splats(
     dataset: Dataset, config: SplatConfig, checkpoint: Path | None = None, *, resume: bool = False
 ) -> tuple[Scene, SplatTrainResult]:
     """The trained scene of splats, with progress bars on stderr, and the figures of the training."""
-    from cagefield.scene import Scene
-    from cagefield.training.splat import train_splat
+    from cagefield.scene.scene import Scene
+    from cagefield.training.splats.train_splats import train_splat
 
     with stages() as move:
 
@@ -280,7 +280,7 @@ def train_splats(
 
 def summary(result: TrainResult | SplatTrainResult) -> str:
     """One line of figures: time, steps, voxels or splats, PSNR raw and color-corrected, SSIM, worst view."""
-    from cagefield.fields.voxel import VoxelField
+    from cagefield.fields.voxel_field import VoxelField
 
     field = result.field
     size = f"{len(field.vertices)} voxels" if isinstance(field, VoxelField) else f"{len(field)} splats"

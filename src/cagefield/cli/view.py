@@ -12,7 +12,7 @@ import tyro
 
 from cagefield.cli.options import Device, Flag
 from cagefield.errors import CagefieldError
-from cagefield.regular_files import read_bytes
+from cagefield.files.safe_open import read_bytes
 
 
 @dataclass(frozen=True)

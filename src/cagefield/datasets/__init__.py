@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from cagefield.datasets.dataset import Dataset, View, load_dataset
+from cagefield.datasets.dataset_loader import Dataset, View, load_dataset
 
 __all__ = ["Dataset", "View", "load_dataset"]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.datasets.normalisation import Similarity, all_cameras
+from cagefield.datasets.nerf_normalization import Similarity, all_cameras
 from cagefield.datasets.notices import warn
 from cagefield.datasets.views import Dataset
 

@@ -17,17 +17,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.cameras import Camera
-from cagefield.datasets.captures import Size, stored_camera, unbounded_capture, uniform_size, warn_of_scaling
-from cagefield.datasets.colmap import find_model, lenses_of, pose_of, read_model, sparse_points
-from cagefield.datasets.colmap_lenses import LensView, report_resampled
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.capture_dataset import (
+    Size,
+    stored_camera,
+    unbounded_capture,
+    uniform_size,
+    warn_of_scaling,
+)
+from cagefield.datasets.colmap.colmap_lenses import LensView, report_resampled
+from cagefield.datasets.colmap.colmap_model import find_model, lenses_of, pose_of, read_model, sparse_points
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photo_names import photo_files
 from cagefield.datasets.photos import FULL_SIZE_FOLDERS, choose_downscale, photo_folders, read_header
-from cagefield.datasets.region import cube_of_interest, levelling_rotation
+from cagefield.datasets.scene_bounds import cube_of_interest, levelling_rotation
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.errors import CameraError, DatasetError
-from cagefield.npz import read_array
+from cagefield.files.npz import read_array
 
 FloatArray = npt.NDArray[np.float64]
 

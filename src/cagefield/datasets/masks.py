@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.images import read_image
+from cagefield.images.image_files import read_image
 
 Excluded = Literal["black", "white"]
 BoolArray = npt.NDArray[np.bool_]

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from PIL import Image
 
 from cagefield.errors import DatasetError
-from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
-from cagefield.rendering.images import DAMAGED, load_whole, opened_picture, reason_of, tiles
-from cagefield.rendering.picture_formats import EFFICIENT_FORMATS
+from cagefield.images.color_conversion import conversion_of, has_alpha, rgb_converter
+from cagefield.images.image_files import DAMAGED, load_whole, opened_picture, reason_of, tiles
+from cagefield.images.image_formats import EFFICIENT_FORMATS
 
 EXTENSIONS = (
     ".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif", ".hif", ".avif", ".exr",

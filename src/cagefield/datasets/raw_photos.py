@@ -18,9 +18,9 @@ from cagefield.datasets.hidden_files import MASK_FOLDER, is_hidden
 from cagefield.datasets.natural_order import natural_key
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.errors import DatasetError
-from cagefield.rendering.color_conversion import conversion_of, has_alpha, rgb_converter
-from cagefield.rendering.images import load_whole, opened_picture
-from cagefield.rendering.picture_formats import EFFICIENT_FORMATS
+from cagefield.images.color_conversion import conversion_of, has_alpha, rgb_converter
+from cagefield.images.image_files import load_whole, opened_picture
+from cagefield.images.image_formats import EFFICIENT_FORMATS
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".m2ts", ".mpg", ".mpeg")
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.errors import DatasetError
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.datasets.masks import read_mask, resample_mask, shrink_mask
 from cagefield.datasets.notices import warn
 from cagefield.datasets.photos import read_header, read_photo

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cagefield.edits.edit import Edit
-from cagefield.edits.files import dump_edits, load_edits, parse_edits, save_edits
+from cagefield.edits.edit_files import dump_edits, load_edits, parse_edits, save_edits
 from cagefield.edits.operations import (
     MoveCorner,
     MoveCorners,

@@ -12,23 +12,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cagefield.cage_checks import format_vector
-from cagefield.cages import Axes, Cage, outside_by
 from cagefield.edits import operations as ops
-from cagefield.edits.limits import as_text, flow_reach, largest_safe
-from cagefield.edits.names import problem_of_name
+from cagefield.edits.edit_names import problem_of_name
+from cagefield.edits.operation_sequence import ImpossibleOperationError, cages_along, problem_of_count
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import FEATHER, Adjustment, Fill, Relight, problem_of_options
+from cagefield.edits.paste_paths import problem_of_source
 from cagefield.edits.patch import Pasted, Patch, SplatPatch
-from cagefield.edits.sequence import ImpossibleOperationError, cages_along, problem_of_count
-from cagefield.edits.sources import problem_of_source
+from cagefield.edits.safe_fraction import as_text, flow_reach, largest_safe
 from cagefield.errors import CageError, DeviceError, EditError
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Axes, Cage, outside_by
+from cagefield.geometry.cage_checks import format_vector
 from cagefield.typing import Array
 from cagefield.warps import SHELLS, Falloff, FlowShell, Shell, Warp
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.discrete import DiscreteWarp
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
 AT_ONCE = 500
@@ -75,7 +75,7 @@ class Edit:
       then a cage in that scene's space, which the operations take to where it stands in this one. Relative
       to the folder of this scene, or absolute. See `Edit.paste`.
     - patch: of a discrete edit, what the field that it was made for shows where something was taken away
-      (`cagefield.patches`); no part of edit files, as `pasted`, what a paste shows there.
+      (`cagefield.completion`); no part of edit files, as `pasted`, what a paste shows there.
 
     Raises `EditError` for impossible combinations and operations; cages that do not fit together and folded
     shells are reported by `check`, which every evaluation calls.
@@ -252,7 +252,7 @@ class Edit:
         if self.lattice is None or not isinstance(exact, ContinuousWarp):
             return exact
         if isinstance(exact.shell, FlowShell):
-            from cagefield.warps.edit_lattice import lattice_of
+            from cagefield.edits.device.edit_lattice import lattice_of
 
             with suppress(DeviceError):
                 return replace(exact, lattice=lattice_of(self))
@@ -307,7 +307,7 @@ class Edit:
         if nodes is None or not isinstance(warp, ContinuousWarp):
             return 0.0, 0.0
         # The kernel's, which takes no time: float32's rounding is far below the lattice's error.
-        from cagefield.warps.edit_lattice import lattice_of
+        from cagefield.edits.device.edit_lattice import lattice_of
 
         lattice = lattice_of(self.replace(lattice=nodes))
         points, distances = warp.shell_points(samples), [np.zeros(0)]

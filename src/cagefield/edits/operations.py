@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cage_checks import factors, vector
-from cagefield.cages import FACES, Axes, Cage
+from cagefield.geometry.cage import FACES, Axes, Cage
+from cagefield.geometry.cage_checks import factors, vector
 
 Triple: TypeAlias = tuple[float, float, float]
 

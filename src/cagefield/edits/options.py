@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from cagefield.cages import Cage
+from cagefield.geometry.cage import Cage
 from cagefield.warps import FALLOFFS, SHELLS
 
 Adjustment: TypeAlias = Literal["continuous", "discrete"]

@@ -1,6 +1,6 @@
 """What takes the place of the field where a discrete edit took something away, or brought something in.
 
-A patch belongs to an edit and to the field that it was made for (`cagefield.patches`); it is no part of an
+A patch belongs to an edit and to the field that it was made for (`cagefield.completion`); it is no part of an
 edit file. It is read in deformed space of the edits before its own.
 """
 
@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.cages import Cage
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Float32, Mask
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Layers (`fields.layers`) of the field that an edit was made for.
+    """Layers (`fields.voxel_layers`) of the field that an edit was made for.
 
     Attributes:
         region: outside of V, samples in this cage read `under`; it holds V^c.

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from cagefield.edits.edit import Edit, bounds_of
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
-from cagefield.fields.layers import places_of
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.fields.voxel_layers import places_of
 from cagefield.typing import Array, Mask
 
 
@@ -124,7 +124,7 @@ class EditStack:
 
     @property
     def places(self) -> tuple[int, ...]:
-        """The places of the layers (`fields.layers`)."""
+        """The places of the layers (`fields.voxel_layers`)."""
         return places_of(self.layers)
 
     @property

@@ -1,7 +1,7 @@
 """A scene as other programs want it: splats, a mesh or points, its edits baked in.
 
 Splats of a scene of splats are its own, moved by its edits. To any other field splats are fitted
-(`training.splat_fitting`): they are trained on the scene's own pictures, edits and all.
+(`training.splats.fit_splats`): they are trained on the scene's own pictures, edits and all.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera, turntable
+from cagefield.cameras.camera import Camera, turntable
 from cagefield.edits import EditStack
-from cagefield.edits.files import load_edits, parse_edits
+from cagefield.edits.edit_files import load_edits, parse_edits
 from cagefield.errors import CagefieldError, EditError
 from cagefield.fields.baking import bake
 from cagefield.fields.meshing import Mesh, mesh_of
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.baked_splats import baked_splats
+from cagefield.fields.sh_rotation import turned_sh
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.cage import Cage
 from cagefield.rendering.edited_field import EditedField, edited_bounds
-from cagefield.scene import Scene
-from cagefield.sh_rotation import turned_sh
-from cagefield.training.splat_config import SplatConfig
+from cagefield.rendering.splats.bake_splats import baked_splats
+from cagefield.scene.scene import Scene
+from cagefield.training.splats.splat_config import SplatConfig
 
 if TYPE_CHECKING:
-    from cagefield.training.splat import SplatTrainResult
-    from cagefield.training.splat_fitting import Surface
+    from cagefield.training.splats.fit_splats import Surface
+    from cagefield.training.splats.train_splats import SplatTrainResult
 
 MOST_SPLATS = 300_000
 """Splats that are fitted at most, unless more are asked for."""
@@ -64,8 +64,8 @@ def fitted_splats(
 
     Raises CagefieldError where nothing of the field can be seen.
     """
-    from cagefield.training.splat_fitting import fit_splats
-    from cagefield.training.splat_run import most_splats
+    from cagefield.training.splats.fit_splats import fit_splats
+    from cagefield.training.splats.splat_run import most_splats
 
     cameras, held_out = fitting_cameras(scene)
     config = replace(config, splats=config.splats or min(MOST_SPLATS, most_splats(cameras, config)))
@@ -167,7 +167,7 @@ def scene_mesh(
 
 def scene_points(scene: Scene, count: int, on_stage: OnStage) -> Surface:
     """At most `count` points of an edited scene's surface, drawn evenly from what its cameras see."""
-    from cagefield.training.splat_fitting import surface_seen
+    from cagefield.training.splats.fit_splats import surface_seen
 
     cameras, _ = fitting_cameras(scene)
     return surface_seen(scene.renderer, cameras, count, on_stage=on_stage)

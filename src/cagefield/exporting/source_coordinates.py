@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from cagefield.errors import CagefieldError
 from cagefield.fields.meshing import Mesh
-from cagefield.fields.splat import NO_OFFSET, Offset, SplatField
-from cagefield.formats.splat_table import SplatBatch
-from cagefield.formats.splat_transform import transformed
-from cagefield.scene import Scene
+from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
+from cagefield.formats.splats.splat_table import SplatBatch
+from cagefield.formats.splats.transform import transformed
+from cagefield.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from cagefield.training.splat_fitting import Surface
+    from cagefield.training.splats.fit_splats import Surface
 
 FloatArray = NDArray[np.float64]
 

@@ -25,13 +25,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
+from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.contraction import contract, uncontract
 from cagefield.fields.protocol import Field
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.quaternions import rotation_matrices
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import AnyArray, Float32
 
 BACK = 0.02

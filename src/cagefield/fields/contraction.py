@@ -22,7 +22,7 @@ Array = NDArray[np.floating]
 def contract(normalised: Array) -> Array:
     """Contracted positions [N,3] of normalised positions [N,3]; exact identity where max|q_i| <= 1.
 
-    The oracle of `rendering.kernels.grid.contract`.
+    The oracle of `rendering.voxels.kernels.grid.contract`.
     """
     m = np.maximum(np.abs(normalised).max(axis=-1, keepdims=True), 1.0)
     return np.where(m <= 1.0, normalised, (2.0 - 1.0 / m) / m * normalised)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 
 MARGIN = 0.05
 """A picture reaches this share of its size over its edges here, for what is interpolated there."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Float32
 
 HALF = float(np.log(2.0))

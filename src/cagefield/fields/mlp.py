@@ -1,4 +1,5 @@
-"""The networks of a NeRF as arrays: layers, and how they fit together; see `fields.nerf` for the notation."""
+"""The networks of a NeRF as arrays: layers, and how they fit together; see `fields.nerf_field` for the
+notation."""
 
 from __future__ import annotations
 

@@ -7,11 +7,11 @@ import re
 from pathlib import Path
 from typing import Any
 
-from cagefield import json_text
 from cagefield.errors import FieldError
-from cagefield.fields.files import read_tensors, write_tensors
+from cagefield.fields.field_files import read_tensors, write_tensors
 from cagefield.fields.mlp import Linear, Mlp
-from cagefield.fields.nerf import NerfField
+from cagefield.fields.nerf_field import NerfField
+from cagefield.files import json_text
 
 KIND = "NerfField"
 FORMAT_VERSION = "1"

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 from torch.nn.functional import linear
 
-from cagefield import devices
+from cagefield.compute import devices
 
 if TYPE_CHECKING:
     from cagefield.fields.mlp import Linear, Mlp, NerfParameters

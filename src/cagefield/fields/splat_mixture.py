@@ -42,9 +42,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import sh as spherical_harmonics
 from cagefield.errors import FieldError
-from cagefield.quaternions import rotation_matrices
+from cagefield.fields import sh as spherical_harmonics
+from cagefield.geometry.quaternions import rotation_matrices
 from cagefield.typing import Float32
 
 MAX_OPACITY = 0.99

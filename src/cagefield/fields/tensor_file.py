@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from cagefield import json_text
+from cagefield.files import json_text
 from cagefield.typing import AnyArray
 
 _MOST_HEADER = 1 << 20

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from cagefield.atomic_files import replaced_file
 from cagefield.errors import FieldError
 from cagefield.fields.meshing import Mesh
-from cagefield.fields.splat import NO_OFFSET, Offset
-from cagefield.rendering.render_result import to_uint8
+from cagefield.fields.splat_field import NO_OFFSET, Offset
+from cagefield.files.atomic import replaced_file
+from cagefield.images.render_result import to_uint8
 
 MESH_SUFFIXES = (".ply", ".glb")
 _PLY_TYPES = {"u1": "uchar", "<f4": "float", "<f8": "double"}

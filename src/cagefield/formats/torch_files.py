@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cagefield.errors import FieldError
-from cagefield.regular_files import UnreadableError, check_regular
+from cagefield.files.safe_open import UnreadableError, check_regular
 
 
 def read_tensors_of(path: Path) -> dict[str, Any]:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cagefield.cameras import Camera
-from cagefield.fields.nerf import NerfField
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.metrics import psnr
-from cagefield.rendering.render_result import Background, background_rgb
+from cagefield.cameras.camera import Camera
+from cagefield.fields.nerf_field import NerfField
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.metrics import psnr
+from cagefield.images.render_result import Background, background_rgb
 
 if TYPE_CHECKING:
-    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import Renderer
 
 PIXELS = 2500
 """Pixels compared in each view, on a regular grid; of splats all."""
@@ -25,7 +25,7 @@ def agreement(
     original: NerfField | SplatField, voxels: VoxelField, cameras: Sequence[Camera], background: Background
 ) -> float:
     """PSNR in dB of the voxels' pictures against the original's, unedited; the mean over the cameras."""
-    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import Renderer
 
     behind = background_rgb(background) or (0.0, 0.0, 0.0)
     renderer = Renderer(voxels)
@@ -39,7 +39,7 @@ def agreement(
 def _against_splats(
     original: SplatField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
 ) -> list[float]:
-    from cagefield.rendering.splat_renderer import SplatRenderer
+    from cagefield.rendering.splats.splat_renderer import SplatRenderer
 
     splats = SplatRenderer(original)
     scores = []
@@ -53,7 +53,7 @@ def _against_splats(
 def _against_nerf(
     original: NerfField, renderer: Renderer, cameras: Sequence[Camera], behind: tuple[float, float, float]
 ) -> list[float]:
-    from cagefield.rendering.nerf import Rays, trace
+    from cagefield.rendering.nerf.nerf_renderer import Rays, trace
 
     scores = []
     for camera in cameras:

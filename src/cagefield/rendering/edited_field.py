@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.edits import EditStack
+from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.fields.protocol import Field
 from cagefield.typing import Array, Float32
-from cagefield.warps.device_stack import DeviceStack
 
 
 @dataclass(frozen=True, eq=False)

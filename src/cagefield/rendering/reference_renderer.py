@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.protocol import Field
+from cagefield.images.render_result import Background, RenderResult
 from cagefield.rendering.compositing import composite
-from cagefield.rendering.render_result import Background, RenderResult
 from cagefield.typing import Float32
 
 NORMAL_WEIGHT = 1e-4

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
 
 if TYPE_CHECKING:
-    from cagefield.rendering.renderer import Renderer
-    from cagefield.rendering.splat_renderer import SplatRenderer
+    from cagefield.rendering.splats.splat_renderer import SplatRenderer
+    from cagefield.rendering.voxels.voxel_renderer import Renderer
 
     AnyRenderer = Renderer | SplatRenderer
 
@@ -23,9 +23,9 @@ def renderer_of(
     Raises EditError where an edit cannot be evaluated, DeviceError where no device starts.
     """
     if isinstance(field, SplatField):
-        from cagefield.rendering.splat_renderer import SplatRenderer
+        from cagefield.rendering.splats.splat_renderer import SplatRenderer
 
         return SplatRenderer(field, edits, preserve_opacity=preserve_opacity)
-    from cagefield.rendering.renderer import Renderer
+    from cagefield.rendering.voxels.voxel_renderer import Renderer
 
     return Renderer(field, edits, preserve_opacity=preserve_opacity)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import json_text
-from cagefield.atomic_files import replaced_file
 from cagefield.errors import CagefieldError
-from cagefield.npz import read_arrays
+from cagefield.files import json_text
+from cagefield.files.atomic import replaced_file
+from cagefield.files.npz import read_arrays
 
 
 def write_checkpoint(

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.datasets.views import View
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.metrics import WINDOW, color_corrected, psnr, ssim
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.metrics import WINDOW, color_corrected, psnr, ssim
 from cagefield.typing import AnyArray, Float32
 
 

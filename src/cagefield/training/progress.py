@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from cagefield.errors import CagefieldError
-from cagefield.fields.voxel import VoxelField
+from cagefield.fields.voxel_field import VoxelField
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from cagefield.warps.interfaces import Mapped, Shell, Warp
 from cagefield.warps.trilinear_shell import TrilinearShell
 
 if TYPE_CHECKING:
-    from cagefield.cages import Cage
+    from cagefield.geometry.cage import Cage
 
 
 def _trilinear(inner: Cage, deformed: Cage, outer: Cage, _falloff: Falloff) -> Shell:

@@ -19,8 +19,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cagefield import trilinear_hex
-from cagefield.cages import Cage
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
 from cagefield.warps.extended_coordinates import Extended, slope_columns, straightened_slope
 from cagefield.warps.trilinear_bend import AXES, SIGNS, bend, bends, corner_slopes, stay_one_to_one
@@ -166,7 +166,7 @@ class Motion:
         along = v @ self.confines.inverse.T
         if not self.confines.is_affine:
             columns = slope_columns(self.confines.form, z.reshape(-1, 3).T)
-            along = trilinear_hex.solve(columns, along.reshape(-1, 3).T).T.reshape(z.shape)
+            along = hexahedron.solve(columns, along.reshape(-1, 3).T).T.reshape(z.shape)
         return z, along
 
     @property
@@ -216,7 +216,7 @@ class Motion:
 
 def may_bend(inner: Cage, corners: Array) -> Mask:
     """Mask [B] of the valid cages [B,8,3] that the inner cage can become with its bend one to one."""
-    C = trilinear_hex.coefficients(corners)
+    C = hexahedron.coefficients(corners)
     ends = bends(C, np.transpose(C[:, AXES], (0, 2, 1)))
     start = Extended.of(inner).bend
     if not (start.any() or ends.any()):

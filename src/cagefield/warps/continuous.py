@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.cages import Cage
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.interfaces import Mapped, Shell
 from cagefield.warps.lattice import Lattice
 

@@ -7,8 +7,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from cagefield import trilinear_hex
-from cagefield.cages import Cage
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.trilinear_bend import AXES, SIGNS, bends, bends_one_to_one, forms
 
@@ -29,7 +29,7 @@ class Extended:
     @lru_cache(maxsize=64)
     def of(cage: Cage) -> Extended:
         """The coordinates of a cage at rest."""
-        C = trilinear_hex.coefficients(cage.corners)
+        C = hexahedron.coefficients(cage.corners)
         F = np.ascontiguousarray(C[AXES].T)
         return Extended(C[0], F, bends(C[None], F[None])[0])
 
@@ -67,7 +67,7 @@ class Extended:
         """dxi/dx [N,3,3] at xi [N,3]; at a kink that of the side towards the cage's inside."""
         if self.is_affine:
             return np.broadcast_to(self.inverse, (len(xi), 3, 3))
-        return trilinear_hex.invert(straightened_slope(self.form, xi)) @ self.inverse
+        return hexahedron.invert(straightened_slope(self.form, xi)) @ self.inverse
 
     @cached_property
     def is_one_to_one(self) -> bool:
@@ -121,7 +121,7 @@ def _newton(form: Array, xi: Array, target: Array, enough: float) -> Array:
             )
         if len(rows) == 0:
             break
-        step = trilinear_hex.solve(slope_columns(form, x), residual)
+        step = hexahedron.solve(slope_columns(form, x), residual)
         trial = x - step
         new = _residual(form, trial, y)
         new_left = np.abs(new).max(axis=0)

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import devices
-from cagefield.devices import floats
-from cagefield.loops import deal_of
+from cagefield.compute import devices
+from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.devices import floats
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table
 from cagefield.warps.kernels.flow_lattice import (

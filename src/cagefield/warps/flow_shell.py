@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield.cage_checks import are_valid
-from cagefield.cages import Cage
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.cage_checks import are_valid
 from cagefield.typing import Array, Mask
 from cagefield.warps.cage_motion import TIMES, Motion, gaps, may_bend
 from cagefield.warps.extended_coordinates import Extended

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield.cages import Cage
-from cagefield.trilinear_hex import BITS
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.hexahedron import BITS
 from cagefield.typing import Array
 
 

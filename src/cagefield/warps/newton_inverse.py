@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cagefield import trilinear_hex
+from cagefield.geometry import hexahedron
 from cagefield.typing import Array
 
 STEPS = 40
@@ -34,7 +34,7 @@ def inverted(
         rows = np.flatnonzero((error > 1e-13 * size) & ~stuck)
         if len(rows) == 0:
             break
-        step = (trilinear_hex.invert(J[rows]) @ (back - points)[rows][:, :, None])[:, :, 0]
+        step = (hexahedron.invert(J[rows]) @ (back - points)[rows][:, :, None])[:, :, 0]
         trial = x[rows] - share[rows, None] * step
         new, slope = to_canonical(trial)
         left = np.linalg.norm(new - points[rows], axis=1)
@@ -42,4 +42,4 @@ def inverted(
         share[rows] = np.where(better, np.minimum(1.0, 4.0 * share[rows]), 0.25 * share[rows])
         rows = rows[better]
         x[rows], back[rows], J[rows], error[rows] = trial[better], new[better], slope[better], left[better]
-    return x, trilinear_hex.invert(J)
+    return x, hexahedron.invert(J)

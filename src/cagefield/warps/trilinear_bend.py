@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import hex_determinant, trilinear_hex
+from cagefield.geometry import hexahedron, hexahedron_determinant
 from cagefield.typing import Array, Mask
 
 BENDS = [3, 5, 6, 7]
@@ -130,7 +130,7 @@ def _are_one_to_one(form: Array) -> Mask:
     mask = (mixed.reshape(len(K), 8, 8) > 0.0).all(axis=(1, 2))
     rows = np.flatnonzero(mask)
     corners = SIGNS + np.einsum("nk,bki->bni", _products(SIGNS), K[rows])
-    mask[rows] = hex_determinant.are_positive(hex_determinant.determinant_coefficients(corners))
+    mask[rows] = hexahedron_determinant.are_positive(hexahedron_determinant.determinant_coefficients(corners))
     return np.asarray(mask)
 
 
@@ -173,7 +173,7 @@ def _products(xi: Array) -> Array:
     return np.stack([x * y, x * z, y * z, x * y * z], axis=-1)
 
 
-SIGNS = 2.0 * trilinear_hex.BITS - 1.0
+SIGNS = 2.0 * hexahedron.BITS - 1.0
 _x, _y, _z = SIGNS.T
 _0, _1 = np.zeros(8), np.ones(8)
 _CORNER_SLOPES = np.stack(

@@ -9,10 +9,10 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield import hex_determinant, trilinear_hex
-from cagefield.cages import Cage
+from cagefield.geometry import hexahedron, hexahedron_determinant
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.inner_map import map_hexahedron
+from cagefield.warps.hexahedron_map import map_hexahedron
 
 LEAST_RATIO = 1e-3
 """A shell whose determinant falls below this share of the canonical one counts as folded: the map to
@@ -69,35 +69,37 @@ class TrilinearShell:
         """
         C, D = self._determinants
         low, high = -1e3, float((_at_corners(D) / _at_corners(C)).min())
-        if hex_determinant.is_positive(D - high * (1.0 - 1e-3) * C):
+        if hexahedron_determinant.is_positive(D - high * (1.0 - 1e-3) * C):
             return high
         step = max(1e-3, 1e-3 * abs(high))
-        while not hex_determinant.is_positive(D - (high - step) * C) and high - step > low:
+        while not hexahedron_determinant.is_positive(D - (high - step) * C) and high - step > low:
             high, step = high - step, 2.0 * step
         low = high - step
         while high - low > 1e-3 * max(1.0, abs(high)):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if hex_determinant.is_positive(D - middle * C) else (low, middle)
+            low, high = (
+                (middle, high) if hexahedron_determinant.is_positive(D - middle * C) else (low, middle)
+            )
         return low
 
     def problem(self) -> str | None:
         """Why the shell is not one to one, or None."""
         C, D = self._determinants
-        if not hex_determinant.is_positive(C):
+        if not hexahedron_determinant.is_positive(C):
             side = SIDES[_worst(C)]
             return (
                 f"is folded before any operation, at side {side}: leave a gap between the cages on every"
                 " side, and turn the inner cage's axes towards the outer cage's"
             )
-        if not hex_determinant.is_positive(D - LEAST_RATIO * C):
+        if not hexahedron_determinant.is_positive(D - LEAST_RATIO * C):
             return f"folds at side {SIDES[_worst(D - LEAST_RATIO * C)]}"
         return None
 
     @cached_property
     def _determinants(self) -> tuple[Array, Array]:
         return (
-            hex_determinant.determinant_coefficients(self.canonical_hexahedra),
-            hex_determinant.determinant_coefficients(self.deformed_hexahedra),
+            hexahedron_determinant.determinant_coefficients(self.canonical_hexahedra),
+            hexahedron_determinant.determinant_coefficients(self.deformed_hexahedra),
         )
 
 
@@ -122,7 +124,7 @@ def _through(source: Array, target: Array, points: Array) -> tuple[Array, Array]
         slack = 1e-6 * (high - low).max()
         near = (best > 0.0) & ((points >= low - slack) & (points <= high + slack)).all(axis=1)
         rows = np.flatnonzero(near)
-        u, found = trilinear_hex.inverse(source[n], points[rows])
+        u, found = hexahedron.inverse(source[n], points[rows])
         violation = np.where(found, np.maximum(-u, u - 1.0).max(axis=1).clip(0.0), np.inf)
         better = violation < best[rows]
         best[rows[better]], side[rows[better]], coordinates[rows[better]] = violation[better], n, u[better]
@@ -141,7 +143,7 @@ def _nearest(hexahedra: Array, points: Array) -> tuple[NDArray[np.intp], Array]:
     """(hexahedron number [N], u [N,3]) of the node of a 9^3 net in each hexahedron nearest to each point."""
     g = np.linspace(0.0, 1.0, 9)
     u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
-    net = np.concatenate([trilinear_hex.points(h, u) for h in hexahedra])
+    net = np.concatenate([hexahedron.points(h, u) for h in hexahedra])
     nearest = np.array([int(np.argmin(((net - p) ** 2).sum(axis=1))) for p in points], dtype=np.intp)
     return nearest // len(u), u[nearest % len(u)]
 
@@ -158,7 +160,7 @@ def _turns() -> tuple[Array, NDArray[np.intp]]:
     """The 24 proper turns of the axes: signed permutation matrices [24,9] and corner orders [24,8]."""
     signs_of, orders = [], []
     for axes in permutations(range(3)):
-        for signs in 1 - 2 * trilinear_hex.BITS.astype(np.intp):
+        for signs in 1 - 2 * hexahedron.BITS.astype(np.intp):
             turn = np.eye(3)[list(axes)] * signs[:, None]
             if np.linalg.det(turn) > 0.0:
                 signs_of.append(turn.ravel())

@@ -1,7 +1,7 @@
 /**
- * The maps of an edit stack for one sample, as `cagefield.warps.kernels.edit_maps` has them.
+ * The maps of an edit stack for one sample, as `cagefield.edits.device.kernels.edit_maps` has them.
  *
- * `rows` is the page's layout (see `cagefield.formats.page_edits`): for each edit 8 numbers of four, and two
+ * `rows` is the page's layout (see `cagefield.pages.page_edits`): for each edit 8 numbers of four, and two
  * hexahedra of 18. Shells come from lattices of halves, interpolated by hand: the GPU's own weights have 8 bits.
  */
 export const ROW = 44;

@@ -1,6 +1,6 @@
 /** Colour from spherical harmonics in RGBA textures of 8 bits: coefficient k of channel c is number 3 k + c. */
 
-/** The real spherical harmonics of the unit direction d, as `cagefield.sh.sh_basis`. */
+/** The real spherical harmonics of the unit direction d, as `cagefield.fields.sh.sh_basis`. */
 export const BASIS = [
   "0.28209479177387814",
   "-0.4886025119029199 * d.y",

@@ -1,10 +1,10 @@
-/** A level of a field as it comes over the wire (see `cagefield.formats.page_field`), unpacked. */
+/** A level of a field as it comes over the wire (see `cagefield.pages.page_field`), unpacked. */
 import { ByteReader, PageFile } from "./page_file";
 import type { OnArrival, Bytes } from "./page_file";
 
 export type Vec3 = [number, number, number];
 
-/** A grid of codes that rays leap by (see `cagefield.rendering.occupancy`), z fastest. */
+/** A grid of codes that rays leap by (see `cagefield.rendering.voxels.occupancy`), z fastest. */
 export interface Occupancy {
   origin: Vec3;
   dims: Vec3;

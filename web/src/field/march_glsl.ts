@@ -1,5 +1,5 @@
 /**
- * The fused march of `cagefield.rendering.kernels.march` as a fragment shader: the same samples at
+ * The fused march of `cagefield.rendering.voxels.kernels.march` as a fragment shader: the same samples at
  * t_in + (k + 1/2) h, leaps by whole steps, end at T <= 1e-3, contraction, clamps and normals.
  *
  * Textures have z of the field along their x. Names are those of the kernels.

@@ -1,4 +1,4 @@
-/** An edit stack as it comes over the wire (see `cagefield.formats.page_edits`). */
+/** An edit stack as it comes over the wire (see `cagefield.pages.page_edits`). */
 import { joined } from "./level";
 import type { Occupancy, Vec3 } from "./level";
 import { ByteReader, PageFile } from "./page_file";

@@ -1,4 +1,4 @@
-/** Files for pages as `cagefield.formats.page_file` writes them: a JSON header, and deflated arrays in order. */
+/** Files for pages as `cagefield.pages.page_file` writes them: a JSON header, and deflated arrays in order. */
 
 export type Bytes = Uint8Array<ArrayBuffer>;
 export type Numbers = Uint8Array | Uint16Array | Int32Array | Float32Array;

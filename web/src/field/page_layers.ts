@@ -1,4 +1,4 @@
-/** Layers of a field as they come over the wire (see `cagefield.formats.page_layers`), and how its index finds them. */
+/** Layers of a field as they come over the wire (see `cagefield.pages.page_layers`), and how its index finds them. */
 import { entryOf } from "./atlas";
 import type { Layout } from "./atlas";
 import { readValues } from "./level";

@@ -1,7 +1,7 @@
 import { WIDTH } from "./project_glsl";
 
 /**
- * Projected splats drawn over each other, far ones first, with the rule of `rendering.kernels.splat_blending`: alpha =
+ * Projected splats drawn over each other, far ones first, with the rule of `rendering.splats.kernels.blending`: alpha =
  * o exp(-q / 2), at most ALPHA_MAX, nothing below ALPHA_MIN. The kernel ends a tile where less than a thousandth of the
  * light comes through; here all splats are drawn.
  *

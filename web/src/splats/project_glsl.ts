@@ -1,5 +1,5 @@
 /**
- * Splats onto a picture, one texel each: `rendering.kernels.splat_projection.project` with the names it has there.
+ * Splats onto a picture, one texel each: `rendering.splats.kernels.projection.project` with the names it has there.
  *
  * A covariance is F F^T: F = R diag(s) of the field's splats, the Cholesky factor of changed ones. With N = M F, M the
  * derivative of the pixel by the point, the projected covariance is N N^T, and its determinant the square of the cross

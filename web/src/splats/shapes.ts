@@ -1,4 +1,4 @@
-/** Shapes of splats from how files tell them (see `cagefield.formats.page_splats`). */
+/** Shapes of splats from how files tell them (see `cagefield.pages.page_splats`). */
 
 /** The matrix, row by row, of three numbers as `page_splats.encode_rotations` writes them. */
 export function rotationOf(a: number, b: number, c: number): number[] {

@@ -1,4 +1,4 @@
-/** Splats that edits changed, as they come over the wire (see `cagefield.formats.page_splat_edits`). */
+/** Splats that edits changed, as they come over the wire (see `cagefield.pages.page_splat_edits`). */
 import { ByteReader, PageFile } from "../field/page_file";
 import { axesOf, covariancesOf } from "./shapes";
 import { meansOf, wholes } from "./splat_file";

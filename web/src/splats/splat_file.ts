@@ -1,4 +1,4 @@
-/** Splats as they come over the wire (see `cagefield.formats.page_splats`), packed as they lie on the GPU. */
+/** Splats as they come over the wire (see `cagefield.pages.page_splats`), packed as they lie on the GPU. */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import type { Bytes, OnArrival } from "../field/page_file";

@@ -1,6 +1,6 @@
 /**
  * Draws splats and what edits changed of them with the page's own GPU, with the methods of `FieldRenderer`. Pictures are
- * those of `rendering.splat_rasterizer`.
+ * those of `rendering.splats.rasterizer`.
  *
  * The order of many splats comes from a worker: while the view is turned a picture has the order of a moment ago, and
  * `onOrder` says when it is worth drawing again; edits are sorted before they are shown (`prepare`).

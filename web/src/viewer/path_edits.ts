@@ -1,4 +1,4 @@
-/** The edits along a camera path: states, and what lies between two of them (see `cagefield.formats.page_path`). */
+/** The edits along a camera path: states, and what lies between two of them (see `cagefield.pages.page_path`). */
 import { ROW } from "../field/edits_glsl";
 import { joined } from "../field/level";
 import type { Vec3 } from "../field/level";

@@ -1,4 +1,4 @@
-/** The edits of splats along a camera path (see `cagefield.formats.page_splat_path`). */
+/** The edits of splats along a camera path (see `cagefield.pages.page_splat_path`). */
 import type { Vec3 } from "../field/level";
 import { ByteReader, PageFile } from "../field/page_file";
 import { axesOf, covariancesOf, rotationOf } from "../splats/shapes";

@@ -15,8 +15,8 @@ import numpy as np
 
 from cagefield.benchmarking.peers.harmonic import HarmonicShell
 from cagefield.benchmarking.peers.mean_value import MeanValueShell
-from cagefield.cages import Cage
 from cagefield.errors import EditError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 
 

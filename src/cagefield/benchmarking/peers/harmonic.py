@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from cagefield.cages import Cage
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Int, Mask
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 from cagefield.warps.lattice import Lattice
 
 RESOLUTION = 65

@@ -16,10 +16,10 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield import trilinear_hex
-from cagefield.cages import FACES, Cage
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array, Int
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 
 _NEAR = 1e-7
 """Points nearer to a triangle's plane than this share of the mesh are taken three times as far beside it."""
@@ -169,9 +169,9 @@ class MeanValueShell:
     def _mesh(self) -> tuple[ClosedMesh, Array]:
         """The deformed shell's surface, and the displacement [V,3] to canonical space of its vertices."""
         (u, inner), (w, outer) = (cube_surface(splits) for splits in self.splits)
-        hole = trilinear_hex.points(self.inner.deformed.corners, u)
-        moved = trilinear_hex.points(self.inner.canonical.corners, u) - hole
-        vertices = np.concatenate([trilinear_hex.points(self.outer.corners, w), hole])
+        hole = hexahedron.points(self.inner.deformed.corners, u)
+        moved = hexahedron.points(self.inner.canonical.corners, u) - hole
+        vertices = np.concatenate([hexahedron.points(self.outer.corners, w), hole])
         mesh = ClosedMesh(vertices, np.concatenate([outer, inner[:, ::-1] + len(w)]))
         return mesh, np.concatenate([np.zeros_like(w), moved])
 

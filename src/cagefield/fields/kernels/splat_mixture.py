@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.compiling import njit
+from cagefield.compute.numba_cache import njit
 
 FAST: dict[str, Any] = {"error_model": "numpy", "cache": True, "nogil": True}
 

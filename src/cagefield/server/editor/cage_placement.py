@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from cagefield import trilinear_hex
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.errors import EditError
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
 
 SHARE_OF_VIEW = 0.22
@@ -40,7 +40,7 @@ def outer_around(edit: Edit, margin: float) -> Cage:
     u = (points - origin) @ np.linalg.inv(edges).T
     low, high = u.min(axis=0), u.max(axis=0)
     size = high - low
-    box = Cage(origin + edges @ low + (trilinear_hex.BITS * size) @ edges.T)
+    box = Cage(origin + edges @ low + (hexahedron.BITS * size) @ edges.T)
     return box.grown(margin)
 
 
@@ -48,7 +48,7 @@ def probes(cage: Cage) -> Array:
     """PROBES^3 points [N,3] of a cage, evenly spaced in its own coordinates, x fastest."""
     axis = (np.arange(PROBES) + 0.5) / PROBES
     z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-    return trilinear_hex.points(cage.corners, np.stack([x, y, z], axis=-1).reshape(-1, 3))
+    return hexahedron.points(cage.corners, np.stack([x, y, z], axis=-1).reshape(-1, 3))
 
 
 def fitted(cage: Cage, dense: Mask) -> Cage:
@@ -72,4 +72,4 @@ def fitted(cage: Cage, dense: Mask) -> Cage:
         hit = np.flatnonzero(kept.any(axis=tuple(a for a in range(3) if a != 2 - axis)))
         low[axis] = max(0.0, (hit[0] - 0.5) / PROBES)
         high[axis] = min(1.0, (hit[-1] + 1.5) / PROBES)
-    return Cage(trilinear_hex.points(cage.corners, low + trilinear_hex.BITS * (high - low)))
+    return Cage(hexahedron.points(cage.corners, low + hexahedron.BITS * (high - low)))

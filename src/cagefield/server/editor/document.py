@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import Operation
 from cagefield.errors import EditError
-from cagefield.keyframes import Keyframe
 
 COLOURS = ("#4cc2ff", "#ffb14c", "#7ee081", "#ff7eb6", "#c9a7ff", "#f4e04d", "#5ce0d0", "#ff8a66")
 """Colours of cage pairs."""

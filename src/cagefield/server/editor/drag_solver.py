@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from cagefield.cages import EDGES, FACES, Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
-from cagefield.edits.limits import largest_safe
 from cagefield.edits.operations import Operation, Triple
+from cagefield.edits.safe_fraction import largest_safe
 from cagefield.errors import CagefieldError, EditError
+from cagefield.geometry.cage import EDGES, FACES, Cage
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.pasting import cropped, why_not_cropped
 from cagefield.server.editor.validity import INSIDE_OUT, cause, problem

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from cagefield.cameras.keyframe_files import is_path
 from cagefield.edits import Edit, EditStack, dump_edits, parse_edits
 from cagefield.errors import CameraError
-from cagefield.keyframe_files import is_path
 from cagefield.server.editor.validity import problem
 
 

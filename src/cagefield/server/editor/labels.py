@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cagefield.edits.names import MOST_CHARACTERS
+from cagefield.edits.edit_names import MOST_CHARACTERS
 from cagefield.edits.operations import Operation
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Target

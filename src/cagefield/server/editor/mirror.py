@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cagefield.cages import FACES, Cage
 from cagefield.edits import Edit
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation, Triple
+from cagefield.geometry.cage import FACES, Cage
 from cagefield.typing import Array
 
 

@@ -11,11 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from cagefield.edits import Edit, EditStack
-from cagefield.edits.sources import relative, resolved
+from cagefield.edits.paste_paths import relative, resolved
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.fields.files import kind_of
-from cagefield.regular_files import real_path
-from cagefield.scene_files import FIELD, is_scene
+from cagefield.fields.field_files import kind_of
+from cagefield.files.safe_open import real_path
+from cagefield.scene.scene_files import FIELD, is_scene
 
 SPLATS = (".ply", ".splat", ".ksplat", ".spz", ".sog", ".glb", ".gltf")
 """Suffixes of files of splats."""

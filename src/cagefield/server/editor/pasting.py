@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cages import Cage
 from cagefield.edits import Edit
 from cagefield.edits.operations import Operation
-from cagefield.edits.placing import placed_paste
+from cagefield.edits.paste_placement import placed_paste
 from cagefield.errors import CageError, EditError
+from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
-from cagefield.warps.inner_map import HexahedronMap
+from cagefield.warps.hexahedron_map import HexahedronMap
 
 SHARE_OF_VIEW = 0.5
 """Longest edge of what is pasted, as a share of the picture's height at the surface it stands on."""

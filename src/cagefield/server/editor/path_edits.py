@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from cagefield.edits import Edit
-from cagefield.edits.partial import partial_edit
+from cagefield.edits.partial_edit import partial_edit
 from cagefield.errors import CagefieldError
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.validity import problem

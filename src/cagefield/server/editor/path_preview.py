@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cagefield.cameras.keyframes import Timeline
 from cagefield.edits import Edit
-from cagefield.keyframes import Timeline
 
 
 @dataclass(frozen=True)

@@ -14,25 +14,25 @@ import json
 import warnings
 from pathlib import Path
 
-from cagefield import json_text
-from cagefield.atomic_files import replaced_file
+from cagefield.cameras.keyframe_files import dump_path, load_keys
+from cagefield.cameras.keyframes import Keyframe
 from cagefield.edits import Edit, EditStack, parse_edits
-from cagefield.edits.files import MOST_EDITS, VERSION, save_edits
+from cagefield.edits.edit_files import MOST_EDITS, VERSION, save_edits
 from cagefield.errors import CagefieldError, SceneError
-from cagefield.fields.splat import SplatField
-from cagefield.keyframe_files import dump_path, load_keys
-from cagefield.keyframes import Keyframe
-from cagefield.leftovers import remove_leftovers, remove_unfinished
-from cagefield.regular_files import FileState, read_bytes, read_text, real_path
-from cagefield.scene import Scene
-from cagefield.scene_files import FIELD, field_states
+from cagefield.fields.splat_field import SplatField
+from cagefield.files import json_text
+from cagefield.files.atomic import replaced_file
+from cagefield.files.safe_open import FileState, read_bytes, read_text, real_path
+from cagefield.files.stale_files import remove_leftovers, remove_unfinished
+from cagefield.files.temporary_folders import remove_abandoned
+from cagefield.scene.scene import Scene
+from cagefield.scene.scene_files import FIELD, field_states
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.edit_texts import ReadEdits, file_values
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.editor.pasted_sources import absolute, admitted, source_in, sources_under, written
 from cagefield.server.editor.scene_lock import SceneLock
 from cagefield.server.editor.session import Session
-from cagefield.temporary_folders import remove_abandoned
 
 CAMERA_PATH = "camera_path.json"
 _EDITS = "edits.yaml"

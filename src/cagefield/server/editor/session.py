@@ -10,17 +10,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from cagefield.cages import Cage
+from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import Edit
-from cagefield.edits.files import MOST_EDITS
+from cagefield.edits.edit_files import MOST_EDITS
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import problem_of_lattices
 from cagefield.errors import EditError
-from cagefield.keyframes import Keyframe, Timeline
+from cagefield.geometry.cage import Cage
+from cagefield.server.editor.active_drags import Drags
 from cagefield.server.editor.cage_placement import outer_around, pair_around
 from cagefield.server.editor.document import Document, Entry
 from cagefield.server.editor.drag_solver import Moved, Target, move
-from cagefield.server.editor.drags import Drags
 from cagefield.server.editor.edit_kinds import Kind, with_kind, with_shell
 from cagefield.server.editor.edit_texts import ReadEdits, edits_in
 from cagefield.server.editor.history import History

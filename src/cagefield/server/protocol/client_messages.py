@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, TypeAdapter
 
-from cagefield.camera_paths import LEAST_FPS
+from cagefield.cameras.camera_paths import LEAST_FPS
 from cagefield.edits.options import LATTICE_RANGE
 from cagefield.server.editor.drag_solver import Target
 from cagefield.server.editor.edit_kinds import Kind

@@ -7,13 +7,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Keyframe, Timeline
 from cagefield.edits import operations as ops
 from cagefield.edits.operations import Operation
 from cagefield.edits.options import CastShadow
 from cagefield.errors import CameraError
-from cagefield.keyframes import Keyframe, Timeline
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.document import Entry
 from cagefield.server.editor.drag_solver import Moved, move_corners
 from cagefield.server.editor.edit_kinds import kind_of

@@ -15,8 +15,8 @@ from cagefield.server.editor.session import Session
 from cagefield.server.protocol import client_messages, common, server_messages
 from cagefield.server.render_queue import jobs
 from cagefield.server.render_queue.dispatcher import BackgroundTask
-from cagefield.server.render_queue.exports import Exports
 from cagefield.server.render_queue.jobs import Job
+from cagefield.server.render_queue.splat_downloads import Exports
 from cagefield.server.render_worker.tasks import (
     Answered,
     EndJobTask,

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol import server_messages
@@ -26,7 +26,6 @@ from cagefield.server.render_queue.dispatcher import BackgroundTask, Dispatcher,
 from cagefield.server.render_queue.patch_extent import PatchExtent
 from cagefield.server.render_queue.requests import EditsRequest, Request
 from cagefield.server.render_queue.splat_extent import spread
-from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import (
     EditsDone,
     Failed,
@@ -37,6 +36,7 @@ from cagefield.server.render_worker.tasks import (
     Task,
     values_of,
 )
+from cagefield.server.render_worker.view import Display
 
 
 @dataclass

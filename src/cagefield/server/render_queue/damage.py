@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.typing import Array
 
 Rect: TypeAlias = tuple[float, float, float, float]

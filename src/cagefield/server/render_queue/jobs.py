@@ -6,11 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield.atomic_files import recover_folder
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Still, stills
 from cagefield.errors import CagefieldError
-from cagefield.keyframes import Still, stills
-from cagefield.rendering.video_encoder import is_ours
+from cagefield.files.atomic import recover_folder
+from cagefield.images.video import is_ours
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
 from cagefield.server.protocol.common import JobKind

@@ -6,14 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
+from cagefield.completion.lighting.ambient_occlusion import REACHES, reaches_of
+from cagefield.completion.lighting.continuous_relighting import light_box
+from cagefield.completion.patcher import wants_light, wants_patch
+from cagefield.completion.surfaces.patch_bounds import EVERYWHERE, NOWHERE, patch_box
+from cagefield.completion.surfaces.splat_voxelization import coarsest_voxel
 from cagefield.edits import Edit
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.patches.bending import light_box
-from cagefield.patches.extent import EVERYWHERE, NOWHERE, patch_box
-from cagefield.patches.light import REACHES, reaches_of
-from cagefield.patches.patcher import wants_light, wants_patch
-from cagefield.patches.voxelised import coarsest_voxel
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
 from cagefield.typing import Array
 
 

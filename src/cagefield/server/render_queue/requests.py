@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cagefield.server.render_worker.pictures import Display, Region
+from cagefield.server.render_worker.view import Display, Region
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from cagefield.server.render_queue.damage import (
     union,
 )
 from cagefield.server.render_queue.requests import EditsRequest, Request
-from cagefield.server.render_worker.pictures import Display, Region
+from cagefield.server.render_worker.view import Display, Region
 
 MOST_UNSHOWN, MOST_MOVING = 2, 1
 """Pictures sent and not yet shown, at most, per page; and while something moves: another one would be older

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.fields.splat import SplatField
+from cagefield.fields.splat_field import SplatField
 
 SPREAD = 0.95
 """Share of a field's opacity in splats that reach no farther than `spread`."""

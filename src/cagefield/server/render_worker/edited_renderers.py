@@ -10,7 +10,7 @@ from cagefield.edits import Edit
 from cagefield.server.editor.identity_cache import IdentityCache
 
 if TYPE_CHECKING:
-    from cagefield.patches.patcher import Patcher
+    from cagefield.completion.patcher import Patcher
     from cagefield.rendering.renderers import AnyRenderer
 
 QUICK_LATTICE = 32

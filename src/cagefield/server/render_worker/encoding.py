@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from cagefield.rendering.render_result import RenderResult, to_uint8
+from cagefield.images.render_result import RenderResult, to_uint8
 from cagefield.server.protocol.common import View
 
 NOTHING = 65535

@@ -28,7 +28,7 @@ ROUNDS = 30
 
 def grid_lines(edit: Edit) -> list[list[list[float]]]:
     """Polylines, world units, in deformed space. Raises EditError where the edit cannot be evaluated."""
-    from cagefield.warps.device_stack import DeviceStack
+    from cagefield.edits.device.device_stack import DeviceStack
 
     if edit.outer is None or edit.adjustment != "continuous":
         return []

@@ -11,10 +11,10 @@ from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any
 
-from cagefield.atomic_files import merged_folder
-from cagefield.leftovers import remove_leftovers
-from cagefield.rendering.images import video_writer, write_png
-from cagefield.rendering.render_result import RenderResult
+from cagefield.files.atomic import merged_folder
+from cagefield.files.stale_files import remove_leftovers
+from cagefield.images.image_files import video_writer, write_png
+from cagefield.images.render_result import RenderResult
 from cagefield.server.render_worker.cancellation import GivenUpError
 from cagefield.server.render_worker.encoding import BEHIND
 from cagefield.server.render_worker.tasks import FrameTask

@@ -7,17 +7,17 @@ from collections.abc import Sequence
 
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.formats.page_edits import encode_changed_edits, for_page
-from cagefield.formats.page_field import encode_page_field
-from cagefield.formats.page_file import LEVEL, QUICK_LEVEL
-from cagefield.formats.page_splat_edits import encode_page_splat_edits
-from cagefield.formats.page_splats import encode_page_splats
-from cagefield.rendering.deformed_splats import changed_splats
-from cagefield.rendering.occupancy import Occupancy
-from cagefield.rendering.renderer import Renderer
-from cagefield.rendering.splat_splitting import split_of
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.pages.page_edits import encode_changed_edits, for_page
+from cagefield.pages.page_field import encode_page_field
+from cagefield.pages.page_file import LEVEL, QUICK_LEVEL
+from cagefield.pages.page_splat_edits import encode_page_splat_edits
+from cagefield.pages.page_splats import encode_page_splats
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splitting import split_of
+from cagefield.rendering.voxels.occupancy import Occupancy
+from cagefield.rendering.voxels.voxel_renderer import Renderer
 from cagefield.server.editor.identity_cache import IdentityCache
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
 from cagefield.server.render_worker.edited_renderers import EditedRenderers

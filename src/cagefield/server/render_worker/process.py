@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
-from cagefield.server.render_worker.lifeline import end_with_parent
+from cagefield.files.temporary_folders import TemporaryFolder
+from cagefield.server.render_worker.parent_watch import end_with_parent
 from cagefield.server.render_worker.tasks import Failed, Ready, Replaced, Result, Task
 from cagefield.server.render_worker.unused_memory import UnusedMemory
-from cagefield.temporary_folders import TemporaryFolder
 
 if TYPE_CHECKING:
-    from cagefield.scene import Scene
+    from cagefield.scene.scene import Scene
 
 TO_END = 10.0
 """Seconds that a process that has its scene may take to end: then it keeps the kernels that it compiled."""
@@ -49,12 +49,13 @@ def serve(
 ) -> None:
     """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`.
 
-    `files` are the states (`scene_files.field_states`) of the scene that is edited, and `background` its
+    `files` are the states (`scene.scene_files.field_states`) of the scene that is edited, and `background`
+    its
     colour; None for any scene, with its own.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
-    from cagefield import devices
+    from cagefield.compute import devices
     from cagefield.server.render_worker.renderer_cache import RendererCache
     from cagefield.server.render_worker.task_handlers import TaskHandlers
 
@@ -86,8 +87,8 @@ def _opened(connection: Connection, folder: str, files: object) -> Scene | None:
 
     None where the server has none, or has gone.
     """
-    from cagefield.scene import Scene
-    from cagefield.scene_files import field_states
+    from cagefield.scene.scene import Scene
+    from cagefield.scene.scene_files import field_states
 
     if files is None:
         return Scene.open(folder)

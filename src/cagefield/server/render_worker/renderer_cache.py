@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
-from cagefield.fields.splat import SplatField
-from cagefield.fields.voxel import VoxelField
-from cagefield.rendering.render_result import RenderResult
+from cagefield.fields.splat_field import SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.geometry.cage import Cage
+from cagefield.images.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
-from cagefield.scene import Scene
+from cagefield.scene.scene import Scene
 from cagefield.server.render_worker import encoding
 from cagefield.server.render_worker.cancellation import GivenUpError, Stop, giving_up
 from cagefield.server.render_worker.edited_renderers import EditedRenderers
-from cagefield.server.render_worker.pictures import Display, Region
 from cagefield.server.render_worker.tasks import (
     EditValues,
     PictureDone,
@@ -30,6 +29,7 @@ from cagefield.server.render_worker.tasks import (
     Stopped,
     WarmStage,
 )
+from cagefield.server.render_worker.view import Display, Region
 from cagefield.typing import Float32
 
 if TYPE_CHECKING:

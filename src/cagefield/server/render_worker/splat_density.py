@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cagefield.cages import Cage
-from cagefield.rendering.deformed_splats import DeformedSplats
+from cagefield.geometry.cage import Cage
+from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.server.editor.cage_placement import PROBES
 from cagefield.typing import Mask
 

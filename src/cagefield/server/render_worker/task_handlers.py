@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from cagefield.edits import Edit
-from cagefield.fields.splat import SplatField
-from cagefield.rendering.deformed_splats import deformed_splats
+from cagefield.fields.splat_field import SplatField
+from cagefield.rendering.splats.raster_splats import deformed_splats
 from cagefield.server.editor.cage_placement import probes
 from cagefield.server.render_worker.cancellation import GivenUpError, giving_up
 from cagefield.server.render_worker.encoding import picture_of, png
 from cagefield.server.render_worker.grid_lines import grid_lines
 from cagefield.server.render_worker.job_files import JobFiles
 from cagefield.server.render_worker.page_files import PageFiles
-from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.renderer_cache import RendererCache
 from cagefield.server.render_worker.splat_density import dense
 from cagefield.server.render_worker.tasks import (
@@ -37,6 +36,7 @@ from cagefield.server.render_worker.tasks import (
     Task,
     WarmTask,
 )
+from cagefield.server.render_worker.view import Display
 
 DENSE = 0.05
 """Optical depth of a voxel from which on it counts as dense."""

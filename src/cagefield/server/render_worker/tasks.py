@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, Literal, TypeAlias
 
-from cagefield.cages import Cage
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.keyframes import Still
 from cagefield.edits import Edit
-from cagefield.keyframes import Still
-from cagefield.server.render_worker.pictures import Display, Region
+from cagefield.geometry.cage import Cage
+from cagefield.server.render_worker.view import Display, Region
 
 
 class WarmStage(Enum):
@@ -156,7 +156,7 @@ class PageFieldTask:
 
 @dataclass(frozen=True)
 class PageEditsTask:
-    """Edits as a page's GPU draws them, of voxels without what the page `has` (see `formats.page_edits`).
+    """Edits as a page's GPU draws them, of voxels without what the page `has` (see `pages.page_edits`).
 
     Abandoned once the shared generation is past `generation`.
     """

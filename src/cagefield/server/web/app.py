@@ -25,9 +25,9 @@ from cagefield.server.render_queue.dispatcher import TooManyError
 from cagefield.server.render_worker.tasks import PageFieldTask, StillTask
 from cagefield.server.render_worker.unused_memory import giving_back
 from cagefield.server.web.security import Attempts, Guard
-from cagefield.server.web.threads import all_started
 from cagefield.server.web.uploads import OpenEditor, Reopen, TooLargeError
 from cagefield.server.web.websocket import attend
+from cagefield.server.web.worker_threads import all_started
 
 STATIC = Path(__file__).parent / "static"
 """The page as it was built."""
@@ -110,7 +110,7 @@ def application(
         return FileResponse(file, media_type="application/octet-stream", filename=file.name)
 
     async def camera_path(_: Request) -> Response:
-        from cagefield.keyframe_files import dump_path
+        from cagefield.cameras.keyframe_files import dump_path
 
         document = editor.coordinator.session.document
         try:

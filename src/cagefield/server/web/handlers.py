@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cagefield.cages import Cage
 from cagefield.edits import EditStack, dump_edits
 from cagefield.errors import CagefieldError
+from cagefield.geometry.cage import Cage
 from cagefield.server.editor.cage_placement import fitted
 from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.pasting import pasted
@@ -26,9 +26,9 @@ from cagefield.server.protocol.conversion import (
     view_height,
 )
 from cagefield.server.render_queue.coordinator import Coordinator, Page
-from cagefield.server.render_worker.pictures import Display
 from cagefield.server.render_worker.tasks import FitTask, GridTask, LookTask, Shown, SurfaceTask, values_of
-from cagefield.server.web.threads import in_thread
+from cagefield.server.render_worker.view import Display
+from cagefield.server.web.worker_threads import in_thread
 from cagefield.typing import Array
 
 Handler = Callable[[Any, Any], "Coroutine[Any, Any, None] | None"]

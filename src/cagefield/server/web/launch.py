@@ -18,15 +18,15 @@ import numpy as np
 import uvicorn
 
 import cagefield
-from cagefield.camera_paths import shared_up
-from cagefield.cameras import Camera
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.camera_paths import shared_up
 from cagefield.errors import CagefieldError
-from cagefield.fields.splat import SplatField
-from cagefield.formats.page_field import VERSION as FIELD_VERSION
-from cagefield.formats.splat_detection import LOD_META, META, splat_folder
-from cagefield.regular_files import MOST_TEXT, FileState, check_regular, read_text, real_path
-from cagefield.scene import Scene
-from cagefield.scene_files import field_states, is_scene, recover
+from cagefield.fields.splat_field import SplatField
+from cagefield.files.safe_open import MOST_TEXT, FileState, check_regular, read_text, real_path
+from cagefield.formats.splats.detection import LOD_META, META, splat_folder
+from cagefield.pages.page_field import VERSION as FIELD_VERSION
+from cagefield.scene.scene import Scene
+from cagefield.scene.scene_files import field_states, is_scene, recover
 from cagefield.server.editor.pasted_sources import source_problem
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.scene_lock import SceneLock
@@ -35,10 +35,10 @@ from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
-from cagefield.server.web.opening import LEFT_OUT, scene_of_file
 from cagefield.server.web.patience import PatientHttp
 from cagefield.server.web.patient_socket import PatientSocket
 from cagefield.server.web.security import Guard
+from cagefield.server.web.splat_file_scene import LEFT_OUT, scene_of_file
 from cagefield.server.web.tls import TlsHttp
 
 WAITING = 128

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import urlsplit
 
-from cagefield.caches import cache_root
-from cagefield.regular_files import UnreadableError, read_bytes
+from cagefield.files.safe_open import UnreadableError, read_bytes
+from cagefield.files.user_cache import cache_root
 
 _LEAST = 32
 """Characters of a token that is taken from a file of ours: those nobody guesses."""

@@ -9,11 +9,11 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 from cagefield.errors import CagefieldError
+from cagefield.files.temporary_folders import TemporaryFolder
 from cagefield.server.protocol import server_messages
 from cagefield.server.render_queue.coordinator import Coordinator
-from cagefield.server.render_worker.own_process import in_own_process
-from cagefield.server.web.opening import scene_of_file
-from cagefield.temporary_folders import TemporaryFolder
+from cagefield.server.render_worker.subprocess_task import in_own_process
+from cagefield.server.web.splat_file_scene import scene_of_file
 
 MOST_UPLOAD = 4 << 30
 """Largest file in bytes that a page may send: 17 million splats with harmonics of degree 3 as a PLY."""

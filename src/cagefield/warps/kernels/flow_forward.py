@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from cagefield.compiling import FAST, njit
+from cagefield.compute.numba_cache import FAST, njit
 from cagefield.warps.flow_table import HEADER, MOMENT
 
 f32, U = np.float32, np.uint64

@@ -2,8 +2,8 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.loops import Deal, dealt, turns
-from cagefield.quadrants import qd
+from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.quadrants import qd
 from cagefield.warps.flow_table import HEADER, MOMENT
 from cagefield.warps.kernels.flow_shell import flow_point
 from cagefield.warps.kernels.flow_velocity_simd import bend, inverse, newton, newton_twice, times, weight_at

@@ -6,7 +6,7 @@ oracle, and the mathematics, are in `flow_shell`.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.quadrants import qd
+from cagefield.compute.quadrants import qd
 from cagefield.warps.flow_table import HEADER, MOMENT
 from cagefield.warps.kernels.flow_velocity import rows_times, velocity
 

@@ -7,7 +7,7 @@ mathematics, are in `warps.flow_velocity`.
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.quadrants import qd
+from cagefield.compute.quadrants import qd
 
 vec3 = qd.math.vec3
 

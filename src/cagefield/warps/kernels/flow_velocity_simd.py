@@ -7,7 +7,7 @@ tables are those of `flow_table`; the same mathematics for one sample, in vector
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.quadrants import qd
+from cagefield.compute.quadrants import qd
 
 NEAR = 2e-5
 """Distances to the outer cage's faces, as shares of its half-width, are taken to be no less than this.

@@ -1,0 +1,145 @@
+"""What one discrete edit took away is filled, and light goes along: on a block of a voxel field's grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cagefield.completion.edit_context import UNSURE, VIEWS, Work, lit_by
+from cagefield.completion.inpainting.cloning import cloned
+from cagefield.completion.inpainting.end_caps import capped
+from cagefield.completion.inpainting.support_inpainting import rebuilt
+from cagefield.completion.lighting.ambient_occlusion import Ambience, Lighting
+from cagefield.completion.lighting.shadow_strength import strength_of
+from cagefield.completion.surfaces.footprint import Footprint, footprint_of
+from cagefield.completion.surfaces.grid_block import Block
+from cagefield.completion.surfaces.support_plane import Support
+from cagefield.completion.surfaces.visibility import Sight
+from cagefield.edits import Edit
+from cagefield.edits.options import Clone
+from cagefield.edits.patch import Patch
+from cagefield.edits.stack import EditStack
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.typing import Mask
+
+THROUGH = 3.0
+"""What is so much before what a camera shows, in voxels, is air."""
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What was worked out for a discrete edit.
+
+    before: the block as the edits below make it; under: with V^c emptied, filled and in its new light; inside
+    [X,Y,Z]: V^c; light: on all but the part, and part_light: on the part, None where these stay as they were;
+    support: what was filled, None where nothing was.
+    """
+
+    work: Work
+    under: Block
+    light: Lighting | None
+    part_light: Lighting | None
+    support: Support | None
+
+    @property
+    def before(self) -> Block:
+        return self.work.before
+
+    @property
+    def inside(self) -> Mask:
+        return self.work.inside
+
+    @cached_property
+    def emptied(self) -> Block:
+        """The block with V^c emptied, in its new light, before it is filled."""
+        return lit_by(self.work.emptied, self.light)
+
+
+def made_of(
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    sight: Sight | None = None,
+    preserve_opacity: bool = True,
+    after: VoxelField | None = None,
+) -> Made:
+    """What a discrete edit of a field makes of it, under the edits below; `ambience` None leaves the light.
+
+    A copy is not filled, as nothing is uncovered. Unless it is `settled`, the part casts no shadow where it
+    is moved to, and keeps the light that it had. A paste keeps that in any case, and takes nothing away;
+    `after` is the field with it, where the edit does not say that. What cameras did see, by their `sight` of
+    the field without edits, is not filled.
+    """
+    work = Work.of(field, below, edit, ambience, settled, preserve_opacity, after, sight)
+    lighting = part_light = footprint = support = None
+    lit = ambience if ambience is not None and ambience.shows else None
+    under, logs, strength = work.emptied, np.zeros(len(work.lit.points)), 1.0
+    found = work.support() if edit.source is None else None
+    if lit is not None:
+        if found is not None:
+            strength = strength_of(work, lit, found)
+        logs = strength * work.without_part(lit)
+        lighting = Lighting.of(under, work.lit, logs, work.apart)
+        under = lit_by(under, lighting)
+    if edit.fill == "surroundings" and not edit.keep_source:
+        support = found
+    if support is not None:
+        dark = work.lit.take(logs > UNSURE)
+        unsure = replace(dark, points=under.coordinates(dark.points))
+        footprint = footprint_of(support, work.part, work.close, unsure)
+    if footprint is not None and sight is not None:
+        footprint = footprint.without_air(
+            work.views(footprint.points(under), below, sight, -THROUGH) >= VIEWS
+        )
+        points = footprint.points(under)
+        known = work.known(points, below, sight, under, lighting) & ~edit.inner.contains(points)
+        footprint = footprint.without(known, work.part)
+    if footprint is None or not footprint.hole.any():
+        support = footprint = None
+    else:
+        under = rebuilt(under, _changed(footprint, under, lighting), work.inside)
+    if isinstance(edit.fill, Clone) and not edit.keep_source:
+        cages = edit.inner, edit.fill.source
+        under = cloned(under, below, cages, work.inside, work.surface, preserve_opacity)
+    if lit is not None and lighting is not None and work.settled:
+        cast, part_light = work.cast(under, footprint, lit, strength)
+        under = lit_by(under, cast)
+        lighting = lighting.plus(cast)
+    return Made(work, under, lighting, part_light, support)
+
+
+def _changed(footprint: Footprint, block: Block, light: Lighting | None) -> Footprint:
+    """The footprint that knows by how much the light on the columns around was changed."""
+    if light is None:
+        return footprint
+    changed = np.zeros(footprint.hole.shape)
+    changed[footprint.around] = light.at(block, footprint.points(block, footprint.around))
+    return replace(footprint, changed=changed)
+
+
+def patch_of(
+    field: VoxelField,
+    below: EditStack,
+    edit: Edit,
+    ambience: Ambience | None,
+    *,
+    settled: bool = True,
+    sight: Sight | None = None,
+    preserve_opacity: bool = True,
+) -> Patch:
+    """The patch of a discrete edit of a voxel field, as `made_of` works it out."""
+    made = made_of(
+        field, below, edit, ambience, settled=settled, sight=sight, preserve_opacity=preserve_opacity
+    )
+    changed = made.under.differs(made.before) | made.inside
+    region, under = made.under.around(changed, made.work.region)
+    whole = lit_by(made.before, made.part_light)
+    if settled and edit.source is None and edit.fill != "none" and not edit.deleted:
+        whole = capped(made.work, whole, made.part_light, below, sight)
+    part = made.work.shown_part(whole, made.under)
+    return Patch(region, under.layer(), None if part is None else part.layer())

@@ -1,0 +1,1 @@
+"""Inpainting of what an edit uncovers."""

@@ -1,0 +1,1 @@
+"""Light of edits: ambient occlusion, shadows, irradiance."""

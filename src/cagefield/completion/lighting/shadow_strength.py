@@ -1,0 +1,76 @@
+"""How strong a part's shade is on what it stands on: measured there, around it.
+
+`Ambience` is fitted to the whole field, to surfaces of all kinds, which light reaches in other ways. Around
+one part its shade is multiplied by the strength s that explains best how the photographed brightness g of its
+support goes down towards it,
+
+    g(p) = a + b . p + log o'(p) - s (log o'(p) - log o(p)),
+
+o the openness with the part, o' without it; a and b are the texture's, and so is what is left over.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cagefield.completion.edit_context import Work
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.surfaces.charbonnier import noise_of
+from cagefield.completion.surfaces.support_plane import NEAR, Support
+
+SPREAD = 0.3
+"""Standard deviation of strengths, about 1."""
+
+WEAK, STRONG = 0.5, 2.0
+"""Least and greatest strength."""
+
+SOME = 6000
+"""Surface elements that are looked at, at most."""
+
+ALONG = 0.9
+"""Least cosine between their normals and the support's."""
+
+DEEPEST = 0.8
+"""Shade (log) up to which photographs tell how bright it is."""
+
+ALIKE = 8.0
+"""Edge of cells in which texture is the same, voxels."""
+
+ROUNDS, HUBER = 6, 1.5
+"""Rounds of the fit; standard deviations of what is left over from which on that counts by its size."""
+
+
+def strength_of(work: Work, ambience: Ambience, support: Support, *, seed: int = 0) -> float:
+    """The strength of the shade of the part of `work` on its support: 1 where photographs say nothing."""
+    if work.sight is None or not len(work.gone.points):
+        return 1.0
+    near = np.flatnonzero(work.gone.distance(work.sight.surface.points, ambience.reach) < ambience.reach)
+    seen, bright = work.sight.surface.take(near), work.sight.bright[near]
+    at = work.before.coordinates(seen.points)
+    along, height = support.local(at)
+    on = np.flatnonzero((np.abs(height) < NEAR) & (seen.normals @ support.normal > ALONG))
+    if len(on) > SOME:
+        on = np.random.default_rng(seed).choice(on, SOME, replace=False)
+    seen, bright, along = seen.take(on), bright[on], along[on]
+    # The support faces one way, whatever its rough normals say.
+    ambience = replace(ambience, facing=None)
+    alone = ambience.log_light([work.others], seen)
+    shade = alone - ambience.log_light([work.others, work.gone], seen)
+    kept = (shade < DEEPEST) & ~work.edit.inner.contains(seen.points)
+    if kept.sum() < 3:
+        return 1.0
+    shade, along, bright = shade[kept], along[kept], (bright - alone)[kept]
+    # What is on one texture's patch, and what several cameras see, counts once.
+    share = len(np.unique(np.floor(along / ALIKE), axis=0)) / len(shade)
+    table = np.column_stack([-shade, np.ones(len(shade)), (along - along.mean(axis=0)) / np.ptp(along)])
+    weight, found = np.ones(len(shade)), np.array([1.0, float(np.median(bright + shade)), 0.0, 0.0])
+    for _ in range(ROUNDS):
+        left = bright - table @ found
+        noise = noise_of(left)
+        weight = share / np.maximum(1.0, np.abs(left) / (HUBER * noise)) / noise**2
+        normal = table.T @ (weight[:, None] * table) + np.diag([SPREAD**-2, 1e-9, 1.0, 1.0])
+        target = table.T @ (weight * bright) + np.array([SPREAD**-2, 0.0, 0.0, 0.0])
+        found = np.linalg.solve(normal, target)
+    return float(np.clip(found[0], WEAK, STRONG))

@@ -1,0 +1,1 @@
+"""Content pasted from other scenes."""

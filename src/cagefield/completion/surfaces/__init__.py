@@ -1,0 +1,1 @@
+"""Surfaces beside an edit: visibility, surfels, supports."""

@@ -1,0 +1,1 @@
+"""Compute runtimes: devices, kernels and their caches."""

@@ -1,0 +1,1 @@
+"""Structure from motion, and the verification of poses."""

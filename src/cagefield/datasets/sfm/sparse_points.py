@@ -1,0 +1,253 @@
+"""The points that a training starts from: a data set's own, triangulated ones, or random ones.
+
+A point that held-out photos alone see would let a training peek at them: `training_points` leaves it out, and
+points that are triangulated for a training come from its training photos alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.datasets.photos import read_header
+from cagefield.datasets.sfm.features import OnProgress
+from cagefield.datasets.sfm.triangulation import triangulate
+from cagefield.datasets.views import Dataset, SparsePoints, View
+from cagefield.errors import DatasetError
+from cagefield.files.atomic import replaced_file
+from cagefield.files.npz import read_arrays
+from cagefield.files.safe_open import open_regular
+from cagefield.files.stale_files import remove_unfinished
+from cagefield.files.user_cache import cache_root
+
+FloatArray = npt.NDArray[np.float64]
+Views = Literal["train", "all"]
+
+LEAST = 50
+"""Fewer points than these are none."""
+
+_VERSION = b"points 1"  # of the files; changes with what `triangulate` finds
+_SAMPLE = 1 << 16  # bytes hashed at the beginning and at the end of each photo
+_PHOTOS = 64  # whose pixels colour random points, at most
+_LEAST_OPAQUE = 128  # alpha below which a pixel of a cut-out shows no surface
+_FARTHEST = 20.0  # half-sizes of the cube of interest to the farthest random point
+_ROUNDS = 12
+_MOST_TRIED = 200_000  # random points in one round
+_PATIENCE = 4  # rounds of random points after which the halves may differ
+
+
+def points_of(
+    dataset: Dataset,
+    cache: Path | None = None,
+    *,
+    views: Views = "train",
+    on_progress: OnProgress | None = None,
+    seed: int = 0,
+) -> SparsePoints | None:
+    """The data set's points, else points triangulated from its poses; None, after one warning, without any.
+
+    `views` "train" takes no point that held-out photos alone see, and triangulates training photos alone;
+    "all" is for measuring. Triangulated points are kept in the folder `cache` under a name that changes with
+    photos, poses and seed, and read from there again; for None they are made each time.
+    """
+    known = training_points(dataset) if views == "train" else dataset.points
+    if known is not None and len(known) >= LEAST:
+        return known
+    used = dataset.train if views == "train" else (*dataset.train, *dataset.test, *_further(dataset))
+    file = None if cache is None else cache / f"points-{capture_key(used, seed)}.npz"
+    found = None if file is None else read_cached_points(file)
+    if found is None:
+        try:
+            found = triangulate(used, on_progress=on_progress, seed=seed)
+        except DatasetError as error:
+            warnings.warn(f"{dataset.path}: no points are made of the photos: {error}", stacklevel=2)
+            return None
+        if file is not None and found is not None:
+            write_cached_points(file, found)
+    if found is None or len(found) < LEAST:
+        count = 0 if found is None else len(found)
+        warnings.warn(
+            f"{dataset.path}: the photos give {count} points, too few to start from; poses may be wrong, or "
+            "the photos have no texture",
+            stacklevel=2,
+        )
+        return None
+    return found
+
+
+def training_points(dataset: Dataset) -> SparsePoints | None:
+    """The data set's points that at least two training views see, or all where nobody says who sees them."""
+    points = dataset.points
+    if points is None or not points.seen_by:
+        return points
+    names = {view.name for view in dataset.train}
+    return points.take(np.array([len(seen & names) >= 2 for seen in points.seen_by]))
+
+
+def random_points(dataset: Dataset, count: int, seed: int = 0) -> SparsePoints:
+    """`count` random positions that training views see, with the mean colour of the pixels there.
+
+    Bounded: uniform in the bounds, and for cut-outs nowhere that a photo shows as empty. Unbounded: half of
+    them uniform in the cube of interest, half around it, uniform in direction and in 1/distance from the
+    cube's faces to 20 times as far. Two views see each of them where the capture has such places, else one.
+    There may be fewer than `count`, where the views see little of that.
+    """
+    if count < 1:
+        raise DatasetError(f"count must be at least 1, got {count}")
+    rng = np.random.default_rng(seed)
+    photos = _Photos(dataset)
+    kept: list[FloatArray] = []
+    colours: list[FloatArray] = []
+    tried, within, total, least = 0, 0, 0, min(2, len(dataset.train))
+    for attempt in range(_ROUNDS):
+        yielded = max(total / tried, 1e-3) if tried else 0.5
+        candidates = _candidates(dataset, min(max(int(1.3 * count / yielded), 1000), _MOST_TRIED), rng)
+        tried += len(candidates)
+        seen, rgb = photos.look(candidates)
+        good = seen >= least
+        if least > 1 and not good.any() and attempt == 0:
+            least, good = 1, seen >= 1
+        kept.append(candidates[good])
+        colours.append(rgb[good])
+        inside = int(np.count_nonzero(_inside(dataset, candidates[good])))
+        within, total = within + inside, total + int(np.count_nonzero(good))
+        even = not dataset.unbounded or min(within, total - within) >= (count + 1) // 2
+        if total >= count and (even or attempt + 1 >= _PATIENCE):
+            break
+    if not total:
+        raise DatasetError(f"{dataset.path}: no camera sees the scene's bounds; check poses and bounds")
+    positions, rgb = np.concatenate(kept), np.concatenate(colours)
+    chosen = (
+        _half_each(_inside(dataset, positions), count) if dataset.unbounded else np.arange(min(count, total))
+    )
+    return SparsePoints(positions[chosen], np.rint(rgb[chosen]).astype(np.uint8))
+
+
+def points_cache() -> Path:
+    """The folder of triangulated points in the user's cache."""
+    return cache_root() / "points"
+
+
+def _inside(dataset: Dataset, positions: FloatArray) -> npt.NDArray[np.bool_]:
+    low, high = dataset.bounds
+    return np.asarray(np.all((positions >= low) & (positions <= high), axis=1))
+
+
+def _half_each(inside: npt.NDArray[np.bool_], count: int) -> npt.NDArray[np.intp]:
+    """Rows: half of `count` inside and half outside, or more of one kind where the other has too few."""
+    within, without = np.flatnonzero(inside), np.flatnonzero(~inside)
+    first = min(len(within), max(count // 2, count - len(without)))
+    return np.concatenate([within[:first], without[: count - first]])
+
+
+def _candidates(dataset: Dataset, count: int, rng: np.random.Generator) -> FloatArray:
+    low, high = dataset.bounds
+    if not dataset.unbounded:
+        return rng.uniform(low, high, (count, 3))
+    half = count // 2
+    directions = rng.standard_normal((count - half, 3))
+    directions /= np.abs(directions).max(axis=1, keepdims=True)  # to the faces of the cube [-1, 1]^3
+    far = directions / rng.uniform(1.0 / _FARTHEST, 1.0, (count - half, 1))
+    return np.concatenate([rng.uniform(low, high, (half, 3)), 0.5 * (low + high) + 0.5 * (high - low) * far])
+
+
+class _Photos:
+    """The pixels of some training photos, evenly among all."""
+
+    def __init__(self, dataset: Dataset) -> None:
+        step = max(1, -(-len(dataset.train) // _PHOTOS))
+        self._views = [(view.camera, view.load(), view.valid_pixels()) for view in dataset.train[::step]]
+
+    def look(self, points: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+        """How many photos see each point, 0 where one shows it as empty, and their mean colour [N,3]."""
+        seen = np.zeros(len(points), dtype=np.intp)
+        empty = np.zeros(len(points), dtype=bool)
+        summed = np.zeros((len(points), 3))
+        for camera, pixels, valid in self._views:
+            positions, depth = camera.project(points)
+            with np.errstate(invalid="ignore"):
+                inside = np.all((positions >= 0) & (positions < (camera.width, camera.height)), axis=1)
+            inside &= depth > 0 if camera.model != "opencv_fisheye" else np.isfinite(depth)
+            rows = np.flatnonzero(inside)
+            columns, lines = positions[rows].astype(np.intp).T
+            if valid is not None:
+                usable = valid[lines, columns]
+                rows, columns, lines = rows[usable], columns[usable], lines[usable]
+            found = pixels[lines, columns]
+            if found.shape[1] == 4:
+                empty[rows] |= found[:, 3] < _LEAST_OPAQUE
+            seen[rows] += 1
+            summed[rows] += found[:, :3]
+        return np.where(empty, 0, seen), summed / np.maximum(seen, 1)[:, None]
+
+
+def _further(dataset: Dataset) -> tuple[View, ...]:
+    """Validation views that are not test views too."""
+    known = {view.image_path for view in (*dataset.train, *dataset.test)}
+    return tuple(view for view in dataset.val if view.image_path not in known)
+
+
+def capture_key(views: Sequence[View], seed: int, version: bytes = _VERSION) -> str:
+    """Digest of photos, names, poses, lenses and seed."""
+    digest = hashlib.sha256(version + str(seed).encode())
+    for view in views:
+        header = read_header(view.image_path)
+        camera = repr((view.name, view.camera.to_dict(), view.downscale, header, view.source))
+        digest.update(camera.encode())
+        for file in (view.image_path, *(() if view.mask is None else (view.mask.path,))):
+            with open_regular(file) as stream:
+                digest.update(stream.read(_SAMPLE))
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(max(0, size - _SAMPLE))
+                digest.update(stream.read(_SAMPLE) + str(size).encode())
+    return digest.hexdigest()[:24]
+
+
+def write_cached_points(file: Path, points: SparsePoints) -> None:
+    """Writes the file whole or not at all; where the folder cannot be written to, nothing."""
+    names = sorted({name for seen in points.seen_by for name in seen})
+    numbers = {name: number for number, name in enumerate(names)}
+    flat = [sorted(numbers[name] for name in seen) for seen in points.seen_by]
+    remove_unfinished(file.parent)  # of any name: it has a digest's, that of a run which may not come again
+    try:
+        with replaced_file(file) as draft, draft.open("wb") as stream:
+            np.savez(
+                stream,
+                positions=points.positions,
+                rgb=points.rgb,
+                errors=np.full(len(points), np.nan) if points.errors is None else points.errors,
+                names=np.array(names, dtype=np.str_),
+                counts=np.array([len(seen) for seen in flat], dtype=np.int64),
+                seen=np.array([number for seen in flat for number in seen], dtype=np.int64),
+            )
+    except OSError:
+        return
+
+
+def read_cached_points(file: Path) -> SparsePoints | None:
+    """The points of a file; None where it is not there or damaged."""
+    try:
+        arrays = read_arrays(file)
+        names, counts, numbers = (arrays[name] for name in ("names", "counts", "seen"))
+        kinds = "".join(array.dtype.kind for array in (names, counts, numbers, arrays["positions"]))
+        if kinds != "Uiif" or any(array.ndim != 1 for array in (names, counts, numbers)):
+            return None
+        if len(counts) and (counts.min() < 0 or counts.max() > len(numbers)):
+            return None
+        if counts.sum() != len(numbers) or (len(numbers) and numbers.min() < 0):
+            return None
+        known, flat = names.tolist(), numbers.tolist()
+        seen = tuple(
+            frozenset(known[number] for number in flat[end - count : end])
+            for count, end in zip(counts.tolist(), np.cumsum(counts).tolist(), strict=True)
+        )
+        return SparsePoints(arrays["positions"], arrays["rgb"], seen, arrays["errors"])
+    except (OSError, ValueError, TypeError, KeyError, IndexError, OverflowError, DatasetError):
+        return None

@@ -1,0 +1,381 @@
+"""A data set of photos alone, or of a video: COLMAP's structure from motion, by pycolmap, on the CPU.
+
+The result is a folder in COLMAP's layout, which `load_dataset` reads: `images`, the photos that found their
+place, turned upright, and their `masks`; `sparse/0`, the model; `poses.json`, what it was made of, and why
+photos were left out.
+
+Everything on the way is in a work folder beside it (`NAME.work`: photos, and the database of features and
+matches), from which an interrupted run continues; it is removed at the end.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.colmap.colmap_files import check_whole
+from cagefield.datasets.colmap.colmap_lenses import lens_views
+from cagefield.datasets.colmap.colmap_model import pose_of
+from cagefield.datasets.raw_photos import RawPhoto
+from cagefield.datasets.sfm import disambiguation, features, moving_features
+from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.features import OnProgress, Photo
+from cagefield.datasets.sfm.matching import match
+from cagefield.datasets.sfm.raw_masks import VALID_FOLDER
+from cagefield.datasets.sfm.registration_report import Matches, reasons_left_out, verified_matches, why_none
+from cagefield.datasets.sfm.sfm_workspace import (
+    kept_work,
+    plainly_named,
+    prepare_work,
+    record_of,
+    remove_work,
+    work_folder,
+    work_photos,
+)
+from cagefield.datasets.transforms.transforms_writer import FILES, RECORD
+from cagefield.errors import DatasetError
+from cagefield.files import json_text
+from cagefield.files.atomic import recover_folder, replaced_folder
+from cagefield.files.safe_open import read_text
+
+MOST_FOR_ALL_PAIRS = 120
+"""Photos of which every pair is matched; of more, those that are near in order or look alike."""
+
+LONGER_SIDE = 1600
+"""Photos are shrunk to this many pixels for features."""
+
+MIN_STATIC_POINTS, MIN_STATIC_SHARE = 12, 0.15
+"""Points that place a photo, number and share, at least, where only those that stand still are left."""
+
+LEAST_SHARED = 12
+"""Photos that share a camera, from which on its lens has a second radial term: RADIAL, not SIMPLE_RADIAL.
+
+Both have square pixels: cameras that are held level do not tell their aspect from a stretched scene."""
+
+_FOCAL_GUESS = 1.2  # focal length over the longer side, where the camera wrote none
+
+
+@dataclass(frozen=True)
+class PosesReport:
+    """What became of the photos.
+
+    Attributes:
+        folder: the data set.
+        total: photos that there were, readable or not.
+        placed: photos that found their place.
+        points: sparse points.
+        error: mean reprojection error in pixels.
+        left_out: the other photos, and what was wrong with each.
+        moving: photos whose features on things that move were left out.
+    """
+
+    folder: Path
+    total: int
+    placed: int
+    points: int
+    error: float
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    moving: int = 0
+
+
+def make_poses(
+    source: Path,
+    target: Path,
+    *,
+    frames: int = 80,
+    masks: Path | None = None,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+) -> PosesReport:
+    """Writes the data set `target` of a folder of photos or a video; replaces what is there.
+
+    An interrupted run of the same photos continues from its work folder. `frames` are taken of a video.
+    Where masks exclude (those of the folder `masks`, else those beside the photos) there are no features; the
+    data set has them too.
+
+    Raises DatasetError where pycolmap is missing, where fewer than three photos find their place, and where
+    the disk is full: `target` is what it was, and the work folder stays.
+    """
+    features.engine()
+    record = record_of(source, frames, masks)
+    recover_folder(target, lambda folder: (folder / RECORD).is_file())
+    work = work_folder(target)
+    with kept_work(work):
+        report = _made(source, target, record, frames, masks, seed, on_progress)
+    remove_work(work)
+    features.share(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
+    return report
+
+
+def _made(
+    source: Path,
+    target: Path,
+    record: Mapping[str, Any],
+    frames: int,
+    masks: Path | None,
+    seed: int,
+    on_progress: OnProgress | None,
+) -> PosesReport:
+    work = work_folder(target)
+    prepare_work(work, record)
+    photos, unreadable = work_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
+    total = len(photos) + len(unreadable)
+    if len(photos) < 3:
+        reasons = "".join(f"; {name}: {reason}" for name, reason in list(unreadable.items())[:3])
+        raise DatasetError(f"{source}: {len(photos)} photos can be read, at least 3 are needed{reasons}")
+    names = plainly_named(photos, work)
+    database = work / "database.db"
+    cameras, shared = camera_guesses(photos)
+    listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
+    check_database(database, cameras, listed)
+    if not database.is_file():
+        features.create_database(database, cameras, listed)
+    plain_masks = work / "masks"
+    features.extract(
+        database,
+        work / "colmap",
+        names,
+        features=8192 if len(photos) <= 60 else 4096,
+        longer_side=LONGER_SIDE,
+        masks=plain_masks if plain_masks.is_dir() else None,
+        on_progress=features.share(on_progress, 0.1, 0.3),
+    )
+    few = len(photos) <= MOST_FOR_ALL_PAIRS
+    pairs = features.all_pairs(len(photos)) if few else features.likely_pairs(database, len(photos))
+    match(database, names, pairs, verify=True, seed=seed, on_progress=features.share(on_progress, 0.3, 0.7))
+    shared_matches = verified_matches(database, len(photos))
+    found = reconstruct(work, names, shared_matches, seed, features.share(on_progress, 0.7, 0.99))
+    models = found.models
+    if not models:
+        raise DatasetError(f"{source}: {why_none(photos, shared_matches)}")
+    model = models[0]
+    placed = {image_id - 1 for image_id in model.reg_image_ids()}
+    left_out = unreadable | reasons_left_out(photos, placed, models[1:], shared_matches)
+    if len(placed) < 3:
+        raise DatasetError(f"{source}: {why_none(photos, shared_matches)}")
+    report = PosesReport(
+        target,
+        total,
+        len(placed),
+        model.num_points3D(),
+        float(model.compute_mean_reprojection_error()),
+        left_out,
+        len(found.moving),
+    )
+    _write(model, photos, placed, target, record, report)
+    return report
+
+
+def is_made_of(target: Path, source: Path, frames: int = 80, masks: Path | None = None) -> bool:
+    """Whether the data set `target` was made of these photos, none of them changed since."""
+    try:
+        known = json_text.loads(read_text(target / RECORD))
+    except (OSError, ValueError):
+        return False
+    return isinstance(known, dict) and known.get("made_of") == record_of(source, frames, masks)
+
+
+def camera_guesses(photos: Sequence[RawPhoto]) -> tuple[list[Any], list[int]]:
+    """COLMAP's first guesses of the cameras, and each photo's: one for all of one size and focal length."""
+    pycolmap = features.engine()
+    groups, numbers = features.consecutive((p.width, p.height, p.focal) for p in photos)
+    cameras = []
+    for index, (width, height, focal) in enumerate(groups):
+        model = "RADIAL" if numbers.count(index) >= LEAST_SHARED else "SIMPLE_RADIAL"
+        guess = _FOCAL_GUESS * max(width, height) if focal is None else focal
+        camera = pycolmap.Camera.create_from_model_name(index + 1, model, guess, width, height)
+        camera.has_prior_focal_length = focal is not None
+        cameras.append(camera)
+    return cameras, numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstructions:
+    """Reconstructions by COLMAP, the one with the most photos first.
+
+    Attributes:
+        models: the reconstructions.
+        moving: numbers of photos whose features on things that move were removed.
+    """
+
+    models: list[Any]
+    moving: tuple[int, ...] = ()
+
+
+def reconstruct(
+    work: Path, names: Sequence[str], matches: Matches, seed: int, on_progress: OnProgress
+) -> Reconstructions:
+    """Reconstructions from the verified matches in `work`, without folds and without things that move.
+
+    Where photos show things that move, those without their features are taken if they place as many photos
+    and the matches that are left agree with them better.
+    """
+    mapping = features.share(on_progress, 0.0, 0.7)
+    models, database = unfolded_models(work, matches, seed, mapping)
+    if not models:
+        return Reconstructions(models)
+    matched = moving_features.read_features(database, len(names))
+    before = _cameras(models[0])
+    moving, photos = moving_features.moving_features(matched, before)
+    if len(photos) < moving_features.MIN_PHOTOS:
+        return Reconstructions(models)
+    copy = work / "static_features.db"
+    shutil.copyfile(database, copy)
+    pairs = moving_features.remove_features(copy, moving)
+    verifying = features.share(on_progress, 0.7, 0.8)
+    match(copy, names, pairs, verify=True, several=True, seed=seed, on_progress=verifying)
+    static = _map(work, copy, len(names), seed, features.share(on_progress, 0.8, 1.0), few_matches=True)
+    if not static or static[0].num_reg_images() < models[0].num_reg_images():
+        return Reconstructions(models)
+    left = moving_features.read_features(copy, len(names))
+    errors = [moving_features.capped_error(left, each) for each in (before, _cameras(static[0]))]
+    return Reconstructions(static, tuple(photos)) if errors[1] < errors[0] else Reconstructions(models)
+
+
+def _cameras(model: Any) -> dict[int, Camera]:
+    """Cameras of a reconstruction's photos, by number of the photo, in its world."""
+    return {number - 1: model_camera(model, model.image(number)) for number in model.reg_image_ids()}
+
+
+def model_camera(model: Any, image: Any) -> Camera:
+    """The camera of an image of a reconstruction, in its world."""
+    made = model.camera(image.camera_id)
+    lens = lens_views(made.model.name, tuple(made.params.tolist()), made.width, made.height)[0]
+    return lens.camera.with_c2w(pose_of(image))
+
+
+def unfolded_models(
+    work: Path, matches: Matches, seed: int, on_progress: OnProgress
+) -> tuple[list[Any], Path]:
+    """(reconstructions without pairs that only look alike, the most photos first; database of their pairs).
+
+    Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
+    these are left out, unless fewer photos, or with as many fewer points, come of it.
+    """
+    count, database = len(matches.counts), work / "database.db"
+    if not disambiguation.are_in_order(matches.counts):
+        return _map(work, database, count, seed, on_progress), database
+    far = disambiguation.far_pairs(matches.counts)
+    chain = _map(work, without_pairs(database, far), count, seed, features.share(on_progress, 0.0, 0.33))
+    false: set[tuple[int, int]] = set()
+    if chain:
+        relative = disambiguation.relative_rotations(database, chain[0], far)
+        false = disambiguation.contradicting(disambiguation.rotations_of(chain[0]), relative)
+    plain = _map(work, database, count, seed, features.share(on_progress, 0.33, 0.66))
+    if not false:
+        return plain, database
+    fewer = without_pairs(database, false)
+    pruned = _map(work, fewer, count, seed, features.share(on_progress, 0.66, 1.0))
+    return (pruned, fewer) if _size(pruned) >= _size(plain) else (plain, database)
+
+
+def _size(models: Sequence[Any]) -> tuple[int, int]:
+    """Photos, then points, of the first of the reconstructions."""
+    return (models[0].num_reg_images(), models[0].num_points3D()) if models else (0, 0)
+
+
+def without_pairs(database: Path, pairs: set[tuple[int, int]]) -> Path:
+    """A copy of the database without the verified matches of these pairs."""
+    copy = database.with_name("fewer_pairs.db")
+    shutil.copyfile(database, copy)
+    disambiguation.remove_pairs(copy, pairs)
+    return copy
+
+
+def _map(
+    work: Path, database: Path, count: int, seed: int, on_progress: OnProgress, few_matches: bool = False
+) -> list[Any]:
+    """The reconstructions, the one with the most photos first; `few_matches` are enough for a photo."""
+    pycolmap = features.engine()
+    options = pycolmap.IncrementalPipelineOptions(min_model_size=3, random_seed=seed, max_num_models=10)
+    options.mapper.random_seed = seed
+    options.triangulation.random_seed = seed
+    if few_matches:
+        options.min_num_matches = moving_features.MIN_MATCHES
+        options.mapper.abs_pose_min_num_inliers = MIN_STATIC_POINTS
+        options.mapper.abs_pose_min_inlier_ratio = MIN_STATIC_SHARE
+    out = work / "models"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    placed = [0]
+
+    def one_more() -> None:
+        placed[0] += 1
+
+    def start() -> None:
+        placed[0] = 2
+
+    def poll() -> None:
+        done = min(placed[0], count)
+        on_progress(done / count, f"{done} of {count} photos placed")
+
+    found = features.call(
+        pycolmap.incremental_mapping,
+        database,
+        work / "colmap",
+        out,
+        options=options,
+        initial_image_pair_callback=start,
+        next_image_callback=one_more,
+        poll=poll,
+    )
+    return sorted(found.values(), key=lambda m: (-m.num_reg_images(), -m.num_points3D()))
+
+
+def _write(
+    model: Any,
+    photos: Sequence[RawPhoto],
+    placed: set[int],
+    target: Path,
+    record: Mapping[str, Any],
+    report: PosesReport,
+) -> None:
+    """The data set, whole or not at all."""
+    for index in placed:
+        model.image(index + 1).name = photos[index].name
+    for image_id in [number for number in model.images if number - 1 not in placed]:
+        del model.images[image_id]
+    with replaced_folder(target, FILES) as draft:
+        for index in sorted(placed):
+            photo = photos[index]
+            _link(photo.path, draft / "images" / photo.name)
+            mask = work_folder(target) / VALID_FOLDER / f"{photo.name}.png"
+            if mask.is_file():
+                _link(mask, draft / "masks" / f"{photo.name}.png")
+        (draft / "sparse/0").mkdir(parents=True)
+        _write_model(model, draft / "sparse/0")
+        summary = {
+            "made_of": record,
+            "photos": report.total,
+            "placed": report.placed,
+            "points": report.points,
+            "reprojection_error": round(report.error, 4),
+            "left_out": dict(report.left_out),
+        }
+        (draft / RECORD).write_text(json.dumps(summary, indent=1), encoding="utf-8")
+
+
+def _link(file: Path, place: Path) -> None:
+    """Puts a file at another place too."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, place)
+    except OSError:
+        shutil.copy2(file, place)
+
+
+def _write_model(model: Any, folder: Path) -> None:
+    """Writes the files of a model. Raises OSError where they are cut off: COLMAP does not notice."""
+    with features.quiet():
+        model.write_binary(folder)
+    try:
+        check_whole(folder)
+    except DatasetError as error:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error

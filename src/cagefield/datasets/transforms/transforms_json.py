@@ -1,0 +1,115 @@
+"""Values of `transforms*.json` as programs write them: JSON with small faults, numbers in text, poses."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from cagefield.cameras.camera_checks import RIGID_TOLERANCE
+from cagefield.errors import DatasetError
+from cagefield.files import json_text
+from cagefield.files.safe_open import MOST_TEXT, read_bytes
+
+FloatArray = npt.NDArray[np.float64]
+
+_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+# A pattern without an end is taken to the end of the text, so that each character is looked at once.
+_STRING = r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\Z)'
+_COMMENTS = re.compile(_STRING + r"|//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_COMMAS = re.compile(_STRING + r"|,(?=\s*[}\]])", re.DOTALL)
+
+
+def read_json(path: Path, most: int = MOST_TEXT, wanted: str = "with the key 'frames'") -> dict[str, Any]:
+    """The object of a JSON file of at most `most` bytes, in UTF-8, or UTF-16 with its mark.
+
+    Comments and last commas are passed by; `wanted` is what an error asks of the object.
+
+    NaN and infinite numbers are kept: who reads a value checks it.
+
+    Raises DatasetError, with line and column, for what is no JSON object.
+    """
+    try:
+        content = read_bytes(path, most)
+        text = content.decode(_MARKS.get(content[:2], "utf-8-sig"))
+        try:
+            values = json_text.loads(text, finite=False)
+        except json.JSONDecodeError:
+            values = json_text.loads(_strict(text), finite=False)
+    except json.JSONDecodeError as error:
+        raise DatasetError(
+            f"{path}: not valid JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
+            "the file may be cut off, copy it again"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path}: cannot be read ({error})") from None
+    if not isinstance(values, dict):
+        raise DatasetError(f"{path}: must be a JSON object {wanted}")
+    return values
+
+
+def _strict(text: str) -> str:
+    """The text without comments (their lines stay) and without commas before a closing bracket."""
+    return _blanked(_COMMAS, _blanked(_COMMENTS, text))
+
+
+def _blanked(pattern: re.Pattern[str], text: str) -> str:
+    """The text with spaces in the place of what a pattern finds outside of strings; line breaks stay."""
+    parts, at = list[str](), 0
+    for found in pattern.finditer(text):
+        begin, end = found.span()
+        if text[begin] != '"':
+            parts += [text[at:begin], "\n".join(" " * len(line) for line in text[begin:end].split("\n"))]
+            at = end
+    return "".join([*parts, text[at:]])
+
+
+def number(where: str, source: dict[str, Any], key: str) -> float | None:
+    """The finite number of a key, in text too; None where the key is missing or null.
+
+    Raises DatasetError for anything else.
+    """
+    value = source.get(key)
+    if value is None:
+        return None
+    found = math.nan
+    if isinstance(value, (int, float, str)) and not isinstance(value, bool):
+        try:
+            found = float(value)
+        except ValueError:
+            found = math.nan
+    if not math.isfinite(found):
+        raise DatasetError(f"{where}: key {key!r} must be a finite number, got {value!r:.40}")
+    return found
+
+
+def matrix(where: str, value: Any) -> FloatArray:
+    """A matrix [4,4] of 3 or 4 rows; its entries may be text, and need not be finite."""
+    try:
+        found = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape == (3, 4):
+        found = np.concatenate([found, [[0.0, 0.0, 0.0, 1.0]]])
+    if found.shape != (4, 4):
+        raise DatasetError(f"{where} must be 4 rows (or 3) of 4 numbers")
+    return found
+
+
+def without_scale(pose: FloatArray) -> tuple[FloatArray, float]:
+    """The pose [4,4] without the uniform scale of its 3x3 part, and that scale; 1 where there is none."""
+    part = pose[:3, :3]
+    scale = float(np.cbrt(np.linalg.det(part)))
+    if not (0 < scale < np.inf) or abs(scale**2 - 1.0) <= RIGID_TOLERANCE:
+        return pose, 1.0
+    rotation = part / scale
+    if float(np.abs(rotation.T @ rotation - np.eye(3)).max()) > RIGID_TOLERANCE:
+        return pose, 1.0
+    pose = pose.copy()
+    pose[:3, :3] = rotation
+    return pose, scale

@@ -1,0 +1,1 @@
+"""Edits packed for the compute device."""

@@ -1,0 +1,144 @@
+"""An edit stack packed for kernels: its edits' rows, their lattices and flow tables, and their boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.compute import devices
+from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.identity_memo import kept
+from cagefield.edits.device.buffer_pool import BufferPool
+from cagefield.edits.device.edit_lattice import nodes_of
+from cagefield.edits.device.kernels.device_stack import map_samples
+from cagefield.edits.device.kernels.edit_maps import EditArgs
+from cagefield.edits.device.packing import (
+    ALONE,
+    BOX,
+    FIRST,
+    FLOW,
+    IMAGE,
+    OFFSET,
+    PART,
+    RECORD,
+    RECORDS,
+    RESOLUTION,
+    UNDER,
+    WIDTH,
+    PackedEdit,
+    row_of,
+    widened,
+)
+from cagefield.warps import flow_table
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.flow_shell import FlowShell
+
+_pool = BufferPool()
+
+
+class PackedStack(Protocol):
+    """What of an edit stack is packed."""
+
+    @property
+    def active(self) -> Sequence[PackedEdit]: ...
+
+    @property
+    def places(self) -> Sequence[int]: ...
+
+
+@dataclass(frozen=True)
+class DeviceStack:
+    """An edit stack packed for kernels.
+
+    params [max(E,1), WIDTH] float32; lattice [M,3] float32, all edits' nodes one after the other (x fastest),
+    displacements in world units, and the tables of exact flow shells (see `flow_table`); n_edits E; boxes
+    [B,2,3] float32 (min, max), one or two for each edit, outside all of which a sample is canonical as it is.
+    """
+
+    params: NDArray[np.float32]
+    lattice: NDArray[np.float32]
+    n_edits: int
+    boxes: NDArray[np.float32]
+
+    @classmethod
+    def from_stack(cls, stack: PackedStack) -> DeviceStack:
+        """The stack's enabled edits that change something. Raises `EditError` where one cannot be evaluated.
+
+        Lattices are sampled here, by the kernel, and kept for as long as their edit lives.
+        """
+        edits = stack.active
+        params = np.zeros((max(len(edits), 1), WIDTH), dtype=np.float32)
+        lattices: list[NDArray[np.float32]] = []
+        offset = 0
+        for number, edit in enumerate(edits):
+            row = params[number]
+            row[:] = row_of(edit)
+            nodes = nodes_of(edit) if row[RESOLUTION] > 0.0 else _flow_table(edit)
+            if len(nodes):
+                row[OFFSET], row[OFFSET + 1] = divmod(offset, 65536)
+                offset += len(nodes)
+                lattices.append(nodes)
+        nodes = np.zeros((1, 3), dtype=np.float32)
+        if lattices:
+            nodes = lattices[0] if len(lattices) == 1 else _pool.join(lattices)
+        places = iter(stack.places)
+        for number, edit in enumerate(edits):
+            for column, layer in ((UNDER, edit.under), (PART, edit.part)):
+                if layer is not None:
+                    params[number, column] = next(places)
+        for number in range(len(edits)):
+            params[number, ALONE] = not _meets(params[:number], params[number])
+        boxes = widened(np.concatenate([np.zeros((0, 2, 3))] + [edit.boxes for edit in edits]))
+        packed = cls(params, nodes, len(edits), boxes.astype(np.float32))
+        for array in (packed.params, packed.lattice, packed.boxes):
+            array.setflags(write=False)
+        return packed
+
+    @cached_property
+    def args(self) -> EditArgs:
+        """The stack as kernels take it."""
+        return EditArgs(self.params, self.lattice, self.n_edits)
+
+    @cached_property
+    def has_flows(self) -> bool:
+        """True where a flow shell is evaluated exactly: kernels without one leave its code out."""
+        return bool((self.params[:, RESOLUTION] == FLOW).any())
+
+    def to_canonical(
+        self, points: NDArray[np.float32], viewdirs: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+        """(points [N,3], viewdirs [N,3], stretch [N], places [N]) of samples, by `map_sample`."""
+        devices.start()
+        n = len(points)
+        out = np.empty((n, 8), dtype=np.float32)
+        samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
+        if n:
+            map_samples(samples, deal_of(len(samples)), out, self.args, self.has_flows)
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7].astype(np.int32)
+
+
+@kept
+def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
+    """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] for all other edits."""
+    warp = edit.exact_warp
+    if isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+        return flow_table.table(warp.shell)
+    return np.zeros((0, 3), dtype=np.float32)
+
+
+def _meets(others: NDArray[np.float32], row: NDArray[np.float32]) -> bool:
+    """True where the box of one of the other rows meets that of `row`, or of what V shows of the field."""
+    boxes = [(row[BOX : BOX + 3], row[BOX + 3 : BOX + 6])]
+    if row[FIRST] == 0 and row[PART] == 0:
+        image = row[RECORDS + IMAGE : RECORDS + RECORD].reshape(8, 3)
+        reach = np.abs(image[1:]).sum(axis=0)
+        boxes.append((image[0] - reach, image[0] + reach))
+    meets = [
+        (others[:, BOX : BOX + 3] <= high) & (others[:, BOX + 3 : BOX + 6] >= low) for low, high in boxes
+    ]
+    return bool(np.any([each.all(axis=1) for each in meets]))

@@ -1,0 +1,87 @@
+"""The lattice of an edit, sampled by a Quadrants kernel in float32 and kept while the edit lives."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.compute import devices
+from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.devices import floats
+from cagefield.compute.identity_memo import kept
+from cagefield.edits.device.kernels.edit_lattice import sample_lattice
+from cagefield.edits.device.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
+from cagefield.errors import EditError
+from cagefield.warps import flow_lattice
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.lattice import Lattice
+from cagefield.warps.trilinear_shell import TrilinearShell
+
+NODE_BYTES = 32
+"""Bytes of a node: 12 as it is sampled, 12 in the stack, and the padding of what kernels hold."""
+
+_ALWAYS = 64
+
+LATTICE_STRAIN = 1.0
+"""Strain of a step (see `FlowShell`) for a lattice of up to 32^3 nodes; finer ones take (R / 32)^-1/2 of it.
+
+Chosen by measurement over the edits of `benchmarks/flow_lattice.py`: what the integration adds to the
+interpolation's own error, worst of the edits, in the mean and in the largest error:
+
+    strain    1.0          0.7          0.5          0.35
+    32^3      1% and 4%    0% and 1%    0% and 0%    0% and 0%
+    64^3      4% and 9%    2% and 3%    0% and 1%    0% and 0%
+    128^3     29% and 33%  4% and 9%    4% and 2%    0% and 0%
+"""
+
+
+def lattice_of(edit: PackedEdit) -> Lattice:
+    """The lattice of a continuous edit as the renderer has it, for the float64 reference.
+
+    Raises `DeviceError` where no device starts, `EditError` for edits without a lattice.
+    """
+    warp, R = _warp_and_resolution(edit)
+    origin, frame = warp.outer.frame
+    return Lattice(origin, frame, nodes_of(edit).reshape(R, R, R, 3).astype(np.float64))
+
+
+@kept
+def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
+    """The nodes [R^3,3] of a continuous edit's lattice, x fastest; raises as `lattice_of` does.
+
+    `EditError` too where they and what is made of them would take most of the memory that is free.
+    """
+    warp, resolution = _warp_and_resolution(edit)
+    _check_memory(resolution)
+    devices.start()
+    if isinstance(warp.shell, FlowShell):
+        strain = LATTICE_STRAIN * min(1.0, (32.0 / resolution) ** 0.5)
+        return flow_lattice.sample(warp.shell.with_strain(strain), resolution)
+    nodes = np.empty((resolution**3, 3), dtype=np.float32)
+    if not isinstance(warp.shell, TrilinearShell):  # no kernel: from the reference
+        lattice = Lattice.sample(lambda p: warp.to_canonical(p).points, warp.outer, resolution)
+        nodes[:] = lattice.displacement.reshape(-1, 3)
+        return nodes
+    origin, frame = warp.outer.frame
+    place = (floats(origin), floats(frame), resolution)
+    params = row_of(edit)[None].copy()
+    params[0, [RESOLUTION, SIMPLE]] = 0.0
+    sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
+    return nodes
+
+
+def _check_memory(resolution: int) -> None:
+    needed, free = NODE_BYTES * resolution**3, devices.free_memory()
+    if resolution > _ALWAYS and free is not None and needed > free // 2:
+        raise EditError(
+            f"a lattice of {resolution} nodes per axis takes {needed / 1e9:.1f} GB, of the "
+            f"{free / 1e9:.1f} GB that are free at most half is taken; give it a lower resolution"
+        )
+
+
+def _warp_and_resolution(edit: PackedEdit) -> tuple[ContinuousWarp, int]:
+    warp, resolution = edit.exact_warp, edit.lattice
+    if not isinstance(warp, ContinuousWarp) or resolution is None:
+        raise EditError("only a continuous edit with a lattice has one")
+    return warp, resolution

@@ -1,0 +1,1 @@
+"""Quadrants kernels of edit stacks."""

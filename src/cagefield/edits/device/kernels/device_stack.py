@@ -1,0 +1,31 @@
+"""The kernels of `cagefield.edits.device.device_stack`."""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.quadrants import qd
+from cagefield.edits.device.kernels.edit_maps import EditArgs, Params, map_sample
+from cagefield.edits.device.kernels.hexahedron import read3
+
+
+@qd.kernel(fastcache=True)
+def map_samples(
+    samples: Params,
+    deal: Deal,
+    out: Params,
+    edits: EditArgs,
+    flows: qd.template(),
+):
+    for turn in range(turns(deal)):
+        i = dealt(turn, deal)
+        if i < samples.shape[0]:
+            d = read3(samples, i, 3)
+            q, v, place = map_sample(read3(samples, i, 0), d, edits, flows)
+            stretch = 1.0
+            if (v - d).norm() > 0.0:
+                stretch = v.norm()
+            for a in qd.static(range(3)):
+                out[i, a] = q[a]
+                out[i, 3 + a] = v[a] / qd.max(stretch, 1e-20)
+            out[i, 6] = stretch
+            out[i, 7] = qd.cast(place, qd.f32)

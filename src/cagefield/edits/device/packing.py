@@ -1,0 +1,146 @@
+"""An edit as a row of float32 numbers, which kernels read.
+
+Its regions are hexahedra, each a record of `RECORD` numbers: an affine flag; W [3,3] and c [3] with
+y = W (p - c); the box of the hexahedron in y; the bend K [4,3] of
+y = xi + K0 xi eta + K1 xi zeta + K2 eta zeta + K3 xi eta zeta, xi in [-1,1]^3; and the monomial coefficients
+C [8,3] of its image in canonical space (see `cagefield.geometry.hexahedron`). Records: 0 is V with its image
+V^c,
+1 is V^o for a continuous edit and the region of a discrete one (V^c, or larger), 2 to 7 are the sides of the
+trilinear shell.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.compute.identity_memo import kept
+from cagefield.errors import EditError
+from cagefield.geometry import hexahedron
+from cagefield.typing import Array
+from cagefield.warps.continuous import ContinuousWarp
+from cagefield.warps.discrete import DiscreteWarp
+from cagefield.warps.flow_shell import FlowShell
+from cagefield.warps.interfaces import Warp
+from cagefield.warps.trilinear_shell import TrilinearShell
+
+# Columns.
+BOX = 0  # min, max of the deformed-space box outside which the edit changes nothing
+FIRST, LAST = 6, 7  # records that are tried, in order: first <= record < last
+CONTINUOUS = 8  # 1, or 0 for a discrete edit
+RESOLUTION = 9  # lattice nodes per axis; 0 evaluates the shell exactly, -1 (`FLOW`) a flow shell by its table
+FLOW = -1.0
+OFFSET = 10  # first lattice node, or table's entry, as 65536 * [10] + [11]: a float32 counts to 2^24 only
+TO_NODES = 12  # origin [3] and matrix [3,3] of the lattice, node units
+NODE_BOX = 24  # min, max of the outer cage in node units, where it is a parallelepiped
+SIMPLE = 30  # 1 where phi is affine, V and V^o are parallelepipeds, and the shell is a lattice
+ALONE = 31  # 1 where no earlier edit reaches into the edit's box, or that of V^c where V shows the field
+UNDER = 32  # where samples of a discrete edit's region are read: `EMPTY`, or the place of a layer
+PART = 33  # where samples of V are read: 0, the field as the earlier edits make it, or the place of a layer
+RECORDS = 34
+EMPTY = -1.0
+AFFINE, MATRIX, CENTRE, LOW, HIGH, BEND, IMAGE, RECORD = 0, 1, 10, 13, 16, 19, 31, 55
+WIDTH = RECORDS + 8 * RECORD
+
+EDGE = 1e-6
+"""A sample counts as inside a hexahedron when its xi is within this of [-1,1]^3: rounding in float32."""
+
+BOX_SLACK = 1e-5
+"""Boxes are this share of their size larger than the edit, so that no float32 sample inside it is missed."""
+
+
+class PackedEdit(Protocol):
+    """What of an edit is packed."""
+
+    @property
+    def exact_warp(self) -> Warp: ...
+
+    @property
+    def lattice(self) -> int | None: ...
+
+    @property
+    def boxes(self) -> Array: ...
+
+    @property
+    def under(self) -> object | None: ...
+
+    @property
+    def part(self) -> object | None: ...
+
+    def unread(self) -> EditError: ...
+
+
+@kept
+def row_of(edit: PackedEdit) -> NDArray[np.float32]:
+    """The row [WIDTH] of an edit, but for what depends on the others in its stack.
+
+    Raises `EditError` for an edit without a kernel.
+    """
+    row = np.zeros(WIDTH, dtype=np.float32)
+    _pack(row, edit)
+    warp = edit.exact_warp
+    if edit.lattice is not None and isinstance(warp, ContinuousWarp):
+        row[RESOLUTION] = edit.lattice
+        row[NODE_BOX : NODE_BOX + 3] = -EDGE * edit.lattice
+        row[NODE_BOX + 3 : NODE_BOX + 6] = edit.lattice - 1 + EDGE * edit.lattice
+        row[SIMPLE] = row[RECORDS + AFFINE] == 1.0 and warp.outer.is_affine
+    elif isinstance(warp, ContinuousWarp) and isinstance(warp.shell, FlowShell):
+        row[RESOLUTION] = FLOW
+    return row
+
+
+def _pack(row: NDArray[np.float32], edit: PackedEdit) -> None:
+    """Write an edit into its row, with its shell exact."""
+    boxes = edit.boxes
+    row[BOX : BOX + 6] = widened(np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])[None]).ravel()
+    warp = edit.exact_warp
+    if isinstance(warp, DiscreteWarp):
+        row[FIRST], row[LAST] = int(warp.inner is None), 1 if warp.region is None else 2
+        row[UNDER] = EMPTY
+        if warp.pasted and edit.part is None:
+            raise edit.unread()
+        if warp.inner is not None:
+            _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+        _record(row, 1, (warp.region or warp.source).corners)
+        return
+    if not isinstance(warp, ContinuousWarp):
+        raise EditError(f"a {type(warp).__name__} has no kernel")
+    row[FIRST], row[LAST], row[CONTINUOUS] = 0, 2, 1
+    _record(row, 0, warp.inner.deformed.corners, warp.inner.canonical.corners)
+    _record(row, 1, warp.outer.corners)
+    if isinstance(warp.shell, TrilinearShell):
+        row[LAST] = 8
+        for n in range(6):
+            _record(row, 2 + n, warp.shell.deformed_hexahedra[n], warp.shell.canonical_hexahedra[n])
+    elif not isinstance(warp.shell, FlowShell) and edit.lattice is None:
+        raise EditError(f"a {type(warp.shell).__name__} has no kernel; set a lattice")
+    origin, frame = warp.outer.frame
+    row[TO_NODES : TO_NODES + 3] = origin
+    if edit.lattice is not None:
+        row[TO_NODES + 3 : TO_NODES + 12] = ((edit.lattice - 1) * np.linalg.inv(frame)).ravel()
+
+
+def _record(row: NDArray[np.float32], number: int, corners: Array, onto: Array | None = None) -> None:
+    """Write the record of a hexahedron [8,3] and, if it has one, of its image [8,3]."""
+    C = hexahedron.coefficients(corners)
+    D = C if onto is None else hexahedron.coefficients(onto)
+    W = hexahedron.centre_inverse(C)
+    bend = C[[3, 5, 6, 7]] @ W.T
+    y = (corners - C[0]) @ W.T
+    # Affine only where the image is, too: an affine record skips the image's bend.
+    size = np.abs(D[[1, 2, 4]]).max()
+    affine = np.abs(bend).max() < 1e-7 and np.abs(D[[3, 5, 6, 7]]).max() < 1e-7 * size
+    slack = 1e-5 * (y.max(axis=0) - y.min(axis=0))
+    at = RECORDS + number * RECORD
+    row[at : at + RECORD] = np.concatenate(
+        [[affine], W.ravel(), C[0], y.min(axis=0) - slack, y.max(axis=0) + slack, bend.ravel(), D.ravel()]
+    )
+
+
+def widened(boxes: Array) -> Array:
+    """Boxes [B,2,3] made larger by what float32 samples may be off."""
+    rounding = 1e-6 * np.abs(boxes).max(axis=(1, 2), initial=0.0)
+    slack = BOX_SLACK * (boxes[:, 1] - boxes[:, 0]) + rounding[:, None]
+    return np.stack([boxes[:, 0] - slack, boxes[:, 1] + slack], axis=1)

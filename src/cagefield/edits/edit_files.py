@@ -1,0 +1,408 @@
+"""Edit files: an edit stack as YAML or JSON that a person can write.
+
+    version: 1
+    edits:
+      - name: arm up
+        inner: {center: [0, 0, 1], size: [1, 1, 2], rotation_deg: [0, 0, 30]}    # or {corners: [8 points]}
+        outer: {margin: 2.5}                  # or a cage like inner; not needed by a discrete edit
+        operations:
+          - translate: [0, 0, 0.5]
+          - rotate_deg: [0, 0, 20]            # or {by: [0, 0, 20], axes: cage}
+          - scale: 1.2                        # or three factors, or {by: ..., axes: cage}
+          - shear: {xy: 0.1}
+          - move_corner: {corner: 7, by: [0.1, 0, 0]}
+          - move_edge: {edge: [0, 1], by: [0, 0, 0.1]}
+          - move_face: {face: +x, by: [0.2, 0, 0]}
+          - move_corners: {corners: [0, 3, 5], by: [0.1, 0, 0]}
+        adjustment: continuous                # or discrete
+        shell: flow                           # or trilinear; flow if left out
+        falloff: smooth                       # of the flow shell: smooth (if left out) or linear
+        width: 1                              # of the flow shell: how much of it moves, up to 1, all of it
+        lattice: 64                           # nodes per axis; left out: exact
+      - name: no cup
+        delete: true
+        inner: {center: [2, 0, 0], size: 0.5}
+        fill: surroundings                    # if left out: what it stood on goes on; or none, or a cage
+                                              # to copy from: {clone: {center: [0, 2, 0], size: 0.5}}
+        relight: occlusion                    # or none: contact shadows go along, if left out
+      - name: microphone
+        source: ../microphone                 # a copy from another scene, or a file of splats: relative to
+                                              # this file's folder, or absolute
+        inner: {center: [0, 0, 0], size: 2}   # in that scene's space
+
+Further keys of an edit: keep_source (discrete: copy instead of move), enabled, allow_folding. Lengths are
+world units, angles degrees. `parse_edits(dump_edits(stack))` is the stack, bit for bit.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cagefield.edits import file_nodes, operations
+from cagefield.edits.edit import Edit, ImpossibleEditError
+from cagefield.edits.edit_names import mended, problem_of_name
+from cagefield.edits.file_nodes import Node
+from cagefield.edits.operation_sequence import problem_of_count
+from cagefield.edits.operations import Operation, euler_degrees
+from cagefield.edits.options import FEATHER, CastShadow, Clone, problem_of_lattices
+from cagefield.edits.stack import EditStack
+from cagefield.errors import CagefieldError, EditFileError
+from cagefield.files.atomic import replaced_file
+from cagefield.files.safe_open import read_text
+from cagefield.geometry.cage import Cage
+from cagefield.typing import Array
+
+VERSION = 1
+MOST_EDITS = 500
+"""Edits of a file: each takes a millisecond to be checked."""
+
+_SHEARS = ("xy", "xz", "yx", "yz", "zx", "zy")
+
+
+def load_edits(path: str | os.PathLike[str], *, check: bool = True, mend: bool = False) -> EditStack:
+    """The edit stack of a .yaml, .yml or .json file; with check=False also one that cannot be evaluated.
+
+    With mend=True names that no edit may have, which older versions wrote, are replaced, with a warning.
+
+    Raises `EditFileError`, naming the file, the line (YAML), the key and the cure, for a file that cannot be
+    read, unknown keys and impossible values.
+    """
+    file = Path(path)
+    kind = _format_of(file)
+    try:
+        text = read_text(file)
+    except UnicodeDecodeError:
+        raise EditFileError(f"{file}: not a UTF-8 text file; save it as UTF-8") from None
+    except OSError as error:
+        raise EditFileError(f"{file}: cannot be read ({error.strerror or error})") from None
+    return parse_edits(text, format=kind, source=str(file), check=check, mend=mend)
+
+
+def parse_edits(
+    text: str, *, format: str = "yaml", source: str = "edits", check: bool = True, mend: bool = False
+) -> EditStack:
+    """The edit stack of a text, format "yaml" or "json"; `source` names it in errors.
+
+    Enabled edits are checked (`Edit.check`) unless check=False; `mend` as for `load_edits`.
+    """
+    yaml = format == "yaml"
+    root = file_nodes.read_yaml(text, source, halves=mend) if yaml else file_nodes.read_json(text, source)
+    if root.is_list:
+        return _stack(root, check, mend)
+    keys = root.mapping(required=("edits",), optional=("version",))
+    if "version" in keys and keys["version"].integer(1, 10**6) > VERSION:
+        raise keys["version"].error(
+            f"version {keys['version'].value} is newer than this program's {VERSION}; update cagefield"
+        )
+    return _stack(keys["edits"], check, mend)
+
+
+def _stack(node: Node, check: bool, mend: bool) -> EditStack:
+    items = node.items()
+    if len(items) > MOST_EDITS:
+        raise node.error(f"{len(items)} edits are too many, a file has at most {MOST_EDITS}; leave some out")
+    edits = [_edit(item, check, mend) for item in items]
+    shown = [edit for edit in edits if edit.enabled and edit.adjustment == "continuous"]
+    if (problem := problem_of_lattices(edit.lattice for edit in shown)) is not None:
+        if not mend:
+            raise node.error(problem)
+        warnings.warn(f"{node.error(problem)}; lattices above 64 are made 64", stacklevel=2)
+        edits = [edit.replace(lattice=min(edit.lattice, 64)) if edit.lattice else edit for edit in edits]
+    return EditStack(edits)
+
+
+def save_edits(stack: EditStack, path: str | os.PathLike[str]) -> None:
+    """Write the stack to a .yaml, .yml or .json file, atomically: a reader sees the old file or the new."""
+    file = Path(path)
+    text = dump_edits(stack, format=_format_of(file))
+    try:
+        with replaced_file(file, parents=False) as temporary, temporary.open("w", encoding="utf-8") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise EditFileError(f"{file}: cannot be written ({error.strerror or error})") from None
+
+
+def dump_edits(stack: EditStack, *, format: str = "yaml") -> str:
+    """The text of an edit file, "yaml" or "json"."""
+    content = {"version": VERSION, "edits": [_from_edit(edit) for edit in stack]}
+    if format == "json":
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+    return file_nodes.write_yaml(content)
+
+
+def _edit(node: Node, check: bool, mend: bool) -> Edit:
+    keys = node.mapping(
+        required=("inner",),
+        optional=(
+            "name",
+            "outer",
+            "operations",
+            "adjustment",
+            "shell",
+            "falloff",
+            "width",
+            "keep_source",
+            "delete",
+            "lattice",
+            "enabled",
+            "allow_folding",
+            "fill",
+            "relight",
+            "feather",
+            "source",
+        ),
+    )
+    inner = _cage(keys["inner"])
+    deleted = keys["delete"].boolean() if "delete" in keys else False
+    options: dict[str, Any] = {"deleted": deleted}
+    if "outer" in keys and not keys["outer"].is_null:
+        options["outer"] = _outer(keys["outer"], inner)
+    pasted = "source" in keys and not keys["source"].is_null
+    options["adjustment"] = "discrete" if deleted or pasted else "continuous"
+    if pasted:
+        options["source"], options["keep_source"] = keys["source"].text(), not deleted
+    if "adjustment" in keys:
+        options["adjustment"] = keys["adjustment"].choice(("continuous", "discrete"))
+    if "fill" in keys:
+        options["fill"] = _fill(keys["fill"])
+    if "relight" in keys:
+        options["relight"] = _relight(keys["relight"])
+    for name in ("shell", "falloff"):
+        if name in keys:
+            options[name] = keys[name].text()
+    if "name" in keys:
+        options["name"] = _name(keys["name"], mend)
+    for name in ("keep_source", "enabled", "allow_folding"):
+        if name in keys:
+            options[name] = keys[name].boolean()
+    for name in ("width", "feather"):
+        if name in keys:
+            options[name] = keys[name].number()
+    if "lattice" in keys and not keys["lattice"].is_null:
+        options["lattice"] = keys["lattice"].integer(2, 512)
+    items = keys["operations"].items() if "operations" in keys else []
+    if (problem := problem_of_count(len(items))) is not None:
+        raise keys["operations"].error(problem)
+    options["operations"] = tuple(_operation(item) for item in items)
+    try:
+        edit = Edit(inner, **options)
+    except ImpossibleEditError as error:
+        raise items[error.number - 1].error(str(error)) from None
+    except CagefieldError as error:
+        raise node.error(str(error)) from None
+    if check and edit.enabled:
+        try:
+            edit.check()
+        except CagefieldError as error:
+            raise node.error(str(error)) from None
+    return edit
+
+
+def _relight(node: Node) -> Any:
+    """How an edit is relit: a word, or {shadow: direction to the light}."""
+    if node.is_mapping:
+        return CastShadow(node.mapping(required=("shadow",))["shadow"].vector())
+    return node.text()
+
+
+def _fill(node: Node) -> Any:
+    """What an edit is filled with: a word, or {clone: cage}."""
+    if node.is_mapping:
+        return Clone(_cage(node.mapping(required=("clone",))["clone"]))
+    return node.text()
+
+
+def _name(node: Node, mend: bool) -> str:
+    name = node.text()
+    problem = problem_of_name(name)
+    if problem is None:
+        return name
+    if not mend:
+        raise node.error(problem)
+    warnings.warn(f"{node.error(problem)}; it is replaced", stacklevel=2)
+    return mended(name)
+
+
+def _cage(node: Node) -> Cage:
+    keys = node.mapping(optional=("center", "size", "rotation_deg", "corners", "pivot"))
+    if "corners" in keys:
+        for other in ("center", "size", "rotation_deg"):
+            if other in keys:
+                raise keys[other].error("a cage has either corners or center and size; remove one")
+        corners = [corner.vector() for corner in keys["corners"].items(8)]
+        values: Any = np.array(corners)
+    elif "center" in keys and "size" in keys:
+        rotation = keys["rotation_deg"].vector() if "rotation_deg" in keys else (0.0, 0.0, 0.0)
+        values = Cage.box(keys["center"].vector(), keys["size"].factors(), np.radians(rotation)).corners
+    else:
+        missing = "size" if "center" in keys else "center"
+        raise node.error(f'a cage needs center and size, or 8 corners; "{missing}" is missing')
+    # The pivot of a box is the centre as written; the mean of its corners can differ in the last bit.
+    place = keys.get("pivot", keys.get("center"))
+    pivot = None if place is None else place.vector()
+    try:
+        return Cage(values, pivot=pivot)  # type: ignore[arg-type]
+    except CagefieldError as error:
+        raise node.error(str(error)) from None
+
+
+def _outer(node: Node, inner: Cage) -> Cage:
+    if "margin" not in node.names():
+        return _cage(node)
+    return inner.grown(node.mapping(required=("margin",))["margin"].factors())
+
+
+def _operation(node: Node) -> Operation:
+    names = (
+        "translate",
+        "rotate_deg",
+        "scale",
+        "shear",
+        "move_corner",
+        "move_edge",
+        "move_face",
+        "move_corners",
+    )
+    keys = node.mapping(optional=names)
+    if len(keys) != 1:
+        raise node.error(
+            f"an operation is one of {', '.join(names)}; got {' and '.join(keys) if keys else 'nothing'}:"
+            " start each operation with its own dash"
+        )
+    name, value = next(iter(keys.items()))
+    if name == "translate":
+        return operations.Translate(value.vector())
+    if name in ("rotate_deg", "scale"):
+        inner = value.mapping(required=("by",), optional=("axes",)) if value.is_mapping else {"by": value}
+        axes: Any = inner["axes"].choice(("world", "cage")) if "axes" in inner else "world"
+        if name == "rotate_deg":
+            return operations.Rotate(inner["by"].vector(), axes)
+        return operations.Scale(inner["by"].factors(), axes)
+    if name == "shear":
+        parts = value.mapping(optional=(*_SHEARS, "axes"))
+        axes = parts.pop("axes").choice(("world", "cage")) if "axes" in parts else "world"
+        return operations.Shear(**{pair: part.number() for pair, part in parts.items()}, axes=axes)
+    if name == "move_corner":
+        parts = value.mapping(required=("corner", "by"))
+        return operations.MoveCorner(parts["corner"].integer(0, 7), parts["by"].vector())
+    if name == "move_edge":
+        parts = value.mapping(required=("edge", "by"))
+        i, j = (end.integer(0, 7) for end in parts["edge"].items(2))
+        return operations.MoveEdge((i, j), parts["by"].vector())
+    if name == "move_corners":
+        parts = value.mapping(required=("corners", "by"))
+        corners = tuple(corner.integer(0, 7) for corner in parts["corners"].items())
+        return operations.MoveCorners(corners, parts["by"].vector())
+    parts = value.mapping(required=("face", "by"))
+    return operations.MoveFace(parts["face"].text(), parts["by"].vector())
+
+
+def _from_edit(edit: Edit) -> dict[str, Any]:
+    content: dict[str, Any] = {"name": edit.name} if edit.name else {}
+    if edit.deleted:
+        content["delete"] = True
+    if edit.source is not None:
+        content["source"] = edit.source
+    content["inner"] = _from_cage(edit.inner)
+    if edit.outer is not None:
+        content["outer"] = _margin(edit.inner, edit.outer) or _from_cage(edit.outer)
+    if edit.operations:
+        content["operations"] = [_from_operation(operation) for operation in edit.operations]
+    if not edit.deleted and edit.source is None:
+        content["adjustment"] = edit.adjustment
+    if edit.adjustment == "continuous" or edit.shell != "flow":
+        content["shell"] = edit.shell
+    if edit.falloff != "smooth":
+        content["falloff"] = edit.falloff
+    if edit.width != 1.0:
+        content["width"] = edit.width
+    if edit.keep_source and edit.source is None:
+        content["keep_source"] = True
+    if isinstance(edit.fill, Clone):
+        content["fill"] = {"clone": _from_cage(edit.fill.source)}
+    elif edit.fill != "surroundings":
+        content["fill"] = edit.fill
+    if isinstance(edit.relight, CastShadow):
+        content["relight"] = {"shadow": list(edit.relight.direction)}
+    elif edit.relight != "occlusion":
+        content["relight"] = edit.relight
+    if edit.feather != FEATHER:
+        content["feather"] = edit.feather
+    if edit.lattice is not None:
+        content["lattice"] = edit.lattice
+    if not edit.enabled:
+        content["enabled"] = False
+    if edit.allow_folding:
+        content["allow_folding"] = True
+    return content
+
+
+def _from_cage(cage: Cage) -> dict[str, Any]:
+    """A cage as centre, size and rotation where that gives back its very corners, else as corners."""
+    R, _ = np.linalg.qr(cage.affine[0])
+    R = R * np.sign(np.diag(R.T @ cage.affine[0]))
+    rotation = euler_degrees(Rotation.from_matrix(R))
+    size = np.linalg.norm(cage.affine[0], axis=0)
+    for digits in (12, 9, 6):
+        # What a person wrote has few digits; what a program computed is tried as it is, last.
+        center, lengths, turn = (_short(v, digits) for v in (cage.pivot, size, rotation))
+        if (lengths > 0.0).all() and Cage.box(center, lengths, np.radians(turn)) == cage:
+            content: dict[str, Any] = {"center": center.tolist(), "size": lengths.tolist()}
+            return content | ({"rotation_deg": turn.tolist()} if turn.any() else {})
+    content = {"corners": cage.corners.tolist()}
+    return content if Cage(cage.corners) == cage else content | {"pivot": cage.pivot.tolist()}
+
+
+def _margin(inner: Cage, outer: Cage) -> dict[str, Any] | None:
+    """The outer cage as a margin where that gives back its very corners."""
+    edges = inner.frame[1]
+    margin = (np.linalg.norm(outer.affine[0], axis=0) - np.linalg.norm(edges, axis=0)) / 2.0
+    for digits in (12, 9, 6):
+        m = _short(margin, digits)
+        if (m > 0.0).all() and inner.grown(m) == outer:
+            return {"margin": float(m[0]) if (m == m[0]).all() else m.tolist()}
+    return None
+
+
+def _from_operation(operation: Operation) -> dict[str, Any]:
+    if isinstance(operation, operations.Translate):
+        return {"translate": list(operation.by)}
+    if isinstance(operation, operations.Rotate):
+        return {"rotate_deg": _with_axes(operation.degrees, operation.axes)}
+    if isinstance(operation, operations.Scale):
+        return {"scale": _with_axes(operation.by, operation.axes)}
+    if isinstance(operation, operations.Shear):
+        content: dict[str, Any] = {name: value for name, value in operation.factors.items() if value != 0.0}
+        return {"shear": content | ({"axes": operation.axes} if operation.axes != "world" else {})}
+    if isinstance(operation, operations.MoveCorner):
+        return {"move_corner": {"corner": int(operation.corner), "by": list(operation.by)}}
+    if isinstance(operation, operations.MoveEdge):
+        return {"move_edge": {"edge": [int(k) for k in operation.edge], "by": list(operation.by)}}
+    if isinstance(operation, operations.MoveCorners):
+        corners = [int(k) for k in operation.corners]
+        return {"move_corners": {"corners": corners, "by": list(operation.by)}}
+    return {"move_face": {"face": operation.face, "by": list(operation.by)}}
+
+
+def _with_axes(by: tuple[float, float, float], axes: str) -> Any:
+    return list(by) if axes == "world" else {"by": list(by), "axes": axes}
+
+
+def _short(v: Array, digits: int) -> Array:
+    return np.round(v, digits) + 0.0  # + 0.0 turns -0.0 into 0.0
+
+
+def _format_of(file: Path) -> str:
+    suffix = file.suffix.lower()
+    if suffix not in (".yaml", ".yml", ".json"):
+        raise EditFileError(f'{file}: an edit file ends in .yaml, .yml or .json, got "{suffix}"; rename it')
+    return "json" if suffix == ".json" else "yaml"

@@ -1,0 +1,51 @@
+"""Operations done one after the other: the cage that comes of them, and the one that is not possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from cagefield.edits.operations import Operation
+from cagefield.edits.safe_fraction import as_text, is_valid, largest_safe
+from cagefield.errors import CageError
+from cagefield.geometry.cage import Cage
+
+MOST_OPERATIONS = 2000
+"""Operations of one edit: 0.1 ms each whenever its cage is computed anew."""
+
+
+class ImpossibleOperationError(CageError):
+    """An operation that makes no cage; `number` counts from 1."""
+
+    def __init__(self, message: str, number: int) -> None:
+        super().__init__(message)
+        self.number = number
+
+
+def cages_along(cage: Cage, operations: Sequence[Operation]) -> Iterator[Cage]:
+    """The cage after each of the operations.
+
+    Raises:
+        ImpossibleOperationError: an operation makes an impossible cage; says how much of it is safe.
+    """
+    for number, operation in enumerate(operations, start=1):
+        try:
+            after = operation.apply(cage)
+        except CageError as error:
+            safe = largest_safe(lambda t, c=cage, o=operation: is_valid(o, t, c))  # type: ignore[misc]
+            raise ImpossibleOperationError(
+                f"operation {number}, {operation.noun} {operation}: {error}"
+                + (f"; {as_text(safe)} of it is safe" if safe > 0.0 else ""),
+                number,
+            ) from None
+        cage = after
+        yield cage
+
+
+def problem_of_count(count: int) -> str | None:
+    """Why there are too many operations, and the cure; None where there are not."""
+    if count <= MOST_OPERATIONS:
+        return None
+    return (
+        f"{count} operations are too many, an edit has at most {MOST_OPERATIONS};"
+        " join them, or go on in another edit"
+    )

@@ -1,0 +1,102 @@
+"""How far an operation may go: by bisection, or many shares of it tested together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Operation, Rotate, Scale, Translate
+from cagefield.errors import CageError
+from cagefield.geometry.cage import Cage
+from cagefield.geometry.cage_checks import factors
+from cagefield.typing import Array, Mask
+from cagefield.warps import FlowShell
+
+PARTS = 16
+TOLERANCE = 1e-3
+
+
+def along(operation: Operation, cage: Cage, t: Array) -> Array:
+    """Corners [T,8,3] of the cage after the shares t [T] of an operation, as `operation.part` makes them.
+
+    No check is made: they need not be a valid cage.
+    """
+    offsets = cage.corners - cage.pivot
+    if isinstance(operation, Rotate):
+        turn = Rotation.from_euler("XYZ", operation.degrees, degrees=True).as_rotvec()
+        M = Rotation.from_rotvec(t[:, None] * turn).as_matrix()
+        if operation.axes == "cage":
+            M = cage.heading @ M @ cage.heading.T
+        return cage.pivot + offsets @ np.transpose(M, (0, 2, 1))
+    if isinstance(operation, Scale):
+        own = cage.axes if operation.axes == "cage" else np.eye(3)
+        M = (own * (factors(operation.by, "scale") ** t[:, None])[:, None]) @ np.linalg.inv(own)
+        return cage.pivot + offsets @ np.transpose(M, (0, 2, 1))
+    by = np.zeros((8, 3))
+    if isinstance(operation, Translate):
+        by[:] = operation.by
+    elif isinstance(operation, (MoveCorner, MoveEdge, MoveFace)):
+        by[list(operation.corners)] = operation.by
+    else:
+        by = operation.apply(cage).corners - cage.corners
+    return cage.corners + t[:, None, None] * by
+
+
+def flow_reach(operation: Operation, cage: Cage, edit: tuple[Cage, Cage], *, fine: bool) -> float:
+    """Largest share of an operation on a deformed cage up to which a flow shell may surround it.
+
+    `edit` is the canonical inner and the outer cage. See `FlowShell.may_surround` for what is left open.
+    """
+
+    return largest_of(lambda t: FlowShell.may_surround(*edit, along(operation, cage, t), fine=fine))
+
+
+def largest_of(safe: Callable[[Array], Mask], tolerance: float = TOLERANCE) -> float:
+    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe.
+
+    `safe` is asked for sixteenths of the range, then for parts of the one in which it first is not.
+    """
+    low, high = 0.0, 1.0
+    if not safe(np.zeros(1))[0]:
+        return 0.0
+    while high - low > tolerance:
+        t = np.linspace(low, high, min(PARTS, int(np.ceil((high - low) / tolerance))) + 1)
+        mask = safe(t[1:])
+        if mask.all():
+            return high
+        first = int(np.argmin(mask))
+        low, high = float(t[first]), float(t[first + 1])
+    return low
+
+
+def largest_safe(safe: Callable[[float], bool], tolerance: float = 1e-3) -> float:
+    """Largest t in [0,1], to the tolerance, such that everything from 0 to t is safe; 1.0 where safe(1).
+
+    Goes up in sixteenths to the first that is not safe and bisects in front of it.
+    """
+    if safe(1.0):
+        return 1.0
+    if not safe(0.0):
+        return 0.0
+    high = next((n / 16.0 for n in range(1, 17) if not safe(n / 16.0)), 1.0)
+    low = high - 1.0 / 16.0
+    while high - low > tolerance:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if safe(middle) else (low, middle)
+    return low
+
+
+def is_valid(operation: Operation, t: float, cage: Cage) -> bool:
+    """True where the share t of an operation makes a cage of this one."""
+    try:
+        operation.part(t).apply(cage)
+    except CageError:
+        return False
+    return True
+
+
+def as_text(share: float) -> str:
+    """A share as text, rounded down so that what is said to be safe is."""
+    return f"{np.floor(100.0 * share) / 100.0:.2f}"

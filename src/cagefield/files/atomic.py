@@ -1,0 +1,236 @@
+"""Files and folders that appear whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import stat
+import warnings
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from cagefield.files.rename_exchange import exchanged
+from cagefield.files.stale_files import hidden_name, is_hidden, put_aside, remove_leftovers
+
+MOST_LINKED = 100_000
+"""Files of a folder that another one takes over, at most: they get other names there."""
+
+
+def check_writable(path: Path, *, inside: bool = False) -> None:
+    """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
+
+    With `inside` it is a folder, and files may be made in it. Raises OSError, that names `path`, where not:
+    called before work whose result has to go there. What ended programs left there is removed.
+    """
+    path = path.absolute()
+    folders = (path, *path.parents) if inside else path.parents
+    folder = next((each for each in folders if each.exists()), Path("/"))
+    remove_leftovers(path, inside=inside)
+    remove_leftovers(folder / path.name)
+    probe = folder / hidden_name(path, "part")
+    with _naming(path, folder):
+        handle = os.open(probe, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        try:
+            try:
+                os.write(handle, b"?")
+            finally:
+                os.close(handle)  # some file systems say only now that there is no room
+        finally:
+            os.unlink(probe)
+
+
+@contextmanager
+def replaced_file(path: Path, *, parents: bool = True) -> Iterator[Path]:
+    """A temporary file beside `path`, same suffix: becomes `path` on success, is removed on failure.
+
+    The folder is made where it is missing and `parents` is True. An OSError about the temporary file, or
+    about none (a full disk), names `path`.
+    """
+    if parents:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(hidden_name(path, "part"))
+    try:
+        with _naming(path, path.parent):
+            os.close(os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600))
+        with _naming(path, temporary):
+            yield temporary
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
+            temporary.replace(path)
+    finally:
+        with suppress(OSError):  # nor could it be made there, which is told
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _naming(path: Path, hidden: Path) -> Iterator[None]:
+    """An OSError that names nothing, or `hidden` or what lies in it, names `path` instead."""
+    try:
+        yield
+    except OSError as error:
+        name = error.filename
+        if name is None or (isinstance(name, (str, Path)) and Path(name).is_relative_to(hidden)):
+            error.filename, error.filename2 = str(path), None
+            if error.errno is None:  # pillow's, which has words alone
+                error.errno, error.strerror = errno.EIO, str(error.args[0]) if error.args else "failed"
+        raise
+
+
+@contextmanager
+def merged_folder(target: Path) -> Iterator[Path]:
+    """A folder to be filled with files that come into `target` together.
+
+    Where `target` holds something already, that is a hidden folder beside it, which takes its place with all
+    that it held under other names (`replaced_folder`); after a failure `target` is what it was. Where it must
+    stay the folder that it is (`_must_stay`), the hidden folder is in it, and its files take their places one
+    after another. Else it is `target` itself, not made yet or empty, and what has been written stays.
+    """
+    if not target.exists() or not any(target.iterdir()):
+        yield target
+        return
+    target = target.resolve()
+    if not _must_stay(target):
+        with replaced_folder(target, None) as draft:
+            yield draft
+        return
+    remove_leftovers(target, inside=True)
+    draft = target / hidden_name(target, "new")
+    with _naming(target, target):
+        draft.mkdir()
+    try:
+        with _naming(target, draft):
+            yield draft
+            for entry in sorted(draft.iterdir()):
+                entry.replace(target / entry.name)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _must_stay(folder: Path) -> bool:
+    """Whether no other folder can take a folder's place, with other names of the files in it.
+
+    Nothing may be made beside it, there are no links, somebody works in it, or it holds another file system,
+    what is another user's or may not be read or removed, or MOST_LINKED files and more.
+    """
+    if not os.access(folder.parent, os.W_OK | os.X_OK) or Path.cwd().is_relative_to(folder):
+        return True
+    if not _has_links(folder):
+        return True
+    count, device, may = 0, folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
+    users = {os.geteuid()} if hasattr(os, "geteuid") and os.geteuid() else None
+    for place, _, files in os.walk(folder):
+        if os.stat(place).st_dev != device or not os.access(place, may):
+            return True
+        count += len(files)
+        if count >= MOST_LINKED:
+            return True
+        if users and not users.issuperset(os.lstat(os.path.join(place, name)).st_uid for name in files):
+            return True
+    return False
+
+
+def _has_links(folder: Path) -> bool:
+    """Whether a file beside a folder can have two names."""
+    probe, other = (folder.with_name(hidden_name(folder, "part")) for _ in range(2))
+    try:
+        probe.touch(exist_ok=False)
+        os.link(probe, other)
+    except (OSError, NotImplementedError):
+        return False
+    finally:
+        for file in (probe, other):
+            file.unlink(missing_ok=True)
+    return True
+
+
+@contextmanager
+def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]:
+    """An empty folder beside `target` to be filled: takes its place on success, is removed on failure.
+
+    What `target` held under the names in `own`, None for those in the new folder, goes; other entries stand
+    in the new folder, which has its rights, when it takes its place. After a failure `target` is what it was.
+    Where the system can exchange two names at once there is a whole folder at `target` at every moment; else
+    `recover_folder`, which whoever calls this has called, puts back what an end between two renames left. An
+    OSError about the new folder, or about none (a full disk), names `target`. A `target` that is itself such
+    an empty folder beside another one, which removes it, is filled as it is.
+    """
+    if is_hidden(target) and target.is_dir() and not any(target.iterdir()):
+        yield target
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    remove_leftovers(target)
+    draft, retired = (target.with_name(hidden_name(target, role)) for role in ("new", "old"))
+    with _naming(target, draft):
+        draft.mkdir()
+    try:
+        with _naming(target, draft):
+            yield draft
+            if own is None:
+                own = {entry.name for entry in draft.iterdir()}
+            others = _others(target, own)
+            for entry in others:
+                _linked(entry, draft / entry.name)
+            if not target.exists():
+                draft.rename(target)
+            else:
+                draft.chmod(stat.S_IMODE(target.stat().st_mode))
+                if exchanged(draft, target):
+                    retired = draft
+                else:
+                    target.rename(retired)
+                    draft.rename(target)
+    except BaseException:
+        if retired is not draft:
+            shutil.rmtree(draft, ignore_errors=True)
+            if retired.exists() and not target.exists():
+                retired.rename(target)
+        raise
+    if retired.exists():
+        for entry in _others(retired, own):  # made since others were linked
+            if not (target / entry.name).exists():
+                entry.rename(target / entry.name)
+        shutil.rmtree(retired, ignore_errors=True)
+
+
+def recover_folder(target: Path, is_whole: Callable[[Path], bool]) -> Path | None:
+    """Puts back, where `target` is not there, the newest folder that an end between renames left beside it.
+
+    Says so in a warning. The name that it had is returned, None where there was nothing to do. `is_whole`
+    says which folders count.
+    """
+    if target.exists() or not target.parent.is_dir():
+        return None
+    left = [folder for folder in put_aside(target) if is_whole(folder)]
+    if not left:
+        return None
+    newest = max(left, key=lambda folder: folder.stat().st_mtime)
+    newest.rename(target)
+    warnings.warn(
+        f"{target} was left as {newest.name} by a program that was ended while it replaced it; it is back",
+        stacklevel=2,
+    )
+    return newest
+
+
+def _others(folder: Path, own: Collection[str]) -> list[Path]:
+    """What a folder holds beside the names in `own`."""
+    return [] if not folder.is_dir() else [entry for entry in folder.iterdir() if entry.name not in own]
+
+
+def _linked(entry: Path, copy: Path) -> None:
+    """Another name of a file, or a folder with other names of its files; a copy where there are no links."""
+
+    def link(source: str, destination: str) -> str:
+        try:
+            os.link(source, destination, follow_symlinks=False)
+        except OSError:
+            shutil.copy2(source, destination, follow_symlinks=False)
+        return destination
+
+    if entry.is_dir() and not entry.is_symlink():
+        shutil.copytree(entry, copy, symlinks=True, copy_function=link)
+    else:
+        link(str(entry), str(copy))

@@ -1,0 +1,1 @@
+"""NeRF checkpoint formats."""

@@ -1,0 +1,53 @@
+"""Axes of splat files, and splats turned from ones to others.
+
+Axes are named by where x, y and z point, seen from a camera that looks at the thing: right or left, up or
+down, front (towards the camera) or back, "rdf" as in 3DGS' PLY, "rub" as in SPZ and glTF. From ones to others
+some coordinates change their sign; rotations turn with them, and harmonics that are odd in them change sign.
+
+Source: nianticlabs/spz, src/cc/splat-types.h (CoordinateConverter).
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from cagefield.fields import sh as spherical_harmonics
+from cagefield.formats.splats.splat_table import SplatBatch
+from cagefield.typing import Array
+
+Axes = Literal["rdf", "rub", "luf", "ruf", "ldb", "rdb", "ldf", "lub"]
+AXES: tuple[str, ...] = get_args(Axes)
+PLY: Axes = "rdf"
+"""Axes of a table of splats."""
+
+
+def signs(source: str, target: str) -> Array:
+    """Factors [3] of x, y and z, 1 or -1."""
+    return np.array([1.0 if a == b else -1.0 for a, b in zip(source, target, strict=True)])
+
+
+def with_axes(batch: SplatBatch, source: str, target: str) -> SplatBatch:
+    """The splats in other axes; mirrored where the two are not of the same hand."""
+    flip = signs(source, target)
+    if (flip > 0).all():
+        return batch
+    # R' = F R F: a rotation by the same angle about the axis F r, mirrored once more where det F < 0.
+    turn = np.concatenate([[1.0], flip * np.prod(flip)])
+    return SplatBatch(
+        batch.means * flip.astype(np.float32),
+        batch.log_scales,
+        batch.quaternions * turn.astype(np.float32),
+        batch.opacities,
+        batch.sh * _harmonic_signs(batch.sh.shape[1], flip)[None, :, None],
+    )
+
+
+def _harmonic_signs(count: int, flip: Array) -> Array:
+    """Factors [K] of the harmonics: Y(F d) = factor Y(d)."""
+    degree = int(np.sqrt(count)) - 1
+    d = np.array([[0.48, 0.6, 0.64]])
+    return np.sign(
+        spherical_harmonics.sh_basis(d * flip, degree)[0] * spherical_harmonics.sh_basis(d, degree)[0]
+    )

@@ -1,0 +1,154 @@
+"""Splat files opened by their content; the ending of their name decides where the content does not.
+
+| ending | format | read | written |
+| --- | --- | --- | --- |
+| .ply | 3DGS, and what follows it | yes | yes |
+| .compressed.ply | PlayCanvas | yes | yes |
+| .spz | Niantic, versions 1 to 4 | yes | 3, or 4 |
+| .sog, a folder with meta.json | PlayCanvas, versions 1 and 2 | yes | 2, as one file |
+| lod-meta.json, a folder with it | PlayCanvas, streamed SOG | finest level | no |
+| .splat | antimatter15 | yes | yes |
+| .ksplat | mkkellogg | yes | no |
+| .glb, .gltf | KHR_gaussian_splatting | yes | .glb |
+| .ckpt | nerfstudio's splatfacto | yes | no |
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+from cagefield.errors import FieldError
+from cagefield.files.ply import open_ply
+from cagefield.files.safe_open import check_regular
+from cagefield.formats.splats.antimatter15_splat import open_splat_rows
+from cagefield.formats.splats.compressed_ply import open_compressed_ply
+from cagefield.formats.splats.detection import LOD_META, META, ZIP_ARCHIVE, detected_format, other_kind
+from cagefield.formats.splats.gltf import open_splat_gltf
+from cagefield.formats.splats.gltf_buffers import GltfAsset
+from cagefield.formats.splats.ksplat import open_ksplat
+from cagefield.formats.splats.nerfstudio import is_splatfacto, open_splatfacto
+from cagefield.formats.splats.sog import open_sog
+from cagefield.formats.splats.sog_lod import open_sog_lod
+from cagefield.formats.splats.splat_ply import MESH, POINT_CLOUD_CURE, open_splat_ply
+from cagefield.formats.splats.splat_table import SplatSource
+from cagefield.formats.splats.spz import open_spz
+
+READABLE = (
+    *(".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".ksplat", ".glb", ".gltf", ".ckpt"),
+    *(META, LOD_META),
+)
+
+_MESHES = ("an OBJ mesh", "an STL mesh", "an FBX mesh", "an OFF mesh")
+_CLOUDS = ("a LAS point cloud", "a PCD point cloud")
+_NAMES = {
+    ".ply": "a PLY", ".spz": "an SPZ", ".sog": "a SOG", ".ksplat": "a .ksplat", ".glb": "a binary glTF",
+    ".gltf": "a glTF", META: "a SOG's meta.json", LOD_META: "a streamed SOG's lod-meta.json",
+}  # fmt: skip
+_MAY_END = {META: (META, ".json"), LOD_META: (LOD_META, META, ".json")}
+
+
+def _open_any_ply(path: Path) -> SplatSource:
+    _, tables = open_ply(path)
+    packed = "vertex" in tables and "packed_position" in tables["vertex"].columns
+    return (open_compressed_ply if packed else open_splat_ply)(path)
+
+
+_OPEN: dict[str, Callable[[Path], SplatSource]] = {
+    ".ply": _open_any_ply,
+    ".compressed.ply": _open_any_ply,
+    ".spz": open_spz,
+    ".sog": open_sog,
+    META: open_sog,
+    LOD_META: open_sog_lod,
+    ".splat": open_splat_rows,
+    ".ksplat": open_ksplat,
+    ".glb": open_splat_gltf,
+    ".gltf": open_splat_gltf,
+    ".ckpt": open_splatfacto,
+}
+
+
+def ending_of(path: Path) -> str:
+    """The ending that says a file's format, such as ".compressed.ply"; "" where it is none of them."""
+    name = path.name.lower()
+    if path.is_dir():
+        return META
+    return max((ending for ending in READABLE if name.endswith(ending)), key=len, default="")
+
+
+def open_splats(path: Path) -> SplatSource:
+    """The open file of splats; its values are read when its batches are.
+
+    A warning says where the content has another format than the name's ending says.
+
+    Raises:
+        FieldError: no such file, a format that is not known, a file that is damaged.
+    """
+    if not path.exists():
+        raise FieldError(f"{path}: no such file; give a file of splats ({', '.join(READABLE[:-2])})")
+    ending = ending_of(path)
+    try:
+        if not path.is_dir():
+            check_regular(path)
+        found = detected_format(path)
+    except OSError as error:
+        raise FieldError(f"{path}: cannot be read ({error.strerror or error})") from None
+    if found is None:
+        return _opened_by_ending(path, ending)
+    if found not in _OPEN:
+        raise FieldError(f"{path}: a zip of a streamed SOG; unpack it and give its folder")
+    if not path.is_dir() and not path.name.lower().endswith((found, *_MAY_END.get(found, ()))):
+        said = f"not what its name says ({ending})" if ending else "which its name does not say"
+        warnings.warn(f"{path}: its content is {_NAMES[found]}, {said}; it is read as that", stacklevel=2)
+    return _OPEN[found](path)
+
+
+def holds_splats(path: Path) -> bool:
+    """Whether a file is to be read as one of splats, by its content or its ending.
+
+    A checkpoint is, where its tensors are splats; a mesh or a picture is, whose error says what it is.
+    """
+    try:
+        if path.is_dir() or (path.is_file() and detected_format(path) is not None):
+            return True
+        ending = ending_of(path)
+        if ending == ".ckpt":
+            return is_splatfacto(path)
+        return bool(ending) or (path.is_file() and other_kind(path) not in (None, ZIP_ARCHIVE))
+    except OSError:
+        return bool(ending_of(path))
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that splats are read from: of a folder all in it and below, of a .gltf its buffers too.
+
+    Raises:
+        FieldError: a .gltf that cannot be read.
+    """
+    if path.is_dir():
+        return sorted(file for file in path.rglob("*") if file.is_file())
+    if detected_format(path) not in (".gltf", ".glb"):
+        return [path]
+    try:
+        return [path, *GltfAsset(path).external_files()]
+    except (ValueError, TypeError, KeyError, OSError):
+        return [path]  # the reader says what is wrong with it
+
+
+def _opened_by_ending(path: Path, ending: str) -> SplatSource:
+    """The file as its ending says; its content has no magic number."""
+    if path.is_dir():
+        raise FieldError(f"{path}: a folder without {META} or {LOD_META}; give a file of splats")
+    if ending in (".splat", ".ckpt"):
+        return _OPEN[ending](path)
+    kind = other_kind(path)
+    if kind in _MESHES:
+        raise FieldError(f"{path}: {kind}: {MESH}")
+    if kind in _CLOUDS:
+        raise FieldError(f"{path}: {kind}, no splats; as a PLY, {POINT_CLOUD_CURE}")
+    if ending and (kind is None or ending == ".ply"):
+        return _OPEN[ending](path)  # whose reader says what is wrong with it
+    of = f" ({kind})" if kind else ""
+    raise FieldError(f"{path}: no format of splats that is known{of}; these are: {', '.join(READABLE)}")

@@ -1,0 +1,116 @@
+"""Writes splats as Niantic's SPZ, versions 3 and 4; the streams are described in `splat_spz`."""
+
+from __future__ import annotations
+
+import gzip
+import struct
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any, Literal
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from cagefield.files.atomic import replaced_file
+from cagefield.formats.splats.splat_table import OnProgress, SplatBatch, SplatTable
+from cagefield.formats.splats.spz import ANTIALIASED, COLOUR, MAGIC, NEW_HEADER, OLD_HEADER
+from cagefield.typing import AnyArray
+
+Version = Literal[3, 4]
+"""Versions that are written. Spark 2.2 reads 3 and not 4; splat-transform reads both."""
+
+FRACTION = 12
+"""Bits of the fraction of positions, where they fit."""
+
+_FIRST_STEP, _STEP = 8, 16
+"""Steps to which harmonics of degree 1 and above it are rounded, as Niantic's own writer does."""
+
+
+def write_spz(
+    path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Version = 3
+) -> None:
+    """Writes splats in SPZ's axes, sorted through space: version 3, packed by gzip, or 4, by Zstandard.
+
+    Positions have 12 bits of fraction, fewer where they do not fit: half a step is 1.2e-4 units.
+    """
+    with ExitStack() as stack:
+        columns = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(6)]
+        fraction = _fraction_for(table)
+        done = 0
+        for batch in table.sorted_batches():
+            for file, values in zip(columns, _encoded(batch, fraction), strict=True):
+                file.write(values.tobytes())
+            done += len(batch)
+            on_progress(0.6 * done / table.count)
+        flags = ANTIALIASED if table.antialiased else 0
+        sizes = [file.tell() for file in columns]
+        for file in columns:
+            file.seek(0)
+        with replaced_file(path) as temporary, temporary.open("wb") as out:
+            if version == 3:
+                with gzip.GzipFile(fileobj=out, mode="wb", filename="", mtime=0) as packed:
+                    packed.write(OLD_HEADER.pack(MAGIC, 3, table.count, table.sh_degree, fraction, flags, 0))
+                    for number, file in enumerate(columns):
+                        _copy(file, packed)
+                        on_progress(0.6 + 0.4 * (number + 1) / 6)
+                return
+            used = [(file, size) for file, size in zip(columns, sizes, strict=True) if size]
+            head = (MAGIC, 4, table.count, table.sh_degree, fraction, flags, len(used), NEW_HEADER.size, b"")
+            out.write(NEW_HEADER.pack(*head) + bytes(16 * len(used)))
+            entries = []
+            for number, (file, size) in enumerate(used):
+                begin = out.tell()
+                zstandard.ZstdCompressor(level=12).copy_stream(file, out, size=size)
+                entries.append((out.tell() - begin, size))
+                on_progress(0.6 + 0.4 * (number + 1) / len(used))
+            out.seek(NEW_HEADER.size)
+            out.write(b"".join(struct.pack("<QQ", *entry) for entry in entries))
+
+
+def _copy(source: IO[bytes], target: Any) -> None:
+    while part := source.read(1 << 22):
+        target.write(part)
+
+
+def _fraction_for(table: SplatTable) -> int:
+    most = max(float(np.abs(batch.means).max()) for batch in table.batches())
+    return int(np.clip(np.floor(np.log2((2**23 - 1) / max(most, 1e-30))), 0, FRACTION))
+
+
+def _encoded(batch: SplatBatch, fraction: int) -> tuple[AnyArray, ...]:
+    fixed = np.clip(np.round(batch.means.astype(np.float64) * 2.0**fraction), -(2**23), 2**23 - 1)
+    positions = fixed.astype("<i4").view(np.uint8).reshape(len(batch), 3, 4)[:, :, :3]
+    colours = batch.sh[:, 0].astype(np.float64) * (COLOUR * 255.0) + 0.5 * 255.0
+    rest = batch.sh[:, 1:].astype(np.float64).reshape(len(batch), -1)
+    steps = np.full(rest.shape[1], _STEP)
+    steps[:9] = _FIRST_STEP
+    rest = np.round(rest * 128.0) + 128.0
+    rest = np.floor((rest + steps / 2) / steps) * steps
+    return (
+        positions,
+        _bytes(batch.opacities.astype(np.float64) * 255.0),
+        _bytes(colours),
+        _bytes((batch.log_scales.astype(np.float64) + 10.0) * 16.0),
+        _packed_rotations(batch.quaternions),
+        _bytes(rest),
+    )
+
+
+def _bytes(values: AnyArray) -> NDArray[np.uint8]:
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+
+
+def _packed_rotations(quaternions: AnyArray) -> NDArray[np.uint32]:
+    xyzw = quaternions.astype(np.float64)[:, [1, 2, 3, 0]]
+    largest = np.abs(xyzw).argmax(axis=1)
+    negated = np.take_along_axis(xyzw, largest[:, None], axis=1) < 0.0
+    xyzw = np.where(negated, -xyzw, xyzw)
+    packed = largest.astype(np.uint32)
+    for axis in range(4):
+        here = largest != axis
+        size = np.clip(np.round(np.abs(xyzw[:, axis]) * np.sqrt(2.0) * 511.0), 0, 511).astype(np.uint32)
+        value = size | (xyzw[:, axis] < 0.0).astype(np.uint32) << np.uint32(9)
+        packed = np.where(here, packed << np.uint32(10) | value, packed)
+    return packed.astype("<u4")

@@ -1,0 +1,1 @@
+"""Geometry: cages, trilinear hexahedra, quaternions."""

@@ -1,0 +1,293 @@
+"""Cages: the hexahedra that say what moves and how much of the surroundings may give way.
+
+Corner k = x + 2y + 4z with x, y, z in {0, 1} along the cage's own axes (VTK voxel order). Edges are corner
+pairs (i, j), i < j, that differ in one bit. Faces are "+x", "-x", "+y", "-y", "+z", "-z" of the same axes.
+Angles are radians, lengths world units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from cagefield.errors import CageError
+from cagefield.geometry import hexahedron
+from cagefield.geometry.cage_checks import check_orientation, corner_number, factors, read_only, vector
+from cagefield.geometry.hexahedron import EDGES as EDGES
+from cagefield.geometry.hexahedron import FACES as FACES
+from cagefield.typing import Array, Mask
+
+Axes: TypeAlias = Literal["world", "cage"]
+
+
+@dataclass(frozen=True, eq=False)
+class Cage:
+    """A hexahedron with 8 corners, 12 edges and 6 bilinear faces; operations return a new cage.
+
+    A point of the cage is x(u) = sum_k N_k(u) corners[k], u in [0,1]^3. The Jacobian determinant of this map
+    must be positive over the whole cage.
+
+    Parameters: corners [8,3] in world units; pivot [3], about which `rotate`, `scale` and `shear` turn. The
+    pivot of a new cage is its centre, travels with `translate`, and stays where it is when a corner, an edge
+    or a face is moved.
+
+    Raises `CageError` when a corner is not finite, or the cage is flat, mirrored or inside out.
+
+    Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", section 3. Its formula for the
+    centre divides the sum of the corners by 6; a hexahedron has 8, and the centre here is their mean. Its
+    R_z is the transpose of the right-handed rotation; rotations here are right-handed.
+    """
+
+    corners: Array
+    pivot: Array = field(default=None, kw_only=True)  # type: ignore[arg-type]
+
+    def __post_init__(self) -> None:
+        corners = read_only(self.corners, (8, 3), "cage corners")
+        pivot = corners.mean(axis=0) if self.pivot is None else self.pivot
+        object.__setattr__(self, "corners", corners)
+        object.__setattr__(self, "pivot", read_only(pivot, (3,), "cage pivot"))
+        check_orientation(corners)
+
+    @classmethod
+    def box(cls, center: ArrayLike, size: ArrayLike, rotation: ArrayLike = (0.0, 0.0, 0.0)) -> Cage:
+        """A box: centre [3], full edge lengths [3] (or one for a cube), intrinsic XYZ rotation in radians."""
+        c = vector(center, "cage center")
+        s = factors(size, "cage size")
+        offsets = (hexahedron.BITS - 0.5) * s
+        theta = vector(rotation, "cage rotation")
+        if theta.any():
+            offsets = offsets @ rotation_matrix(theta).T
+        return cls(c + offsets, pivot=c)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Cage):
+            return NotImplemented
+        return np.array_equal(self.corners, other.corners) and np.array_equal(self.pivot, other.pivot)
+
+    def __hash__(self) -> int:
+        return hash((self.corners.tobytes(), self.pivot.tobytes()))
+
+    def __repr__(self) -> str:
+        return f"Cage(corners={self.corners.tolist()})"
+
+    @property
+    def center(self) -> Array:
+        """Mean of the 8 corners [3]."""
+        return np.asarray(self.corners.mean(axis=0))
+
+    @property
+    def edges(self) -> tuple[tuple[int, int], ...]:
+        """The 12 corner pairs (i, j), i < j: four along x, four along y, four along z."""
+        return EDGES
+
+    @property
+    def faces(self) -> dict[str, tuple[int, int, int, int]]:
+        """The corner numbers of each face, by name."""
+        return dict(FACES)
+
+    @property
+    def aabb(self) -> Array:
+        """Axis-aligned box [2,3] (min, max) of the cage; the cage lies in the hull of its corners."""
+        return np.stack([self.corners.min(axis=0), self.corners.max(axis=0)])
+
+    @cached_property
+    def affine(self) -> tuple[Array, Array]:
+        """(A [3,3], b [3]) with x(u) = b + A u: exact where `is_affine`, else the least-squares fit."""
+        C = hexahedron.coefficients(self.corners)
+        A = 2.0 * C[[1, 2, 4]].T
+        return A, C[0] - A.sum(axis=1) / 2.0
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """True when the cage is a parallelepiped, to 1e-12 of its extent."""
+        C = hexahedron.coefficients(self.corners)
+        return bool(np.abs(C[[3, 5, 6, 7]]).max() <= 1e-12 * np.abs(C[[1, 2, 4]]).max())
+
+    @property
+    def frame(self) -> tuple[Array, Array]:
+        """(origin [3], edge vectors as columns [3,3]) of the least box along `affine` that holds the cage."""
+        A, b = self.affine
+        if self.is_affine:
+            return b, A
+        u = (self.corners - b) @ np.linalg.inv(A).T
+        low, high = u.min(axis=0), u.max(axis=0)
+        return b + A @ low, A * (high - low)
+
+    def grown(self, margin: ArrayLike) -> Cage:
+        """A parallelepiped around the cage: its `frame` moved outwards by a margin > 0, one or three.
+
+        The margin is in world units along the frame's edges, the same on both sides.
+        """
+        m = factors(margin, "margin")
+        origin, edges = self.frame
+        lengths = np.linalg.norm(edges, axis=0)
+        origin = origin - edges @ (m / lengths)
+        return Cage(origin + hexahedron.BITS @ (edges * (1.0 + 2.0 * m / lengths)).T)
+
+    @property
+    def axes(self) -> Array:
+        """Unit edge directions at the cage's middle, as the columns of a [3,3] matrix."""
+        A = self.affine[0]
+        return np.asarray(A / np.linalg.norm(A, axis=0))
+
+    @property
+    def heading(self) -> Array:
+        """The rotation [3,3] nearest to `axes`."""
+        U, _, Vt = np.linalg.svd(self.axes)
+        return np.asarray(U @ Vt)
+
+    def coordinates(self, points: ArrayLike) -> tuple[Array, Mask]:
+        """(u [N,3], inside [N]) of points [N,3]: u in [0,1]^3 where inside, else unspecified."""
+        p = np.asarray(points, dtype=np.float64)
+        u = np.full(p.shape, np.nan)
+        mask = np.zeros(len(p), dtype=bool)
+        low, high = self.aabb
+        slack = 1e-9 * (high - low)
+        near = np.flatnonzero(hexahedron.all_three((p >= low - slack) & (p <= high + slack)))
+        u[near], found = hexahedron.inverse(self.corners, p[near])
+        mask[near] = hexahedron.inside(u[near], found)
+        return u, mask
+
+    def contains(self, points: ArrayLike) -> Mask:
+        """Mask [N] of the points [N,3] in the closed cage; exact for planar and for bilinear faces."""
+        return self.coordinates(points)[1]
+
+    def translate(self, by: ArrayLike) -> Cage:
+        """The cage moved by a vector [3]; the pivot travels with it."""
+        v = vector(by, "translate")
+        return Cage(self.corners + v, pivot=self.pivot + v)
+
+    def rotate(self, theta: ArrayLike, *, axes: Axes = "world") -> Cage:
+        """The cage turned about its pivot by R_x R_y R_z, intrinsic XYZ angles [3] in radians.
+
+        As `scipy.spatial.transform.Rotation.from_euler("XYZ")`. axes="cage" turns about the cage's own x, y
+        and z directions instead of the world's.
+        """
+        R = rotation_matrix(vector(theta, "rotate"))
+        if axes == "cage":
+            R = self.heading @ R @ self.heading.T
+        return self._linear(R, axes)
+
+    def scale(self, by: ArrayLike, *, axes: Axes = "world") -> Cage:
+        """The cage scaled about its pivot by one factor or three, each > 0.
+
+        axes="world" scales along the world's x, y, z; axes="cage" along the cage's own edges.
+        """
+        return self._linear(np.diag(factors(by, "scale")), axes, own=True)
+
+    def shear(
+        self,
+        *,
+        xy: float = 0.0,
+        xz: float = 0.0,
+        yx: float = 0.0,
+        yz: float = 0.0,
+        zx: float = 0.0,
+        zy: float = 0.0,
+        axes: Axes = "world",
+    ) -> Cage:
+        """The cage sheared about its pivot: `xy` adds xy * y to x, and so on for the other pairs."""
+        S = np.array([[1.0, xy, xz], [yx, 1.0, yz], [zx, zy, 1.0]])
+        if not np.isfinite(S).all():
+            raise CageError(f"shear factors must be finite, got {_named_shears(S)}")
+        if np.linalg.det(S) <= 0.0:
+            raise CageError(
+                f"shear must not turn space inside out: {_named_shears(S)} has determinant"
+                f" {np.linalg.det(S):.3g}; use smaller factors"
+            )
+        return self._linear(S, axes, own=True)
+
+    def move_corner(self, corner: int, by: ArrayLike) -> Cage:
+        """The cage with corner k, 0 to 7, moved by a vector [3]; the pivot stays."""
+        return self._move((corner_number(corner),), vector(by, "move_corner"))
+
+    def move_edge(self, edge: tuple[int, int], by: ArrayLike) -> Cage:
+        """The cage with both corners of edge (i, j) moved by a vector [3]; the pivot stays."""
+        pair = tuple(sorted(corner_number(k) for k in edge))
+        if pair not in EDGES:
+            raise CageError(f"edge {tuple(edge)} is not an edge of a cage: the edges are {list(EDGES)}")
+        return self._move(pair, vector(by, "move_edge"))
+
+    def move_face(self, face: str, by: ArrayLike) -> Cage:
+        """The cage with the four corners of a face, such as "+x", moved by a vector [3]; the pivot stays."""
+        if face not in FACES:
+            raise CageError(f'face "{face}" is not a face of a cage: the faces are {", ".join(FACES)}')
+        return self._move(FACES[face], vector(by, "move_face"))
+
+    def move_corners(self, corners: Iterable[int], by: ArrayLike) -> Cage:
+        """The cage with some of its corners, each named once, moved by one vector [3]; the pivot stays."""
+        chosen = tuple(corner_number(corner) for corner in corners)
+        if not chosen or len(set(chosen)) < len(chosen):
+            raise CageError(f"corners must name one or more corners, each once, got {list(chosen)}")
+        return self._move(chosen, vector(by, "move_corners"))
+
+    def _linear(self, M: Array, axes: Axes, own: bool = False) -> Cage:
+        if axes not in ("world", "cage"):
+            raise CageError(f'axes must be "world" or "cage", got "{axes}"')
+        if own and axes == "cage":
+            M = self.axes @ M @ np.linalg.inv(self.axes)
+        return Cage(self.pivot + (self.corners - self.pivot) @ M.T, pivot=self.pivot)
+
+    def _move(self, corners: tuple[int, ...], by: Array) -> Cage:
+        moved = self.corners.copy()
+        moved[list(corners)] += by
+        return Cage(moved, pivot=self.pivot)
+
+
+def rotation_matrix(theta: ArrayLike) -> Array:
+    """R_x R_y R_z [3,3], right-handed, for intrinsic XYZ angles [3] in radians."""
+    return np.asarray(Rotation.from_euler("XYZ", np.asarray(theta, dtype=np.float64)).as_matrix())
+
+
+def outside_by(cage: Cage, point: ArrayLike) -> tuple[str, float]:
+    """(face, distance) of the face of the cage that the point [3] is furthest outside of.
+
+    The distance is signed, positive outside, and measured from the face's nearest point along the outward
+    normal there; for planar faces it is the distance to the face's plane.
+    """
+    p = vector(point, "point")
+    best = ("", -np.inf)
+    for name, ids in FACES.items():
+        distance = _face_distance(cage, ids, p, outward=1.0 if name[0] == "+" else -1.0)
+        if distance > best[1]:
+            best = (name, distance)
+    return best
+
+
+def _face_distance(cage: Cage, ids: tuple[int, ...], p: Array, outward: float) -> float:
+    """Signed distance of p from the bilinear face with corners `ids`, along its normal nearest to p."""
+    v = cage.corners[list(ids)]
+    axis = next(a for a in range(3) if len({k >> a & 1 for k in ids}) == 1)
+    # The face's two directions taken in cyclic order span the axis' positive normal; y has them swapped.
+    sign = outward if axis != 1 else -outward
+    normal = np.cross(v[3] - v[0], v[2] - v[1])
+    size = float(np.linalg.norm(normal))
+    if abs(float((v[1] - v[0]) @ normal)) <= 1e-9 * size**1.5:
+        return sign * float((p - v[0]) @ normal) / size
+    a, b = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9))
+    s, t = a.ravel(), b.ravel()
+    grid = np.outer((1 - s) * (1 - t), v[0]) + np.outer(s * (1 - t), v[1])
+    grid += np.outer((1 - s) * t, v[2]) + np.outer(s * t, v[3])
+    nearest = int(np.argmin(((grid - p) ** 2).sum(axis=1)))
+    st = np.array([s[nearest], t[nearest]])
+    for _ in range(20):
+        ds = (1 - st[1]) * (v[1] - v[0]) + st[1] * (v[3] - v[2])
+        dt = (1 - st[0]) * (v[2] - v[0]) + st[0] * (v[3] - v[1])
+        x = v[0] + st[0] * (v[1] - v[0]) + st[1] * dt
+        before = st
+        st = np.clip(st + np.linalg.lstsq(np.stack([ds, dt], axis=1), p - x, rcond=None)[0], 0.0, 1.0)
+        if np.abs(st - before).max() < 1e-12:
+            break
+    normal = np.cross(ds, dt)
+    return sign * float((p - x) @ normal) / float(np.linalg.norm(normal))
+
+
+def _named_shears(S: Array) -> str:
+    names = {f"{a}{b}": S[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i != j}
+    return ", ".join(f"{name}={value:g}" for name, value in names.items() if value != 0.0)

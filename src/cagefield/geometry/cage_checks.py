@@ -1,0 +1,107 @@
+"""What corners and vectors a cage takes, and the errors that say what is wrong with others."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cagefield.errors import CageError
+from cagefield.geometry import hexahedron, hexahedron_determinant
+from cagefield.typing import Array, Mask
+
+_FLAT = 1e-9
+"""Least Jacobian determinant of a valid cage, as a share of the product of its mean edge lengths."""
+
+
+def vector(value: ArrayLike, name: str) -> Array:
+    """A finite float64 vector [3], or a `CageError` that names it."""
+    return read_only(value, (3,), name)
+
+
+def factors(value: ArrayLike, name: str) -> Array:
+    """Three positive finite factors [3] from one or three, or a `CageError` that names them."""
+    raw = np.asarray(value, dtype=np.float64)
+    v = read_only(np.full(3, raw) if raw.ndim == 0 else raw, (3,), name)
+    if not (v > 0.0).all():
+        axis = int(np.argmin(v))
+        raise CageError(f"{name} must be positive along every axis, got {v[axis]:g} along {'xyz'[axis]}")
+    return v
+
+
+def read_only(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    """A finite float64 array that cannot be written, or a `CageError` that names it."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CageError(f"{name} must be numbers of shape {list(shape)}, got {value!r}") from None
+    if array.shape != shape:
+        raise CageError(f"{name} must have shape {list(shape)}, got {list(array.shape)}")
+    if not np.isfinite(array).all():
+        where = np.argwhere(~np.isfinite(array))[0]
+        label = f"{name}: corner {where[0]}" if len(shape) == 2 else name
+        shown = array[where[0]] if len(shape) == 2 else array
+        raise CageError(f"{label} must be finite, got {format_vector(shown)}")
+    array.setflags(write=False)
+    return array
+
+
+def format_vector(v: Array) -> str:
+    """A point as text, "(0.41, 0.10, 0.93)"."""
+    return "(" + ", ".join(f"{x:.4g}" for x in v) + ")"
+
+
+def corner_number(corner: int) -> int:
+    """The number of a corner, 0 to 7, or a `CageError`."""
+    if isinstance(corner, bool) or not isinstance(corner, (int, np.integer)) or not 0 <= corner <= 7:
+        raise CageError(f"corner {corner!r} is not a corner of a cage: corners are 0 to 7, k = x + 2y + 4z")
+    return int(corner)
+
+
+def are_valid(corners: Array) -> Mask:
+    """Mask [B] of the corners [B,8,3] that a `Cage` may have."""
+    bernstein, lengths = _orientation(corners)
+    floor = _FLAT * lengths.prod(axis=1)
+    return (floor > 0.0) & hexahedron_determinant.are_positive(bernstein - floor[:, None, None, None])
+
+
+def _orientation(corners: Array) -> tuple[Array, Array]:
+    """(Bernstein coefficients [B,3,3,3] of the determinants, mean edges [B,3] along each axis)."""
+    tails, heads = np.array(hexahedron.EDGES).T
+    lengths = np.linalg.norm(corners[:, heads] - corners[:, tails], axis=2)
+    return hexahedron_determinant.determinant_coefficients(corners), lengths.reshape(-1, 3, 4).mean(axis=2)
+
+
+def check_orientation(corners: Array) -> None:
+    """Raise `CageError` where the Jacobian determinant is not positive over the whole hexahedron."""
+    if are_valid(corners[None])[0]:
+        return
+    bernstein, lengths = (each[0] for each in _orientation(corners[None]))
+    floor = _FLAT * lengths.prod()
+    at_corners = bernstein[::2, ::2, ::2].transpose(2, 1, 0).ravel()  # corner k = x + 2y + 4z
+    k = int(np.argmin(at_corners))
+    where = f"corner {k} at {format_vector(corners[k])}"
+    if lengths.min() == 0.0 or np.abs(at_corners).max() <= floor:
+        raise CageError(
+            f"cage has zero size: its mean edges along x, y, z are {format_vector(lengths)} long and {where}"
+            " spans no volume; give it a positive size along every axis"
+        )
+    if at_corners.max() < 0.0:
+        raise CageError(
+            f"cage is mirrored: the Jacobian determinant is negative at every corner ({at_corners[k]:.3g} at"
+            f" {where}); list the corners in the order k = x + 2y + 4z of a right-handed frame"
+        )
+    if at_corners.min() > floor:
+        g = np.linspace(0.0, 1.0, 17)
+        u = np.stack(np.meshgrid(g, g, g, indexing="ij"), axis=-1).reshape(-1, 3)
+        det = np.linalg.det(hexahedron.jacobian(corners, u))
+        worst = int(np.argmin(det))
+        k = int(np.argmin(((hexahedron.BITS - u[worst]) ** 2).sum(axis=1)))
+        raise CageError(
+            f"cage is inside out between its corners, nearest to corner {k} at {format_vector(corners[k])}:"
+            f" the Jacobian determinant there falls to {det[worst]:.3g} and must stay positive; move corner"
+            f" {k} away from the middle of the cage"
+        )
+    raise CageError(
+        f"cage is inside out at {where}: the Jacobian determinant there is {at_corners[k]:.3g} and must be"
+        f" positive; move corner {k} back from the opposite faces"
+    )

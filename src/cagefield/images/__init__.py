@@ -1,0 +1,1 @@
+"""Images: render results, image files, video, metrics."""

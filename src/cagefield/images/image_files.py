@@ -1,0 +1,274 @@
+"""Pictures and videos in and out; a file appears whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from cagefield.errors import CagefieldError, DatasetError
+from cagefield.files.atomic import replaced_file
+from cagefield.files.safe_open import check_regular
+from cagefield.images.color_conversion import has_alpha, rgb_converter
+from cagefield.images.image_formats import (
+    EFFICIENT_FORMATS,
+    open_picture,
+    orientation_is_pixels,
+    turned_as_stored,
+)
+from cagefield.images.jpeg_scan import end_of_pixels
+from cagefield.images.render_result import to_uint8
+from cagefield.images.tiff_tags import check_tags
+from cagefield.images.video import encoder
+from cagefield.typing import UInt8
+
+MOST_PIXELS = 100 << 20
+"""Pixels of a picture that is read: a file of kilobytes may have any number of them."""
+
+MOST_BYTES = 1 << 30
+"""Bytes of a picture's file that is read: some decoders take all of it into memory."""
+
+_DENSEST, _ALWAYS = 1100, 1 << 18
+"""Pixels for each byte of a file, at most: deflate's best of 8 bits a pixel; 512 x 512 are always read."""
+
+_DENSEST_EFFICIENT = 16 * _DENSEST
+"""Pixels for each byte of HEIF and AVIF, at most: flat blocks of 64 x 64 pixels take a fraction of a bit."""
+
+_TILE = 1 << 16
+
+_ZEROS = bytes(64)
+"""What libjpeg looks ahead at the end of the pixels, and more."""
+
+DAMAGED = (
+    OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
+    RuntimeError, ZeroDivisionError, struct.error, zlib.error, Image.DecompressionBombError,
+)  # fmt: skip
+"""What pillow raises of damaged pictures."""
+
+
+def reason_of(error: Exception) -> str:
+    """A decoder's reason as one line of at most 200 characters."""
+    return " ".join(str(error).split())[:200]
+
+
+def check_pixels(image: Image.Image, size: int | None = None) -> None:
+    """Passes where an opened picture, of which only the header is read, has at most MOST_PIXELS.
+
+    `size` bytes of its file can hold so many, too. Raises ValueError.
+    """
+    count = image.width * image.height
+    if count > MOST_PIXELS:
+        raise ValueError(
+            f"{image.width} x {image.height} pixels, at most {MOST_PIXELS >> 20} million are read; shrink it"
+        )
+    densest = _DENSEST_EFFICIENT if image.format in EFFICIENT_FORMATS else _DENSEST
+    if size is not None and count > max(_ALWAYS, densest * size):
+        raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
+
+
+class _PictureFile(io.BufferedReader):
+    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes.
+
+    With `pixels_end` it ends there, and zeros are in the place of the mark at the end.
+    """
+
+    pixels_end: int | None = None
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self._size = os.fstat(self.fileno()).st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
+            size = min(size, max(0, self._size - self.tell()))
+        begin, content = self.tell(), super().read(size)
+        if self.pixels_end is None or begin + len(content) <= self.pixels_end:
+            return content
+        self.seek(self.pixels_end + 1)
+        return content[: self.pixels_end - begin] + _ZEROS if begin <= self.pixels_end else b""
+
+    def __repr__(self) -> str:
+        return repr(str(self.name))
+
+
+@contextmanager
+def opened_picture(path: Path) -> Iterator[Image.Image]:
+    """The picture in a file, of which the header is read, and at most MOST_PIXELS can be.
+
+    Pixels are as stored: EXIF's orientation is not applied, the rotation of HEIF and AVIF is.
+
+    Raises ValueError for more, what DAMAGED lists for a file that is no picture, and DatasetError for one
+    whose decoder is not installed.
+    """
+    check_regular(path, MOST_BYTES)
+    with _PictureFile(path) as file:
+        check_tags(file, path.stat().st_size)
+        with open_picture(file) as image:
+            check_pixels(image, path.stat().st_size)
+            if image.format in ("JPEG", "MPO"):
+                image.load = partial(_load_jpeg, image, file)
+            try:
+                yield turned_as_stored(image) if orientation_is_pixels(image) else image
+            finally:
+                image.__dict__.pop("load", None)  # it holds the picture
+
+
+def _load_jpeg(image: Image.Image, file: _PictureFile) -> Any:
+    """Its `load`, which refuses a file that lacks pixels, where libjpeg would make them up."""
+    del image.load  # the class has its own
+    place = file.tell()
+    file.seek(0)
+    file.pixels_end = end_of_pixels(file)
+    file.seek(place)
+    return image.load()
+
+
+def load_whole(image: Image.Image) -> None:
+    """Decodes an opened picture. Raises what DAMAGED lists, and ValueError for another size than it said."""
+    said = image.size
+    image.load()
+    if image.size != said:
+        raise ValueError(f"{image.size[0]} x {image.size[1]} pixels, its header says {said[0]} x {said[1]}")
+
+
+def tiles(width: int, height: int, multiple: int = 1) -> Iterator[tuple[int, int, int, int]]:
+    """Boxes (x, y, end x, end y) that cover a picture, of some ten thousand pixels each.
+
+    Pictures are converted by them: what that takes is no more for large ones. Their sides are multiples of
+    `multiple`, but for those at the right and at the bottom.
+    """
+    across = max(multiple, _TILE // multiple // multiple * multiple)
+    down = max(multiple, _TILE // min(width, across) // multiple * multiple)
+    for y in range(0, height, down):
+        for x in range(0, width, across):
+            yield x, y, min(x + across, width), min(y + down, height)
+
+
+def read_image(path: str | os.PathLike[str]) -> UInt8:
+    """Pixels [H,W,3], or [H,W,4] with straight alpha where the file has transparency.
+
+    Files of other depths, modes and color profiles are converted (see `color_conversion`); pixels come as
+    stored, EXIF orientation is not applied (camera poses refer to the stored pixels). Raises DatasetError for
+    a file that is missing or no picture.
+    """
+    path = Path(path)
+    try:
+        with opened_picture(path) as image:
+            convert = rgb_converter(image)
+            load_whole(image)
+            pixels = np.empty((image.height, image.width, 4 if has_alpha(image) else 3), np.uint8)
+            for box in tiles(image.width, image.height):
+                x, y, end_x, end_y = box
+                pixels[y:end_y, x:end_x] = np.asarray(convert(image.crop(box)))
+            return pixels
+    except FileNotFoundError as error:
+        raise DatasetError(f"{path}: there is no such image") from error
+    except DatasetError:
+        raise
+    except DAMAGED as error:
+        raise DatasetError(f"{path}: not a readable image ({reason_of(error)})") from error
+
+
+def _pixels(image: NDArray[Any], channels: tuple[int, ...] = (1, 3, 4)) -> UInt8:
+    """uint8 [H,W] or [H,W,C] of a picture in uint8 or floats of [0,1]."""
+    image = np.asarray(image)
+    depth = 1 if image.ndim == 2 else image.shape[-1] if image.ndim == 3 else 0
+    if depth not in channels or image.size == 0:
+        raise CagefieldError(f"an image must be [H,W,C] with C in {list(channels)}, not {list(image.shape)}")
+    if image.dtype != np.uint8 and not np.issubdtype(image.dtype, np.floating):
+        raise CagefieldError(f"an image must be uint8, or floats in [0, 1], not {image.dtype}")
+    return np.ascontiguousarray(to_uint8(image))
+
+
+def write_png(path: str | os.PathLike[str], image: NDArray[Any]) -> None:
+    """Writes uint8 or float [H,W], [H,W,1|3|4] as a PNG. Raises CagefieldError for other shapes, suffixes."""
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise CagefieldError(f"{path}: write_png writes .png files")
+    pixels = _pixels(image)
+    if pixels.ndim == 3 and pixels.shape[-1] == 1:
+        pixels = pixels[..., 0]
+    with replaced_file(path) as temporary:
+        Image.fromarray(pixels).save(temporary, format="PNG")
+
+
+@contextmanager
+def video_writer(
+    path: str | os.PathLike[str], shape: tuple[int, int], fps: float = 24.0, *, quality: int = 18
+) -> Iterator[Callable[[NDArray[Any]], None]]:
+    """A function that adds one RGB frame [H,W,3] (uint8 or float) of `shape` (H, W) to an H.264 file.
+
+    The file is there once the context ends, and not at all where it ends with an error. Odd sizes are
+    extended by repeating the last row or column: yuv420p, which every player shows, has even ones. `quality`
+    is x264's CRF, 0 (lossless) to 51.
+
+    Raises CagefieldError for a suffix other than .mp4, and for frames of another size; OSError, that names
+    the file, where it cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".mp4":
+        raise CagefieldError(f"{path}: a video's name ends in .mp4")
+    if not fps > 0 or not 0 <= quality <= 51:
+        raise CagefieldError(f"fps must be positive and quality in [0, 51], not fps={fps}, quality={quality}")
+    height, width = shape
+    pad = ((0, height % 2), (0, width % 2), (0, 0))
+    count = 0
+    with (
+        replaced_file(path) as temporary,
+        encoder(temporary, (width + width % 2, height + height % 2), fps, quality) as encode,
+    ):
+
+        def add(frame: NDArray[Any]) -> None:
+            nonlocal count
+            pixels = _pixels(frame, (3,))
+            if pixels.shape[:2] != shape:
+                raise CagefieldError(
+                    f"frame {count} is {list(pixels.shape)}; all frames must be {[height, width, 3]}"
+                )
+            encode(np.pad(pixels, pad, mode="edge").tobytes())
+            count += 1
+
+        yield add
+
+
+def write_video(
+    path: str | os.PathLike[str], frames: Iterable[NDArray[Any]], fps: float = 24.0, *, quality: int = 18
+) -> None:
+    """Writes RGB frames [H,W,3] (uint8 or float) as a video; see `video_writer`.
+
+    Raises CagefieldError for no frames, frames of different sizes, or a suffix other than .mp4.
+    """
+    source = iter(frames)
+    first = next(source, None)
+    if first is None:
+        raise CagefieldError(f"{path}: a video needs at least one frame")
+    height, width = _pixels(first, (3,)).shape[:2]
+    with video_writer(path, (height, width), fps, quality=quality) as add:
+        add(first)
+        for frame in source:
+            add(frame)
+
+
+def side_by_side(*images: NDArray[Any], gap: int = 4) -> UInt8:
+    """RGB pictures [H,W,3] in one row, white between them and below shorter ones."""
+    if not images:
+        raise CagefieldError("side_by_side needs at least one image")
+    columns = [_pixels(image, (3,)) for image in images]
+    height = max(column.shape[0] for column in columns)
+    width = sum(column.shape[1] for column in columns) + gap * (len(columns) - 1)
+    row = np.full((height, width, 3), 255, np.uint8)
+    left = 0
+    for column in columns:
+        row[: column.shape[0], left : left + column.shape[1]] = column
+        left += column.shape[1] + gap
+    return row

@@ -1,0 +1,204 @@
+"""An edit stack as the page's GPU evaluates it: numbers of the edits, their lattices, the deformed occupancy.
+
+    rows        [44 E + 2 B, 4] float32. Of each edit 8 rows, its numbers in `edits.device.packing`:
+                    box's min, first | box's max, last | lattice's origin, nodes an axis |
+                    to nodes, row 0, continuous | row 1, simple | row 2, under | node box's min, first node |
+                    max, part
+                and the hexahedra 0 and 1, 18 rows each: W (its first w is the affine flag), c, the box of y,
+                the bend [4,3], the image [8,3]. Then min and max of the boxes outside which nothing changes.
+    lattice.N   [2, 3 R^3] uint8, low and high bytes of float16 displacements in world units, of lattice N
+    layer.N.*   the arrays of layer N (`page_layers`), of those that the edits' patches have
+    occupancy   [bx, by, bz] uint16, codes of the deformed field (`rendering.voxels.occupancy`), from
+    `origin` on
+
+Inner cages are exact. Shells are lattices: an edit whose shell is evaluated exactly gets one of LATTICE nodes
+an axis, and finer ones than FINEST_LATTICE are made that coarse. In the GPU's texture every lattice begins at
+a multiple of ROW_OF_NODES nodes, so that one can be uploaded without the others.
+
+The header names lattices, layers and the occupancy by keys, digests of their content. A file for a page that
+has some of them already leaves those out; of an occupancy whose grid the page has, it holds the part that
+changed, which `part` says: the key of the one before, and the part's first brick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import EditStack
+from cagefield.edits.device import packing as row_layout
+from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.edits.device.edit_lattice import nodes_of
+from cagefield.edits.edit import Edit
+from cagefield.errors import EditError
+from cagefield.pages.page_file import LEVEL, byte_planes, pack
+from cagefield.pages.page_layers import bricks_of, digest, encode_layer, layer_key
+from cagefield.rendering.voxels.occupancy import Occupancy
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.typing import Float32
+
+MAGIC, VERSION = b"cageedit", 3
+
+LATTICE = 64
+"""Nodes an axis of the lattices of edits that have none: 1.5 MB of halves."""
+
+FINEST_LATTICE = 128
+"""Most nodes an axis of a lattice: 12 MB of halves."""
+
+ROW_OF_NODES = 2048
+"""Nodes in a row of the lattices' texture: every WebGL2 has textures of as many texels an edge."""
+
+ROWS, MOST_ROWS = 44, 1024
+"""Rows of an edit, and those of the shader's 16 KiB of uniforms, which every WebGL2 has."""
+
+
+@dataclass(frozen=True)
+class PageEdits:
+    """A file of edits, and what a page has that has read it."""
+
+    data: bytes
+    keys: tuple[str, ...] = ()
+    """Of the lattices, the layers and, last, the occupancy."""
+    occupancy: Occupancy | None = field(default=None, repr=False)
+
+
+def for_page(edit: Edit) -> Edit:
+    """The edit itself, or the same with a lattice in its shell that a page can have."""
+    if edit.adjustment != "continuous" or (edit.lattice or FINEST_LATTICE + 1) <= FINEST_LATTICE:
+        return edit
+    return edit.replace(lattice=LATTICE if edit.lattice is None else FINEST_LATTICE)
+
+
+def for_pages(edits: EditStack) -> EditStack:
+    """The stack with a lattice in each continuous edit's shell."""
+    return EditStack(for_page(edit) for edit in edits)
+
+
+def encode_page_edits(renderer: Renderer) -> bytes:
+    """The file of a renderer's edits, whose shells must be lattices (`for_pages`), and of their occupancy.
+
+    Raises EditError for a shell without a lattice, and for more edits than the page's shader holds.
+    """
+    return encode_changed_edits(renderer).data
+
+
+def encode_changed_edits(
+    renderer: Renderer,
+    has: Collection[str] = (),
+    occupancies: Mapping[str, Occupancy] | None = None,
+    level: int = LEVEL,
+) -> PageEdits:
+    """The same for a page that `has` what some keys name; `occupancies` are known ones by their keys.
+
+    `level` is deflate's. Raises EditError as `encode_page_edits` does.
+    """
+    stack = DeviceStack.from_stack(renderer.edits)
+    edits = renderer.edits.active
+    table = page_rows(edits, stack)
+    lattices: list[dict[str, Any]] = []
+    arrays: dict[str, NDArray[Any]] = {}
+    for edit, row in zip(edits, stack.params, strict=False):
+        if row[row_layout.CONTINUOUS] > 0.5:
+            nodes = nodes_of(edit)
+            key = _lattice_key(edit, nodes)
+            if key not in has and all(key != before["key"] for before in lattices):
+                arrays[f"lattice.{len(lattices)}"] = byte_planes(nodes.reshape(-1).astype(np.float16))
+            lattices.append({"key": key, "nodes": len(nodes)})
+    layers: list[dict[str, Any]] = []
+    for layer, place in zip(renderer.edits.layers, renderer.edits.places, strict=True):
+        key = layer_key(layer)
+        if key not in has and all(key != before["key"] for before in layers):
+            arrays.update(encode_layer(layer, renderer.field, f"layer.{len(layers)}"))
+        layers.append({"key": key, **bricks_of(layer, place)})
+    occupancy, codes = _occupancy(renderer.occupancy, has, occupancies or {})
+    header = {
+        "edits": len(edits),
+        "boxes": len(stack.boxes) if edits else 0,
+        "preserve_opacity": renderer.preserve_opacity,
+        "lattices": lattices,
+        "layers": layers,
+        "occupancy": occupancy,
+    }
+    arrays = {"rows": table, **arrays}
+    if codes is not None:
+        arrays["occupancy"] = codes.astype(np.uint16)
+    keys = (*(str(each["key"]) for each in (*lattices, *layers)), str(occupancy["key"]))
+    return PageEdits(pack(MAGIC, VERSION, header, arrays, level), keys, renderer.occupancy)
+
+
+def page_rows(edits: Sequence[Edit], stack: DeviceStack) -> Float32:
+    """The rows [ROWS E + 2 B, 4] of a stack's active edits, packed in `stack`. Raises EditError as above."""
+    boxes = stack.boxes if edits else np.zeros((0, 2, 3), np.float32)
+    if ROWS * len(edits) + 2 * len(boxes) > MOST_ROWS:
+        raise EditError(
+            f"{len(edits)} edits are more than a page's GPU takes; let the server draw, or bake some"
+        )
+    rows, first = [], 0
+    for edit, row in zip(edits, stack.params, strict=False):
+        rows.append(_rows(edit, row, first))
+        if row[row_layout.CONTINUOUS] > 0.5:
+            nodes = round(float(row[row_layout.RESOLUTION])) ** 3
+            first += -(-nodes // ROW_OF_NODES) * ROW_OF_NODES
+    ends = np.zeros((2 * len(boxes), 4), np.float32)
+    ends[:, :3] = boxes.reshape(-1, 3)
+    return np.concatenate([*rows, ends])
+
+
+def _occupancy(
+    occupancy: Occupancy, has: Collection[str], known: Mapping[str, Occupancy]
+) -> tuple[dict[str, Any], NDArray[np.int32] | None]:
+    """The header of an occupancy, and its codes, or the part of them that a page has to be sent."""
+    codes, origin = occupancy.codes, [int(n) for n in occupancy.origin]
+    key = digest(np.asarray([*origin, *codes.shape], np.int64), codes)
+    header: dict[str, Any] = {"key": key, "origin": origin, "dims": list(codes.shape), "part": None}
+    if key in has:
+        return header, None
+    for name, before in known.items():
+        same_grid = before.codes.shape == codes.shape and (before.origin == occupancy.origin).all()
+        if name not in has or not same_grid:
+            continue
+        changed = before.codes != codes
+        spans = []
+        for axis in range(3):
+            along = np.flatnonzero(changed.any(axis=tuple(a for a in range(3) if a != axis)))
+            spans.append(slice(int(along[0]), int(along[-1]) + 1))
+        part = codes[tuple(spans)]
+        low = [span.start for span in spans]
+        return header | {"part": {"of": name, "low": low, "dims": list(part.shape)}}, part
+    return header, codes
+
+
+_keys: WeakKeyDictionary[Edit, str] = WeakKeyDictionary()
+
+
+def _lattice_key(edit: Edit, nodes: Float32) -> str:
+    """The key of an edit's lattice; worked out once in the edit's life."""
+    if edit not in _keys:
+        _keys[edit] = digest(nodes)
+    return _keys[edit]
+
+
+def _rows(edit: Edit, row: NDArray[np.float32], first_node: int) -> Float32:
+    """The rows [ROWS,4] of an edit from its row of `edits.device.packing`, its lattice from a node on."""
+    p = row_layout
+    if row[p.CONTINUOUS] > 0.5 and row[p.RESOLUTION] < 1.0:
+        raise EditError(f'edit "{edit.name}" has no lattice; a page draws shells from lattices (`for_pages`)')
+    out = np.zeros((ROWS, 4), np.float32)
+    out[0:2, :3] = row[p.BOX : p.BOX + 6].reshape(2, 3)
+    out[2:6, :3] = row[p.TO_NODES : p.TO_NODES + 12].reshape(4, 3)
+    out[6:8, :3] = row[p.NODE_BOX : p.NODE_BOX + 6].reshape(2, 3)
+    out[:8, 3] = (
+        row[p.FIRST], row[p.LAST], row[p.RESOLUTION], row[p.CONTINUOUS], row[p.SIMPLE], row[p.UNDER],
+        first_node, row[p.PART],
+    )  # fmt: skip
+    for number in range(2):
+        record = row[p.RECORDS + number * p.RECORD : p.RECORDS + (number + 1) * p.RECORD]
+        at = 8 + 18 * number
+        out[at : at + 18, :3] = record[p.MATRIX : p.RECORD].reshape(18, 3)
+        out[at, 3] = record[p.AFFINE]
+    return out

@@ -1,0 +1,171 @@
+"""What edits change of a page's splats: those that go, and those that come, as the rasteriser draws them.
+
+The page keeps the splats that it has loaded (`page_splats`) and lays these over them. With N splats of the
+field, in the page's order, and M that come (moved ones, copies, the children of split ones):
+
+    hidden       [ceil(N / 8)] uint8, bit n mod 8 of byte n / 8 is set where splat n is not shown as it is
+    sources      [M] int32, the splat whose colours splat m has
+    means        [M, 3] float32, in deformed space, less the field's centre
+    covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
+    opacities    [2, M] uint8, high bytes first, of 65535 o
+    gains        [M] int32: what the red, green and blue of a source's colour is multiplied by, see
+                 `encode_gains`
+    turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
+                 along R^T d
+
+Where the header says `packed`, sources rise, and in the place of means and covariances there are `chunks`,
+`means`, `rotations` and `scales` as in `page_splats`, of the splats' axes in deformed space: half the bytes,
+for a file that is kept.
+
+A whole difference to the field without edits is sent each time, so that the newest is right whatever came
+before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.errors import FieldError
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.quaternions import quaternions_of
+from cagefield.pages.page_file import LEVEL, QUICK_LEVEL, pack, unpack
+from cagefield.pages.page_splats import (
+    CHUNK,
+    ROTATION_BITS,
+    SCALES,
+    byte_pairs,
+    decode_means,
+    decode_rotations,
+    decode_shapes,
+    encode_means,
+    encode_rotations,
+    encode_shapes,
+    from_byte_pairs,
+    page_order,
+)
+from cagefield.rendering.splats.raster_splats import ChangedSplats, covariances_of
+from cagefield.typing import Float32
+
+MAGIC, VERSION = b"cagesped", 2
+
+
+@dataclass(frozen=True)
+class PageSplatEdits:
+    """What a file holds: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
+    [M], turns [M,4] (w, x, y, z), gains [M,3]."""
+
+    hidden: NDArray[np.bool_]
+    sources: NDArray[np.int32]
+    means: Float32
+    covariances: Float32
+    opacities: Float32
+    turns: Float32
+    gains: Float32
+
+
+def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed: bool = False) -> bytes:
+    """The file of what edits changed of a field."""
+    order = page_order(field)
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    splats, sources = changed.splats, place[changed.sources]
+    packed = packed and len(splats) > 0
+    rows = np.argsort(sources, kind="stable") if packed else slice(None)
+    turns = np.eye(3)[None] if splats.rotations is None else splats.rotations
+    header = {"count": len(field), "changed": len(splats), "packed": packed, "log_scales": list(SCALES)}
+    arrays: dict[str, NDArray[Any]] = {
+        "hidden": np.packbits(changed.hidden[order], bitorder="little"),
+        "sources": sources[rows],
+    }
+    if packed:
+        arrays["chunks"], arrays["means"] = encode_means(splats.means[rows], field.center, field)
+        log_scales, axes = axes_of(splats.covariances[rows])
+        arrays.update(encode_shapes(quaternions_of(axes), log_scales, splats.opacities[rows]))
+    else:
+        arrays["means"] = (splats.means.astype(np.float64) - field.center).astype(np.float32)
+        arrays["covariances"] = splats.covariances
+        arrays["opacities"] = byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64)))
+    quaternions = np.broadcast_to(quaternions_of(turns), (len(splats), 4))[rows]
+    arrays["turns"] = encode_rotations(quaternions, bits=ROTATION_BITS if packed else 15)
+    arrays["gains"] = gains_of(changed)[rows]
+    return pack(MAGIC, VERSION, header, arrays, level=LEVEL if packed else QUICK_LEVEL)
+
+
+def axes_of(covariances: Float32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(logarithms of standard deviations [M,3], rotations [M,3,3] to their axes) of covariances [M,6]."""
+    full = covariances[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3).astype(np.float64)
+    variances, axes = np.linalg.eigh(full)
+    axes[:, :, 2] *= np.linalg.det(axes)[:, None]
+    return 0.5 * np.log(np.maximum(variances, 1e-30)), axes
+
+
+GAIN_STEP = 1.0 / 128.0
+"""Of the base-2 logarithm of a gain: half a percent."""
+
+
+def gains_of(changed: ChangedSplats) -> NDArray[np.int32]:
+    """The encoded gains [M] of changed splats."""
+    return encode_gains(
+        np.ones((len(changed.sources), 3), np.float32) if changed.gains is None else changed.gains
+    )
+
+
+def encode_gains(gains: Float32) -> NDArray[np.int32]:
+    """Gains [M,3] as [M]: 10 bits each, red the lowest, of 512 + log2(gain) / GAIN_STEP."""
+    codes = np.clip(512 + np.round(np.log2(np.maximum(gains, 1e-6)) / GAIN_STEP), 0, 1023).astype(np.int32)
+    return np.asarray(codes[:, 0] | codes[:, 1] << np.int32(10) | codes[:, 2] << np.int32(20))
+
+
+def decode_gains(codes: NDArray[np.int32]) -> Float32:
+    """The gains [M,3] of what `encode_gains` made."""
+    parts = codes[:, None] >> np.array([0, 10, 20], np.int32) & np.int32(1023)
+    return np.asarray(np.exp2((parts.astype(np.float32) - 512.0) * GAIN_STEP), np.float32)
+
+
+def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
+    """What a file holds, its numbers as the page has them.
+
+    Raises:
+        FieldError: the file is of another kind or version, truncated or garbled.
+    """
+    header, arrays = unpack(data, MAGIC, VERSION, "edits of splats for pages")
+    try:
+        count, changed, packed = int(header["count"]), int(header["changed"]), bool(header["packed"])
+        shapes: dict[str, tuple[int, ...]] = {
+            "hidden": (-(-count // 8),),
+            "sources": (changed,),
+            "means": (len(arrays["means"]), 3, changed) if packed else (changed, 3),
+            "opacities": (2, changed),
+            "turns": (2, 3, changed),
+            "gains": (changed,),
+        }
+        if packed:
+            pairs, chunks = (2, 3, changed), (-(-changed // CHUNK), 2, 3)
+            shapes.update({"chunks": chunks, "rotations": pairs, "scales": pairs})
+        else:
+            shapes["covariances"] = (changed, 6)
+        parts: dict[str, Any] = {name: arrays[name] for name in shapes}
+    except (ValueError, KeyError, TypeError) as error:
+        raise FieldError("garbled edits of splats for pages; write them again") from error
+    if any(parts[name].shape != shape for name, shape in shapes.items()):
+        raise FieldError("arrays of edits of splats for pages do not fit each other; write them again")
+    if changed and not (parts["sources"].min() >= 0 and parts["sources"].max() < count):
+        raise FieldError(f"sources of edits of splats must be 0 to {count - 1}; write them again")
+    opacities = (from_byte_pairs(parts["opacities"]) / 65535.0).astype(np.float32)
+    if packed:
+        parts["means"] = decode_means(parts["chunks"], parts["means"], np.zeros(3))
+        log_scales, quaternions, opacities = decode_shapes(parts)
+        parts["covariances"] = covariances_of(quaternions, log_scales)
+    return PageSplatEdits(
+        np.unpackbits(parts["hidden"], count=count, bitorder="little").astype(bool),
+        parts["sources"],
+        parts["means"],
+        parts["covariances"],
+        opacities,
+        decode_rotations(parts["turns"]),
+        decode_gains(parts["gains"]),
+    )

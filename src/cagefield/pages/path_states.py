@@ -1,0 +1,212 @@
+"""The edits of a scene on their way along its camera path, as a page shows them, and how exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras.keyframes import Keyframe, Timeline
+from cagefield.completion.patcher import Patcher
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.partial_edit import partial_edit
+from cagefield.edits.patch import Patch, SplatPatch
+from cagefield.errors import EditError
+from cagefield.pages.page_edits import LATTICE, for_pages
+from cagefield.pages.page_path import PathState, encode_page_path, joined_occupancy, mixable, mixed
+from cagefield.rendering.voxels.occupancy import Occupancy
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+
+STATES_A_SECOND = 12.0
+"""Where edits move; the page goes straight between two. A quarter turn in two seconds is 4 degrees a state:
+chords are .0006 of the radius beside the circle."""
+
+MOST_STATES = 120
+"""Longer motions have fewer states a second."""
+
+BUDGET = 8 << 20
+"""Bytes of nodes that move, before they are compressed to about a third."""
+
+SIZES = (LATTICE, 48, 32, 24, 16)
+"""Nodes an axis of the lattices of edits that move: the most that fit into the budget."""
+
+LEAST = 1e-3
+"""The part that stands for 0: what has not begun has all its numbers too, and is where it was, nearly."""
+
+PROBES = 4000
+"""Points at which what the page shows is compared with the exact edits, half-way between two states."""
+
+
+@dataclass(frozen=True)
+class PathEdits:
+    """What a page holds of edits along a path: the file, how many states, the nodes an axis of lattices; None
+    of splats, which have none.
+
+    `error` is the distance (mean, 99th percentile) of points half-way between states from where the stack of
+    that moment, with the lattices of `for_pages`, takes them, in world units.
+    """
+
+    data: bytes
+    states: int
+    nodes: int | None
+    error: tuple[float, float]
+    split: bool = False
+    """Whether splats are split on the way as the whole edits split them."""
+
+
+def path_edits(
+    renderer: Renderer,
+    edits: EditStack,
+    keys: Sequence[Keyframe],
+    loop: bool,
+    patcher: Patcher,
+    *,
+    on_progress: Callable[[float], None] = lambda done: None,
+) -> PathEdits | None:
+    """The states of `edits` along the path of `keys`; None where all of them have gone all the way all along.
+
+    `renderer` draws the field. `on_progress` is told the share that is done. Raises EditError for an edit
+    that is not possible at a part that is shown.
+
+    Of an edit that moves, `patcher` fills what it left once it has begun, and takes its light along once it
+    has gone all the way: a patch of every state would take some hundred KB each.
+    """
+    if len(keys) < 2:
+        return None
+    line = Timeline(keys, loop=loop)
+    times = state_times(line, edits, MOST_STATES)
+    if times is None:
+        return None
+    kept = renderer.preserve_opacity
+    on_way = for_pages(patcher.patched(edits.edits, moving=True, preserve_opacity=kept))
+    edits = for_pages(patcher.patched(edits.edits, preserve_opacity=kept, bending=False))
+    knots = [parts_at(line, edits, t) for t in times]
+    unique = list(dict.fromkeys(knots))
+    moving = [n for n in range(len(edits)) if len({parts[n] for parts in unique}) > 1]
+    shells = [n for n in moving if edits[n].adjustment == "continuous"]
+    lattices = sum(len({parts[n] for parts in unique}) for n in shells)
+    nodes = next((r for r in SIZES if 6 * r**3 * lattices <= BUDGET), SIZES[-1])
+    stacks = {parts: stack_at(edits, parts, moving, nodes, on_way) for parts in unique}
+    middles = [k for k in range(len(knots) - 1) if knots[k] != knots[k + 1]]
+    total = len(stacks) + len(middles)
+    states = {parts: PathState.of(stack) for parts, stack in stacks.items()}
+    found: list[Occupancy] = []
+    errors: list[NDArray[np.float64]] = []
+    for stack in stacks.values():
+        renderer = renderer.with_edits(stack)
+        found.append(renderer.occupancy)
+        on_progress(len(found) / total)
+    for k in middles:
+        middle = stack_at(edits, parts_at(line, edits, 0.5 * (times[k] + times[k + 1])), (), nodes, on_way)
+        renderer = renderer.with_edits(middle)
+        found.append(renderer.occupancy)
+        one, other = states[knots[k]], states[knots[k + 1]]
+        if mixable(one, other):
+            errors.append(_distances(PathState.of(middle), one, other))
+        on_progress(len(found) / total)
+    data = encode_page_path(
+        renderer.field,
+        times,
+        [unique.index(parts) for parts in knots],
+        list(states.values()),
+        joined_occupancy(found),
+        preserve_opacity=renderer.preserve_opacity,
+    )
+    off = np.concatenate(errors) if errors else np.zeros(1)
+    return PathEdits(data, len(unique), nodes, (float(off.mean()), float(np.percentile(off, 99))))
+
+
+Parts = tuple[float, ...]
+
+
+def state_times(line: Timeline, edits: EditStack, most: int) -> list[float] | None:
+    """Seconds at which states are taken, at most so many: where edits move, and where they begin and end to.
+
+    None where all edits have gone all the way all along.
+    """
+    count = max(2, round(line.seconds * STATES_A_SECOND) + 1)
+    while True:
+        at = np.linspace(0.0, line.seconds, count)
+        rows = [parts_at(line, edits, t) for t in at]
+        if all(part == 1.0 for row in rows for part in row):
+            return None
+        last = count - 1
+        kept = [n for n in range(count) if n in (0, last) or not rows[n - 1] == rows[n] == rows[n + 1]]
+        if len(kept) <= most or count <= 2:
+            return [float(at[n]) for n in kept]
+        count = max(2, int(count * most / len(kept)))
+
+
+def parts_at(line: Timeline, edits: EditStack, seconds: float) -> Parts:
+    """How far each edit has gone, 1 for those that the path does not name."""
+    named = line.parts(np.array([seconds]))
+    shown = [number for number, edit in enumerate(edits, 1) if edit.enabled and edit.changes_anything]
+    return tuple(
+        round(float(named[number][0]), 5) if number in named and number in shown else 1.0
+        for number in range(1, len(edits) + 1)
+    )
+
+
+def stack_at(
+    edits: EditStack,
+    parts: Parts,
+    moving: Sequence[int] = (),
+    nodes: int = LATTICE,
+    on_way: EditStack | None = None,
+) -> EditStack:
+    """The stack at these parts; the lattices of edits that move have at most `nodes` an axis.
+
+    `on_way` has the patches of edits that have begun and not gone all the way; without, they are as `edits`'.
+    """
+    found: list[Edit] = []
+    for number, (edit, part) in enumerate(zip(edits, parts, strict=True)):
+        try:
+            there = partial_edit(edit, max(part, LEAST))
+            if there is not None and there.enabled and not there.is_possible:
+                there.check()
+        except EditError as error:
+            raise EditError(f"the camera path shows an edit at {part:.0%} of its way: {error}") from None
+        if there is None:
+            continue
+        patch = _patch(edits, on_way or edits, parts, number)
+        if patch is not there.patch:
+            there = there.replace(patch=patch)
+        if number in moving and there.lattice is not None:
+            there = there.replace(lattice=min(nodes, there.lattice))
+        found.append(there)
+    return EditStack(found)
+
+
+def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | SplatPatch | None:
+    """The patch that an edit has at these parts.
+
+    Patches show what the whole edits before them make: there is none while one of these, that reaches into
+    its region, is on its way.
+    """
+    edit, part = edits[number], parts[number]
+    if part < 1.0 and not edit.deleted:
+        edit = on_way[number]
+    if edit.patch is None or part <= 0.0:
+        return None
+    low, high = edit.patch.region.aabb
+    for before, there in zip(edits.edits[:number], parts, strict=False):
+        meets = (before.boxes[:, 0] <= high) & (before.boxes[:, 1] >= low)
+        if there < 1.0 and before.enabled and meets.all(axis=1).any():
+            return None
+    return edit.patch
+
+
+def _distances(exact: PathState, one: PathState, other: PathState) -> NDArray[np.float64]:
+    """How far the page's map half-way between two states is from the map of that moment, [PROBES]."""
+    rng = np.random.default_rng(0)
+    boxes = exact.packed.boxes
+    box = rng.integers(len(boxes), size=PROBES)
+    points = rng.uniform(boxes[box, 0], boxes[box, 1]).astype(np.float32)
+    ahead = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (PROBES, 1))
+    ours = mixed(one, other, 0.5).to_canonical(points, ahead)
+    theirs = exact.packed.to_canonical(points, ahead)
+    # A point on the other side of a cut, at the surface of a cage that moves alone, is no error of the map.
+    same = ours[3] == theirs[3]
+    return np.asarray(np.linalg.norm(ours[0] - theirs[0], axis=1)[same], np.float64)

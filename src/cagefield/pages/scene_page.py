@@ -1,0 +1,225 @@
+"""A scene as a page, one file or a folder: voxels or splats, their edits along a camera path, a viewer."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cagefield.cameras.camera import Camera, turntable
+from cagefield.cameras.keyframes import Keyframe, stills
+from cagefield.edits import EditStack
+from cagefield.errors import CagefieldError
+from cagefield.exporting import FOV_X
+from cagefield.fields.splat_field import SplatField
+from cagefield.files.atomic import recover_folder, replaced_folder
+from cagefield.pages.page_edits import encode_page_edits, for_pages
+from cagefield.pages.page_field import encode_page_field
+from cagefield.pages.page_file import bytes_until
+from cagefield.pages.page_splat_edits import encode_page_splat_edits
+from cagefield.pages.page_splats import encode_page_splats
+from cagefield.pages.path_states import PathEdits, path_edits
+from cagefield.pages.splat_path_states import splat_path_edits
+from cagefield.rendering.splats.raster_splats import changed_splats
+from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splitting import split_of
+from cagefield.rendering.voxels.voxel_renderer import Renderer
+from cagefield.scene.scene import Scene
+
+_HERE = files("cagefield.exporting")
+
+STILLS_A_SECOND = 12.0
+"""Of the camera path; between two of them the page goes straight."""
+
+PART = 3 << 16
+"""Bytes of a file in a script of a page: the browser reads on between two."""
+
+INDEX, SCRIPT = "index.html", "viewer.js"
+NAMES = {"field": "scene.field", "edits": "scene.edits", "path": "scene.path"}
+
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; worker-src blob:; "
+ONE_FILE = _POLICY + "script-src 'unsafe-inline'"
+FOLDER = _POLICY + "script-src 'self'; connect-src 'self'"
+
+
+@dataclass(frozen=True)
+class ScenePage:
+    """What a page shows: title, header (cameras, background), and files by the names in NAMES.
+
+    `along` says how edits move along the path, None where they do not.
+    """
+
+    title: str
+    header: Mapping[str, Any]
+    files: Mapping[str, bytes]
+    along: PathEdits | None
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        title: str,
+        keys: tuple[Keyframe, ...] = (),
+        *,
+        loop: bool = False,
+        step: float = 0.5,
+        on_progress: Callable[[float], None] = lambda done: None,
+    ) -> ScenePage:
+        """The page of an edited scene, with the camera path of `keys`.
+
+        `step` is the distance between samples in voxels. `on_progress` is told how much is done of the edits
+        along the path.
+
+        Raises:
+            CagefieldError: the scene holds discs (2DGS).
+            EditError: edits that cannot be evaluated, or more than a page takes.
+        """
+        field = scene.field
+        if isinstance(field, SplatField):
+            found, along = _splat_files(scene, field, keys, loop, on_progress)
+        else:
+            plain = Renderer(field, EditStack([]), preserve_opacity=scene.preserve_opacity)
+            found = {"field": encode_page_field(field, step=step, background=scene.background)}
+            if scene.edits.active:
+                found["edits"] = encode_page_edits(plain.with_edits(for_pages(scene.patched_edits)))
+            along = path_edits(plain, scene.edits, keys, loop, scene.patcher, on_progress=on_progress)
+        if along is not None:
+            found["path"] = along.data
+        header = {
+            "start": _view(_start(scene)),
+            "up": scene.up.tolist(),
+            "centre": field.center.tolist(),
+            "background": None if scene.background is None else list(scene.background),
+            "path": _path(keys, loop),
+        }
+        return cls(title, header, found, along)
+
+    def one_file(self) -> str:
+        """The text of an HTML file that needs neither server nor network.
+
+        The viewer comes first and the coarse level next, so that a browser shows it while the rest is on its
+        way.
+        """
+        field, coarse = self.files["field"], bytes_until(self.files["field"], "1.")
+        order = [("field", field[:coarse]), *((n, self.files[n]) for n in ("edits",) if n in self.files)]
+        order += [("field", field[coarse:]), *((n, self.files[n]) for n in ("path",) if n in self.files)]
+        scripts = [f"<script>{_viewer().decode()}</script>"]
+        for name, data in order:
+            scripts += [_script(name, data[at : at + PART]) for at in range(0, len(data), PART)]
+        scripts += [_script(name, None) for name in self.files]
+        entries = {name: {"bytes": len(data)} for name, data in self.files.items()}
+        return self._html(ONE_FILE, entries, "\n".join(scripts))
+
+    def folder(self) -> dict[str, bytes]:
+        """The files, by name, of a folder for a web site; addresses are relative, and new for new bytes."""
+        entries, written = {}, {SCRIPT: _viewer()}
+        for name, data in self.files.items():
+            written[NAMES[name]] = data
+            entries[name] = {"bytes": len(data), "url": _address(NAMES[name], data)}
+        script = f'<script src="{_address(SCRIPT, written[SCRIPT])}"></script>'
+        written[INDEX] = self._html(FOLDER, entries, script).encode()
+        return written
+
+    def _html(self, policy: str, entries: Mapping[str, Any], scripts: str) -> str:
+        parts = {
+            "POLICY": policy,
+            "TITLE": html.escape(self.title),
+            # Of a script's text only "</" has a meaning to the page.
+            "SCENE": json.dumps({**self.header, "files": entries}, allow_nan=False).replace("<", "\\u003c"),
+            "SCRIPTS": scripts,
+        }
+        page = (_HERE / "page.html").read_text(encoding="utf-8")
+        return re.sub("@([A-Z]+)@", lambda found: parts[found[1]], page)
+
+
+def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
+    """Writes the files of `ScenePage.folder` into a folder, which appears whole, or not at all.
+
+    What else an older folder holds stays there.
+    """
+    recover_folder(folder, lambda left: (left / SCRIPT).is_file())
+    with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:
+        for name, data in written.items():
+            (draft / name).write_bytes(data)
+
+
+def _splat_files(
+    scene: Scene,
+    field: SplatField,
+    keys: tuple[Keyframe, ...],
+    loop: bool,
+    on_progress: Callable[[float], None],
+) -> tuple[dict[str, bytes], PathEdits | None]:
+    """(files by name, edits along the path) of a scene of splats."""
+    if field.discs:
+        raise CagefieldError(
+            "the scene's splats are discs (2DGS), which pages do not draw; "
+            "export them as .ply, or render a video"
+        )
+    preserve_opacity, edits = scene.preserve_opacity, scene.patched_edits
+    field = with_pasted(field, edits)
+    found = {"field": encode_page_splats(field, background=scene.background)}
+    if edits.active:
+        split = split_of(field, edits)
+        changed = changed_splats(field, edits, preserve_opacity=preserve_opacity, split=split)
+        found["edits"] = encode_page_splat_edits(field, changed, packed=True)
+    along = splat_path_edits(
+        field,
+        scene.edits,
+        keys,
+        loop,
+        scene.patcher,
+        preserve_opacity=preserve_opacity,
+        on_progress=on_progress,
+    )
+    return found, along
+
+
+def _viewer() -> bytes:
+    return (_HERE / "viewer" / SCRIPT).read_bytes()
+
+
+def _address(name: str, data: bytes) -> str:
+    """The name with a query that a browser's cache knows these bytes by."""
+    return f"{name}?{hashlib.sha256(data).hexdigest()[:12]}"
+
+
+def _script(name: str, data: bytes | None) -> str:
+    text = "null" if data is None else f'"{base64.b64encode(data).decode()}"'
+    return f'<script>cagefieldViewer.take("{name}",{text})</script>'
+
+
+def _start(scene: Scene) -> Camera:
+    """The first test camera, or any, or one in front of a scene without cameras."""
+    for split in ("test", "val", "train"):
+        if scene.cameras.get(split):
+            return scene.cameras[split][0]
+    bounds = scene.field.bounds
+    radius = 0.6 * float(np.linalg.norm(bounds[1] - bounds[0])) / math.sin(0.5 * FOV_X)
+    return turntable(
+        bounds.mean(axis=0), radius, 1, elevation=0.3, up=scene.up, width=400, height=400, fov_x=FOV_X
+    )[0]
+
+
+def _view(camera: Camera) -> dict[str, Any]:
+    """A camera's pose, and the field of view of its shorter side, which the window's shorter side has."""
+    least = min(camera.width / camera.fx, camera.height / camera.fy)
+    return {"c2w": camera.c2w.ravel().tolist(), "fov_y_deg": math.degrees(2.0 * math.atan(0.5 * least))}
+
+
+def _path(keys: tuple[Keyframe, ...], loop: bool) -> dict[str, Any] | None:
+    if len(keys) < 2:
+        return None
+    pictures = stills(keys, loop=loop, fps=STILLS_A_SECOND, width=100, height=100)
+    seconds = sum(key.seconds for key in (keys if loop else keys[:-1]))
+    return {"stills": [_view(still.camera) for still in pictures], "seconds": seconds, "loop": loop}

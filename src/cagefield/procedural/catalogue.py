@@ -1,0 +1,26 @@
+"""The built-in scenes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cagefield.errors import SceneError
+from cagefield.procedural.chair import chair
+from cagefield.procedural.digger import digger
+from cagefield.procedural.microphone import microphone
+from cagefield.procedural.plant import plant
+from cagefield.procedural.scene import ProceduralScene
+
+SCENES: dict[str, Callable[[], ProceduralScene]] = {
+    "digger": digger,
+    "chair": chair,
+    "microphone": microphone,
+    "plant": plant,
+}
+
+
+def procedural_scene(name: str) -> ProceduralScene:
+    """The built-in scene of that name. Raises SceneError with the names there are."""
+    if name not in SCENES:
+        raise SceneError(f"there is no built-in scene {name!r}; choose one of {', '.join(SCENES)}")
+    return SCENES[name]()

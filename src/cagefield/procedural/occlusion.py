@@ -1,0 +1,106 @@
+"""Baked occlusion of a scene as modelled: corners and gaps are darker, as ambient light would have it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from cagefield.procedural.parts import Part, Placed
+
+
+class Around(Protocol):
+    """A closed surface seen from within."""
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance [N] of points [3,N] within it to its nearest wall, negative outside."""
+        ...
+
+
+class Occlusion:
+    """Openness in [0,1] of surface points of the scene as modelled, from a lattice of distances.
+
+    1 - sum_i w_i max(0, h_i - distance(p + h_i n)) / h_i: how much nearer other surfaces are than open space.
+    """
+
+    taps = ((0.06, 0.45), (0.14, 0.35), (0.28, 0.2))
+
+    def __init__(
+        self,
+        parts: tuple[Part, ...],
+        around: Around | None = None,
+        spacing: float = 0.025,
+        *,
+        beside: Occlusion | None = None,
+    ) -> None:
+        """`around`: a closed surface that the parts stand in, as a room's walls; `spacing`: the lattice's.
+
+        `beside`: another of the same spacing, whose lattice this one's continues: where both know the same
+        surfaces they are equal.
+        """
+        self._parts, self._around, self.spacing, self._beside = parts, around, spacing, beside
+
+    @cached_property
+    def _lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(origin [3], distances [X,Y,Z]) of the union of the parts, up to the reach of the last tap."""
+        reach = self.reach
+        lows = np.min([part.bounds[0] for part in self._parts], 0) - reach
+        highs = np.max([part.bounds[1] for part in self._parts], 0) + reach
+        if self._beside is not None:
+            node = self._beside._lattice[0].astype(np.float64)
+            lows = node + np.floor((lows - node) / self.spacing + 1e-3) * self.spacing
+        axes = [np.arange(lo, hi + self.spacing, self.spacing) for lo, hi in zip(lows, highs, strict=True)]
+        lattice = np.full([len(axis) for axis in axes], reach, np.float32)
+        for part in self._parts:
+            for primitive in part.primitives:
+                placed = Placed.build(part, primitive)
+                for number, center in enumerate(placed.shift):
+                    half = np.abs(placed.linear[number]) @ placed.extent + np.float32(reach)
+                    near = tuple(
+                        slice(*np.searchsorted(axis, (c - h, c + h)))
+                        for axis, c, h in zip(axes, center, half, strict=True)
+                    )
+                    grid = np.meshgrid(
+                        *(axis[cut] for axis, cut in zip(axes, near, strict=True)), indexing="ij"
+                    )
+                    points = np.stack(grid).reshape(3, -1).astype(np.float32)
+                    distance = placed.distance(points, np.full(points.shape[1], number))
+                    lattice[near] = np.minimum(lattice[near], distance.reshape(grid[0].shape))
+        return lows.astype(np.float32), lattice
+
+    def __call__(self, points: NDArray[np.float32], normals: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Openness [N] at points [3,N] with unit normals [3,N], both as modelled."""
+        openness = np.ones(points.shape[1], np.float32)
+        for height, weight in self.taps:
+            distance = self.distance(points + np.float32(height) * normals)
+            openness -= np.float32(weight / height) * np.clip(height - distance, 0, height)
+        return np.clip(openness, 0, 1)
+
+    @property
+    def reach(self) -> float:
+        """The largest distance that is known; `distance` is no larger."""
+        return self.taps[-1][0] + self.spacing
+
+    @property
+    def bounds(self) -> NDArray[np.float32]:
+        """Box [2,3] outside which no part is within `reach`."""
+        origin, lattice = self._lattice
+        size = np.array(lattice.shape, np.float32) - 1
+        return np.stack([origin, origin + np.float32(self.spacing) * size])
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance [N] of points [3,N] to the nearest surface as modelled, up to `reach`."""
+        distance = self.distance_to_parts(points)
+        if self._around is not None:
+            np.minimum(distance, self._around.distance(points), out=distance)
+        return distance
+
+    def distance_to_parts(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same without what is around the parts."""
+        origin, lattice = self._lattice
+        at = (points - origin[:, None]) / np.float32(self.spacing)
+        distance: NDArray[np.float32] = map_coordinates(lattice, at, order=1, mode="nearest")
+        return distance

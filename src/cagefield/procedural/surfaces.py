@@ -1,0 +1,133 @@
+"""Colours and normals of points on the surface of a procedural scene, and the scene as a radiance field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.procedural.parts import Placed, apply
+from cagefield.procedural.shading import Light, shade
+from cagefield.typing import Float32, Int
+
+Openness = Callable[[Float32, Float32], Float32]
+
+DEPTH = 2.0
+"""Depth in units of eps at which a field's shell starts: less, and outlines grow; more, and faces sink in."""
+
+SHELL = 6.0
+"""Distance in units of eps past which a field's sigma is negligible: sigmoid(-SHELL - DEPTH) = 3e-4."""
+
+
+def _unit(vectors: Float32) -> Float32:
+    length = np.sqrt((vectors**2).sum(0))
+    return vectors / np.maximum(length, np.float32(1e-12))
+
+
+def surface(
+    item: Placed,
+    points: Float32,
+    instance: Int,
+    viewdirs: Float32,
+    *,
+    openness: Openness,
+    relit: bool,
+    light: Light = shade,
+) -> tuple[Float32, Float32]:
+    """(rgb [N,3], unit world normals [N,3]) of points [3,N] on the surface of one placed primitive.
+
+    viewdirs [3,N]; openness maps modelled points and normals [3,N] to occlusion.
+    """
+    local = item.local(points, instance)
+    normals = _unit(item.world_gradient(item.local_gradient(local, instance), instance))
+    motion = item.part.motion
+    modelled_points, modelled_normals, modelled_dirs = points, normals, viewdirs
+    if not np.array_equal(motion, np.eye(4)):
+        inverse = np.linalg.inv(motion)
+        modelled_points = apply(inverse[:3, :3], points) + inverse[:3, 3:].astype(np.float32)
+        modelled_normals = _unit(apply(motion[:3, :3].T, normals))
+        modelled_dirs = _unit(apply(inverse[:3, :3], viewdirs))
+    albedo = item.primitive.texture(local.T, instance)
+    if item.primitive.luminous:
+        return albedo * np.float32(item.primitive.luminous), normals.T
+    rgb = light(
+        albedo,
+        modelled_points,
+        normals if relit else modelled_normals,
+        viewdirs if relit else modelled_dirs,
+        occlusion=openness(modelled_points, modelled_normals),
+        gloss=item.primitive.gloss,
+    )
+    return rgb, normals.T
+
+
+@dataclass(frozen=True)
+class SurfaceField:
+    """Radiance field of solid surfaces: sigma = sigmoid(-distance / eps - DEPTH) / (eps ln 2).
+
+    The optical depth from open space is 1 at DEPTH * eps below a flat surface. Distances are
+    Euclidean for parts that were scaled alike on all axes, accurate to first order for the others.
+    """
+
+    placed: tuple[Placed, ...]
+    openness: Openness
+    relit: bool
+    eps: float
+    bounds: NDArray[np.float64]
+    light: Light = shade
+
+    def __call__(self, positions: NDArray[Any], viewdirs: NDArray[Any]) -> tuple[Float32, Float32]:
+        """(sigma [N], rgb [N,3]); rgb is 0 further than SHELL * eps from all surfaces."""
+        points = np.ascontiguousarray(positions, np.float32)
+        distance, owner, instance = self.distance(points)
+        with np.errstate(over="ignore"):
+            sigma = (
+                1 / (1 + np.exp(distance / np.float32(self.eps) + DEPTH)) / np.float32(self.eps * np.log(2))
+            )
+        rgb = np.zeros((len(points), 3), np.float32)
+        for index in np.unique(owner[owner >= 0]):
+            rows = np.flatnonzero(owner == index)
+            rgb[rows], _ = surface(
+                self.placed[index],
+                np.ascontiguousarray(points[rows].T),
+                instance[rows],
+                np.ascontiguousarray(viewdirs[rows].T, np.float32),
+                openness=self.openness,
+                relit=self.relit,
+                light=self.light,
+            )
+        return sigma, rgb
+
+    def distance(self, points: Float32) -> tuple[Float32, Int, Int]:
+        """(signed distance [N], nearest primitive, its instance); inf and -1 beyond SHELL * eps."""
+        reach = np.float32(SHELL * self.eps)
+        distance = np.full(len(points), np.inf, np.float32)
+        owner, which = np.full(len(points), -1, np.intp), np.zeros(len(points), np.intp)
+        part_rows: dict[str, Int] = {}
+        for index, item in enumerate(self.placed):
+            if item.part.name not in part_rows:
+                low, high = item.part.bounds[0] - reach, item.part.bounds[1] + reach
+                part_rows[item.part.name] = np.flatnonzero(((points > low) & (points < high)).all(1))
+            rows, instance = _candidates(item, points, part_rows[item.part.name], reach)
+            gap = item.distance(np.ascontiguousarray(points[rows].T), instance)
+            near = gap < reach
+            rows, instance, gap = rows[near], instance[near], gap[near]
+            before = distance[rows]
+            np.minimum.at(distance, rows, gap)
+            wins = (distance[rows] == gap) & (gap < before)
+            owner[rows[wins]], which[rows[wins]] = index, instance[wins]
+        return distance, owner, which
+
+
+def _candidates(item: Placed, points: Float32, rows: Int, reach: np.float32) -> tuple[Int, Int]:
+    """(rows of points, instances) whose ball, grown by reach, holds the point."""
+    kept_rows, kept_instances = [], []
+    for instance, (center, radius) in enumerate(zip(item.shift, item.radii, strict=True)):
+        offset = points[rows] - center
+        inside = np.flatnonzero(np.einsum("ni,ni->n", offset, offset) < (radius + reach) ** 2)
+        kept_rows.append(rows[inside])
+        kept_instances.append(np.full(len(inside), instance, np.intp))
+    return np.concatenate(kept_rows), np.concatenate(kept_instances)

@@ -1,0 +1,93 @@
+"""The map of an edit stack for tensors: the same kernel, on the device where the tensors are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from cagefield.compute import devices
+from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.quadrants import take_tensors
+from cagefield.edits.device.device_stack import DeviceStack, PackedStack
+from cagefield.edits.device.kernels.edit_maps import EditArgs
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.rendering.nerf.kernels.torch_edit_map import map_tensors
+
+take_tensors(torch.Tensor)
+
+
+class LayeredStack(PackedStack, Protocol):
+    """What of an edit stack is packed, and the layers of its patches."""
+
+    @property
+    def layers(self) -> Sequence[VoxelField]: ...
+
+
+class TensorMap:
+    """An edit stack as a function of tensors.
+
+    On a GPU the kernel reads and writes the tensors where they are. On the CPU it sees them as arrays of the
+    same memory, which it takes faster; `as_tensors` hands it tensors there too.
+    """
+
+    def __init__(
+        self,
+        edits: LayeredStack,
+        device: torch.device,
+        *,
+        preserve_opacity: bool = True,
+        as_tensors: bool = False,
+    ) -> None:
+        packed = DeviceStack.from_stack(edits)
+        self.device = device
+        self.preserve_opacity = preserve_opacity
+        self._as_arrays = device.type == "cpu" and not as_tensors
+        self.count, self.flows = packed.n_edits, packed.has_flows
+        self._layers = tuple(zip(edits.layers, edits.places, strict=True))
+        self._edits = EditArgs(self._argument(packed.params), self._argument(packed.lattice), packed.n_edits)
+
+    def _argument(self, values: NDArray[np.float32]) -> Any:
+        return values if self._as_arrays else torch.from_numpy(values.copy()).to(self.device)
+
+    def __call__(self, points: Any, viewdirs: Any) -> tuple[Any, Any, Any]:
+        """(canonical points [N,3], unit viewdirs [N,3], gain [N]) of deformed samples [N,3].
+
+        Density is multiplied by the gain: 0 where a sample is emptied, else 1, or |J d| to preserve opacity.
+        """
+        return self._mapped(points, viewdirs, self.preserve_opacity)[:3]
+
+    def evaluated(
+        self, points: Any, viewdirs: Any, field: Callable[[Any, Any], tuple[Any, Any]]
+    ) -> tuple[Any, Any]:
+        """(sigma [N], rgb [N,3]) of a canonical field at deformed samples [N,3]; of layers in patches."""
+        points, viewdirs, gain, places = self._mapped(points, viewdirs, self.preserve_opacity)
+        sigma, rgb = field(points, viewdirs)
+        for layer, place in self._layers:
+            rows = torch.nonzero(places == place)[:, 0]
+            if len(rows):
+                at, along = (values[rows].cpu().numpy() for values in (points, viewdirs))
+                own = [torch.from_numpy(values).to(self.device) for values in layer(at, along)]
+                sigma, rgb = sigma.index_copy(0, rows, own[0]), rgb.index_copy(0, rows, own[1])
+        return sigma * gain, rgb
+
+    def jacobian(self, points: Any) -> Any:
+        """The map's Jacobian [N,3,3] at deformed points [N,3]; 0 where a sample is emptied."""
+        columns = []
+        for axis in torch.eye(3, device=self.device):
+            _, along, stretch, _ = self._mapped(points, axis.expand(points.shape), True)
+            columns.append(along * stretch[:, None])
+        return torch.stack(columns, dim=2)
+
+    def _mapped(self, points: Any, viewdirs: Any, preserve_opacity: bool) -> tuple[Any, Any, Any, Any]:
+        """What the call returns, and the places [N] that samples are read at (`fields.voxel_layers`)."""
+        devices.start()
+        samples = torch.cat([points, viewdirs], dim=1).contiguous()
+        out = torch.empty((len(samples), 8), dtype=torch.float32, device=self.device)
+        if len(samples):
+            table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
+            map_tensors(table, deal_of(len(samples)), result, self._edits, self.flows, preserve_opacity)
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]

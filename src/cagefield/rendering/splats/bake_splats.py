@@ -1,0 +1,99 @@
+"""Edited splats as a field of their own, as a file of splats can hold them.
+
+Notation: J = d(deformed)/d(canonical) at a splat's mean, R diag(s) its own axes and scales. Its covariance
+becomes J C J^T = A A^T with A = J R diag(s) = U S V^T, so U are its new axes and S its new scales. Colour
+turns by P, the rotation of J's polar decomposition J = P (P^T J): see `sh_rotation`.
+
+Which splats move, which are copied and which are hidden: `moved_splats`; opacity: `deformed_splats`; those
+that the map bends over, or that a cut goes through, are split first: `splat_splitting`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from cagefield.edits import EditStack
+from cagefield.fields.sh_rotation import rotated_sh
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
+from cagefield.rendering.splats.splat_provenance import with_pasted
+from cagefield.rendering.splats.splitting import split_of
+from cagefield.typing import Array, Float32
+
+
+def baked_splats(
+    field: SplatField, edits: EditStack, *, preserve_opacity: bool = True, split: bool = True
+) -> SplatField:
+    """The splats that edits make of a field; those that no edit reaches come first, as they were.
+
+    Its box is the field's, grown by where edits take something.
+
+    Raises:
+        EditError: an edit that cannot be evaluated.
+    """
+    if not edits.active:
+        return field
+    field = with_pasted(field, edits)
+    moved = moved_splats(field, edits)
+    parts = []
+    found = split_of(field, edits) if split else None
+    if found is not None:
+        moved = moved.without(found.parents)
+        parts.append(_baked(found.children, moved_splats(found.children, edits), preserve_opacity))
+    parts.insert(0, _baked(field, moved, preserve_opacity))
+    boxes = np.concatenate([field.bounds[None], *(edit.boxes for edit in edits.active)])
+    means, log_scales, quaternions, opacities, sh = (
+        np.concatenate([part[n] for part in parts]) for n in range(5)
+    )
+    return dataclasses.replace(
+        field,
+        means=means,
+        log_scales=log_scales,
+        quaternions=quaternions,
+        opacities=opacities,
+        sh=sh,
+        bounds=np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
+    )
+
+
+def where_they_are(field: SplatField, moved: MovedSplats, preserve_opacity: bool = True) -> SplatField:
+    """A field's splats where they are: those in their own places first, then the rows of `moved`."""
+    means, log_scales, quaternions, opacities, sh = _baked(field, moved, preserve_opacity)
+    return dataclasses.replace(
+        field, means=means, log_scales=log_scales, quaternions=quaternions, opacities=opacities, sh=sh
+    )
+
+
+def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tuple[Float32, ...]:
+    """Means, log scales, quaternions, opacities and harmonics of a field's splats where they are."""
+    kept, source = ~moved.left, moved.source
+    axes = rotation_matrices(field.quaternions[source].astype(np.float64))
+    axes = axes * np.exp(field.log_scales[source].astype(np.float64))[:, None]
+    turned, scales, _ = np.linalg.svd(moved.jacobian @ axes)
+    turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
+    sh = moved.sh(field.sh)
+    opacities = field.opacities[source].astype(np.float64)
+    if not preserve_opacity:
+        growth = np.cbrt(np.abs(np.linalg.det(moved.jacobian)))
+        opacities = 1.0 - (1.0 - opacities) ** growth
+    elsewhere = (
+        moved.points,
+        np.log(np.maximum(scales, 1e-30)),
+        quaternions_of(turned),
+        opacities,
+        rotated_sh(field.sh[source] if sh is None else sh, _polar_rotations(moved.jacobian)),
+    )
+    own = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
+    return tuple(
+        np.concatenate([values[kept], there], dtype=np.float32)
+        for values, there in zip(own, elsewhere, strict=True)
+    )
+
+
+def _polar_rotations(jacobian: Array) -> Array:
+    """P [N,3,3] of J = P S with S symmetric and positive."""
+    u, _, vt = np.linalg.svd(jacobian)
+    return np.asarray(u @ vt)

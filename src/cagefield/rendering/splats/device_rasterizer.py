@@ -1,0 +1,196 @@
+"""Splats rasterised on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
+
+What `splat_rasterizer` does on the CPU, with the same layouts of pictures and sums.
+Sorting is done on the host: depths, then the tiles that each splat touches, both stable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
+from cagefield.compute.devices import floats, ints
+from cagefield.rendering.splats.kernels import device_rasterizer as kernels
+from cagefield.rendering.splats.kernels.blending import SUMS
+from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
+from cagefield.rendering.voxels.device_grid import to_device
+from cagefield.typing import Float32
+
+_FARTHEST = 1e9
+"""Largest |(x/z, y/z)| that float32 squares."""
+
+
+class SplatArrays:
+    """Splats on the device, kept from picture to picture; with their normals [N,3] where these were given."""
+
+    def __init__(self, splats: DeformedSplats, normals: Float32 | None = None) -> None:
+        devices.start()
+        self.splats = splats
+        self.count = len(splats)
+        self.has_normals = normals is not None
+        self.means, self.covariances, self.opacities, self.sh, self.rotations, self.normals = (
+            to_device(np.zeros(1, np.float32) if values is None else values)
+            for values in (
+                splats.means,
+                splats.covariances,
+                splats.opacities,
+                splats.sh,
+                splats.rotations,
+                normals,
+            )
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceProjection:
+    """As `splat_rasterizer.Projection`, with packed splats, `ids` and `starts` on the device.
+
+    order, firsts, slots: as there, on the host.
+    """
+
+    packed: Any
+    ids: Any
+    starts: Any
+    order: NDArray[np.int64]
+    firsts: NDArray[np.int64]
+    slots: NDArray[np.int32]
+    ends: NDArray[np.int64]
+    width: int
+    height: int
+
+    @property
+    def across(self) -> int:
+        """Tiles in a row of the picture."""
+        return -(-self.width // TILE)
+
+    @property
+    def tiles(self) -> int:
+        """Tiles of the picture."""
+        return len(self.ends)
+
+    @property
+    def pairs(self) -> int:
+        """Pairs (tile, splat)."""
+        return int(self.firsts[-1])
+
+    def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
+        """The picture [tiles,channels,AREA], and where each tile's splats end; see `Projection.blend`."""
+        out = _empty(self.tiles * channels * AREA)
+        kernels.blend(self.packed, self.ids, self.starts, self.tiles, self.across, out, channels)
+        return out.to_numpy().reshape(self.tiles, channels, AREA), self.ends
+
+    def picture(self, channels: int = DEPTH) -> Float32:
+        """The picture [H,W,channels]."""
+        return untiled(self.blend(channels)[0], self.width, self.height)
+
+    def gradients(self, colour: Float32, slopes: Float32) -> Float32:
+        """Sums [pairs, SUMS] for dL/d(picture) `slopes` [tiles,3,AREA]; see `Projection.gradients`."""
+        sums = to_device(np.zeros(max(1, self.pairs) * SUMS, np.float32))
+        kernels.gradients(
+            self.packed,
+            self.ids,
+            self.starts,
+            self.tiles,
+            ints((self.width, self.height)),
+            to_device(colour),
+            to_device(slopes),
+            sums,
+        )
+        return sums.to_numpy().reshape(-1, SUMS)[: self.pairs]
+
+    def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
+        """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
+        out = _empty(len(pixels))
+        kernels.opacity_before(
+            self.packed,
+            self.ids,
+            self.starts,
+            self.across,
+            to_device(np.asarray(pixels, np.float32)),
+            to_device(np.asarray(distances, np.float32)),
+            out,
+            len(pixels),
+        )
+        return out.to_numpy()[: len(pixels)]
+
+
+def project(
+    arrays: SplatArrays, camera: Camera, *, near: float, region: Region | None = None
+) -> DeviceProjection:
+    """The splats as `camera` sees them; see `splat_rasterizer.project`."""
+    x, y, width, height = region or (0, 0, camera.width, camera.height)
+    lens = intrinsics(camera)
+    splats = arrays.splats
+    packed, keys = _empty(arrays.count * PACKED), _empty(arrays.count)
+    boxes = to_device(np.zeros(max(1, arrays.count) * 4, np.int32))
+    origin = camera.origin.astype(np.float32).astype(np.float64)
+    across, down = -(-width // TILE), -(-height // TILE)
+    kernels.project(
+        arrays.means,
+        arrays.covariances,
+        arrays.opacities,
+        arrays.sh,
+        arrays.rotations,
+        arrays.normals,
+        arrays.count,
+        floats(world_to_camera(camera)),
+        floats(origin),
+        floats(camera.origin - origin),
+        floats(lens.focal),
+        floats(lens.centre - (x, y)),
+        ints((width, height)),
+        floats(lens.limits),
+        floats(lens.coefficients),
+        min(lens.radius_limit, _FARTHEST),
+        near,
+        int(splats.antialiased),
+        int(splats.rotations is not None),
+        int(arrays.has_normals),
+        packed,
+        keys,
+        boxes,
+        splats.sh.shape[1],
+        lens.model,
+    )
+    box = boxes.to_numpy().reshape(-1, 4)
+    shown = np.flatnonzero(box[:, 1] > box[:, 0])
+    order = shown[np.argsort(keys.to_numpy()[shown], kind="stable")]
+    on_device = to_device(order.astype(np.int32))
+    counts = to_device(np.zeros(max(1, len(order)), np.int32))
+    kernels.count_tiles(on_device, boxes, packed, counts, len(order))
+    firsts = np.concatenate([[0], np.cumsum(counts.to_numpy()[: len(order)], dtype=np.int64)])
+    touched = to_device(np.zeros(max(1, int(firsts[-1])), np.int32))
+    kernels.list_tiles(
+        on_device, to_device(firsts.astype(np.int32)), boxes, packed, across, touched, len(order)
+    )
+    tile_of = touched.to_numpy()[: int(firsts[-1])]
+    by_tile = np.argsort(tile_of, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(tile_of, minlength=across * down), dtype=np.int64)])
+    slots = np.empty(len(by_tile), np.int32)
+    slots[by_tile] = np.arange(len(by_tile), dtype=np.int32)
+    ids = np.repeat(order, np.diff(firsts))[by_tile].astype(np.int32)
+    return DeviceProjection(
+        packed,
+        to_device(ids),
+        to_device(starts.astype(np.int32)),
+        order,
+        firsts,
+        slots,
+        starts[1:],
+        width,
+        height,
+    )
+
+
+def _empty(size: int) -> Any:
+    """An uninitialised float32 array on the device."""
+    from cagefield.compute.quadrants import qd
+
+    return qd.ndarray(dtype=qd.f32, shape=(max(1, size),))

@@ -1,0 +1,1 @@
+"""Numba and Quadrants kernels of the splat rasterizers."""

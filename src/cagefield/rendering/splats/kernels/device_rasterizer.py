@@ -1,0 +1,413 @@
+"""Splats onto a picture on Quadrants' devices: what `splat_projection` and `splat_blending` do, for GPUs.
+
+Notation and layouts (packed splats, sums, tiles) as there. One thread has one splat, or one pixel; a pixel is
+left once it lets less than T_MIN through, and pixels add to a pair's sums atomically. Everything is float32:
+splats as thin as a pixel and much longer than a picture come out some percent wider or narrower.
+
+The oracle is `cagefield.rendering.splats.reference_rasterizer`.
+"""
+
+# Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
+
+from cagefield.compute.quadrants import qd
+from cagefield.rendering.splats.kernels import blending
+from cagefield.rendering.splats.kernels.blending import SUMS
+from cagefield.rendering.splats.kernels.projection import (
+    ALPHA_MAX,
+    ALPHA_MIN,
+    AREA,
+    BLUR,
+    FISHEYE,
+    LEAST_COMPENSATION,
+    OPENCV,
+    PACKED,
+    SLOPE_BLUR,
+    TILE,
+)
+from cagefield.rendering.voxels.kernels.grid import F32, I32, sh_basis, vec3
+
+T_MIN = float(blending.T_MIN)
+
+MOST_VARIANCE = 1e15
+"""Splats of larger variances, in pixels^2, are not drawn: their determinant would overflow."""
+
+vec2 = qd.types.vector(2, qd.f32)
+vec4 = qd.types.vector(4, qd.f32)
+vec6 = qd.types.vector(6, qd.f32)
+ivec2 = qd.types.vector(2, qd.i32)
+mat3 = qd.types.matrix(3, 3, qd.f32)
+
+
+@qd.func
+def distort(x: qd.f32, y: qd.f32, k: vec6, model: qd.template()):
+    """The lens's image of n = (x, y), and its derivative by rows: (x', y', D00, D01, D10, D11)."""
+    out = vec6(x, y, 1.0, 0.0, 0.0, 1.0)
+    s = x * x + y * y
+    if qd.static(model == OPENCV):
+        g = 1.0 + s * (k[0] + s * (k[1] + s * (k[4] + s * k[5])))
+        dg = k[0] + s * (2.0 * k[1] + s * (3.0 * k[4] + s * 4.0 * k[5]))
+        cross = 2.0 * x * y * dg + 2.0 * k[2] * x + 2.0 * k[3] * y
+        out = vec6(
+            g * x + 2.0 * k[2] * x * y + k[3] * (s + 2.0 * x * x),
+            g * y + k[2] * (s + 2.0 * y * y) + 2.0 * k[3] * x * y,
+            g + 2.0 * x * x * dg + 2.0 * k[2] * y + 6.0 * k[3] * x,
+            cross,
+            cross,
+            g + 2.0 * y * y * dg + 6.0 * k[2] * y + 2.0 * k[3] * x,
+        )
+    if qd.static(model == FISHEYE):
+        if s > 1e-6:
+            r = qd.sqrt(s)
+            t = qd.atan2(r, 1.0)
+            u = t * t
+            scale = t * (1.0 + u * (k[0] + u * (k[1] + u * (k[2] + u * k[3])))) / r
+            slope = 1.0 + u * (3.0 * k[0] + u * (5.0 * k[1] + u * (7.0 * k[2] + u * 9.0 * k[3])))
+            bend = (slope / (1.0 + s) - scale) / s
+            cross = x * y * bend
+            out = vec6(x * scale, y * scale, scale + x * x * bend, cross, cross, scale + y * y * bend)
+    return out
+
+
+@qd.kernel(fastcache=True)
+def project(
+    means: F32,
+    covariances: F32,
+    opacities: F32,
+    sh: F32,
+    rotations: F32,
+    normals: F32,
+    count: qd.i32,
+    W: mat3,
+    origin: vec3,
+    origin_rest: vec3,
+    focal: vec2,
+    centre: vec2,
+    size: ivec2,
+    limits: vec4,
+    coefficients: vec6,
+    radius_limit: qd.f32,
+    near: qd.f32,
+    antialiased: qd.i32,
+    turned: qd.i32,
+    with_normals: qd.i32,
+    packed: F32,
+    keys: F32,
+    tiles: I32,
+    K: qd.template(),
+    model: qd.template(),
+):
+    """As `splat_projection.project`; the camera is at origin + origin_rest, for float32 to hold it."""
+    across = (size.x + TILE - 1) // TILE
+    down = (size.y + TILE - 1) // TILE
+    qd.loop_config(block_dim=128)
+    for i in range(count):
+        offset = vec3(means[3 * i], means[3 * i + 1], means[3 * i + 2]) - origin - origin_rest
+        p = W @ offset
+        z = p.z
+        keys[i] = z
+        for j in range(4):
+            tiles[4 * i + j] = 0
+        if z >= near and opacities[i] > ALPHA_MIN:
+            n = vec2(p.x / z, p.y / z)
+            if n.x * n.x + n.y * n.y <= radius_limit * radius_limit:
+                nx = qd.min(limits[1], qd.max(limits[0], n.x))
+                ny = qd.min(limits[3], qd.max(limits[2], n.y))
+                lens = distort(nx, ny, coefficients, model)
+                px = (vec3(W[0, 0], W[0, 1], W[0, 2]) - nx * vec3(W[2, 0], W[2, 1], W[2, 2])) / z
+                py = (vec3(W[1, 0], W[1, 1], W[1, 2]) - ny * vec3(W[2, 0], W[2, 1], W[2, 2])) / z
+                M0 = focal.x * (lens[2] * px + lens[3] * py)
+                M1 = focal.y * (lens[4] * px + lens[5] * py)
+                at = 6 * i
+                C = qd.Matrix(
+                    [
+                        [covariances[at], covariances[at + 1], covariances[at + 2]],
+                        [covariances[at + 1], covariances[at + 3], covariances[at + 4]],
+                        [covariances[at + 2], covariances[at + 4], covariances[at + 5]],
+                    ]
+                )
+                v0 = C @ M0
+                v1 = C @ M1
+                a = v0.dot(M0)
+                b = v0.dot(M1)
+                c = v1.dot(M1)
+                if a + c < MOST_VARIANCE:
+                    # Rounded covariances may be indefinite.
+                    sharp = qd.max(0.0, a * c - b * b)
+                    det = sharp + BLUR * (a + c + BLUR)
+                    o = opacities[i]
+                    if antialiased == 1:
+                        o *= qd.max(LEAST_COMPENSATION, qd.sqrt(sharp / det))
+                    reach = 2.0 * qd.log(o / ALPHA_MIN)
+                    seen = distort(n.x, n.y, coefficients, model)
+                    u = focal.x * seen[0] + centre.x
+                    v = focal.y * seen[1] + centre.y
+                    rx = qd.sqrt(qd.max(reach, 0.0) * (a + BLUR))
+                    ry = qd.sqrt(qd.max(reach, 0.0) * (c + BLUR))
+                    inside = u + rx > 0.0 and v + ry > 0.0 and u - rx < size.x and v - ry < size.y
+                    if reach > 0.0 and inside:
+                        tiles[4 * i] = qd.cast(qd.max(0.0, (u - rx) / TILE), qd.i32)
+                        tiles[4 * i + 1] = qd.cast(qd.min(across - 1.0, (u + rx) / TILE), qd.i32) + 1
+                        tiles[4 * i + 2] = qd.cast(qd.max(0.0, (v - ry) / TILE), qd.i32)
+                        tiles[4 * i + 3] = qd.cast(qd.min(down - 1.0, (v + ry) / TILE), qd.i32) + 1
+                        row = PACKED * i
+                        packed[row] = u - 0.5
+                        packed[row + 1] = v - 0.5
+                        packed[row + 2] = (c + BLUR) / det
+                        packed[row + 3] = -b / (c + BLUR)
+                        packed[row + 4] = 1.0 / (c + BLUR)
+                        packed[row + 5] = o
+                        packed[row + 9] = ry
+                        distance = offset.norm()
+                        e = offset / distance
+                        packed[row + 10] = distance
+                        along0 = e.dot(v0)
+                        along1 = e.dot(v1)
+                        slope_det = sharp + SLOPE_BLUR * (a + c + SLOPE_BLUR)
+                        packed[row + 11] = (along0 * (c + SLOPE_BLUR) - along1 * b) / slope_det
+                        packed[row + 12] = (along1 * (a + SLOPE_BLUR) - along0 * b) / slope_det
+                        if with_normals == 1:
+                            normal = vec3(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2])
+                            sign = 1.0
+                            if normal.dot(e) > 0.0:
+                                sign = -1.0
+                            for j in qd.static(range(3)):
+                                packed[row + 13 + j] = sign * normal[j]
+                        if turned == 1:
+                            first = 9 * i
+                            back = vec3(0.0, 0.0, 0.0)
+                            for j in qd.static(range(3)):
+                                for m in qd.static(range(3)):
+                                    back[j] += rotations[first + 3 * m + j] * e[m]
+                            e = back
+                        basis = sh_basis(e, K)
+                        for channel in qd.static(range(3)):
+                            colour = 0.5
+                            for j in qd.static(range(K)):
+                                colour += basis[j] * sh[(i * K + j) * 3 + channel]
+                            packed[row + 6 + channel] = qd.max(0.0, colour)
+
+
+@qd.func
+def overlaps(packed: qd.template(), i: qd.i32, column: qd.i32, line: qd.i32):
+    """1 where alpha exceeds ALPHA_MIN at some point of a tile; see `splat_tiles.overlaps`."""
+    row = PACKED * i
+    x0 = column * TILE - packed[row]
+    y0 = line * TILE - packed[row + 1]
+    x1 = x0 + (TILE - 1)
+    y1 = y0 + (TILE - 1)
+    A = packed[row + 2]
+    k = packed[row + 3]
+    D = packed[row + 4]
+    found = 1
+    if not (x0 <= 0.0 and x1 >= 0.0 and y0 <= 0.0 and y1 >= 0.0):
+        least = 1e30
+        for side in qd.static(range(2)):
+            y = y0
+            x = x0
+            if qd.static(side == 1):
+                y = y1
+                x = x1
+            across = qd.min(x1, qd.max(x0, -k * y)) + k * y
+            least = qd.min(least, A * across * across + D * y * y)
+            y = qd.min(y1, qd.max(y0, -A * k * x / (A * k * k + D)))
+            across = x + k * y
+            least = qd.min(least, A * across * across + D * y * y)
+        if least >= 2.0 * qd.log(packed[row + 5] / ALPHA_MIN):
+            found = 0
+    return found
+
+
+@qd.kernel(fastcache=True)
+def count_tiles(order: I32, tiles: I32, packed: F32, counts: I32, number: qd.i32):
+    """Writes how many tiles each splat of `order` touches."""
+    qd.loop_config(block_dim=128)
+    for q in range(number):
+        i = order[q]
+        n = 0
+        for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
+            for column in range(tiles[4 * i], tiles[4 * i + 1]):
+                n += overlaps(packed, i, column, line)
+        counts[q] = n
+
+
+@qd.kernel(fastcache=True)
+def list_tiles(
+    order: I32, firsts: I32, tiles: I32, packed: F32, across: qd.i32, touched: I32, number: qd.i32
+):
+    """Writes the tiles of splat order[q] to touched[firsts[q]:firsts[q+1]]."""
+    qd.loop_config(block_dim=128)
+    for q in range(number):
+        i = order[q]
+        n = firsts[q]
+        for line in range(tiles[4 * i + 2], tiles[4 * i + 3]):
+            for column in range(tiles[4 * i], tiles[4 * i + 1]):
+                if overlaps(packed, i, column, line) == 1:
+                    touched[n] = line * across + column
+                    n += 1
+
+
+@qd.kernel(fastcache=True)
+def blend(
+    packed: F32, ids: I32, starts: I32, count: qd.i32, across: qd.i32, out: F32, channels: qd.template()
+):
+    """Blends all tiles into out [tiles, channels, AREA]; see `splat_blending.blend`."""
+    qd.loop_config(block_dim=AREA)
+    for n in range(count * AREA):
+        t = n // AREA
+        pixel = n % AREA
+        x = qd.cast((t % across) * TILE + pixel % TILE, qd.f32)
+        y = qd.cast((t // across) * TILE + pixel // TILE, qd.f32)
+        T = 1.0
+        rgb = vec3(0.0, 0.0, 0.0)
+        normal = vec3(0.0, 0.0, 0.0)
+        depth = 0.0
+        e = starts[t]
+        end = starts[t + 1]
+        while e < end and T >= T_MIN:
+            row = PACKED * ids[e]
+            dx = x - packed[row]
+            dy = y - packed[row + 1]
+            l = dx + packed[row + 3] * dy
+            q = packed[row + 2] * l * l + packed[row + 4] * dy * dy
+            a = qd.min(packed[row + 5] * qd.exp(-0.5 * q), ALPHA_MAX)
+            if a >= ALPHA_MIN:
+                w = a * T
+                T -= w
+                rgb += w * vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                if qd.static(channels > 4):
+                    depth += w * (packed[row + 10] + packed[row + 11] * dx + packed[row + 12] * dy)
+                if qd.static(channels > 5):
+                    normal += w * vec3(packed[row + 13], packed[row + 14], packed[row + 15])
+            e += 1
+        at = t * channels * AREA + pixel
+        out[at] = T
+        for j in qd.static(range(3)):
+            out[at + (1 + j) * AREA] = rgb[j]
+        if qd.static(channels > 4):
+            out[at + 4 * AREA] = depth
+        if qd.static(channels > 5):
+            for j in qd.static(range(3)):
+                out[at + (5 + j) * AREA] = normal[j]
+
+
+@qd.kernel(fastcache=True)
+def gradients(
+    packed: F32,
+    ids: I32,
+    starts: I32,
+    count: qd.i32,
+    size: ivec2,
+    colour: F32,
+    slopes: F32,
+    sums: F32,
+):
+    """Adds to the sums of all pairs, which are 0 before; see `splat_blending.gradients`."""
+    across = (size.x + TILE - 1) // TILE
+    qd.loop_config(block_dim=AREA)
+    for n in range(count * AREA):
+        t = n // AREA
+        pixel = n % AREA
+        column = (t % across) * TILE + pixel % TILE
+        line = (t // across) * TILE + pixel // TILE
+        if column < size.x and line < size.y:
+            x = qd.cast(column, qd.f32)
+            y = qd.cast(line, qd.f32)
+            at = 3 * t * AREA + pixel
+            g = vec3(slopes[at], slopes[at + AREA], slopes[at + 2 * AREA])
+            rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
+            # The pixel's sum of |alpha dC/dalpha| first: it is part of every curvature.
+            influence = 0.0
+            T = 1.0
+            e = starts[t]
+            end = starts[t + 1]
+            while e < end and T >= T_MIN:
+                row = PACKED * ids[e]
+                dy = y - packed[row + 1]
+                l = x - packed[row] + packed[row + 3] * dy
+                q = packed[row + 2] * l * l + packed[row + 4] * dy * dy
+                a = qd.min(packed[row + 5] * qd.exp(-0.5 * q), ALPHA_MAX)
+                if a >= ALPHA_MIN:
+                    w = a * T
+                    c = vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                    rest -= w * c
+                    T -= w
+                    influence += (w * c - a / (1.0 - a) * rest).norm()
+                e += 1
+            rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
+            T = 1.0
+            e = starts[t]
+            while e < end and T >= T_MIN:
+                row = PACKED * ids[e]
+                dx = x - packed[row]
+                dy = y - packed[row + 1]
+                k = packed[row + 3]
+                l = dx + k * dy
+                ex = packed[row + 2] * l
+                f = packed[row + 4] * dy
+                ey = k * ex + f
+                full = packed[row + 5] * qd.exp(-0.5 * (l * ex + dy * f))
+                a = qd.min(full, ALPHA_MAX)
+                if a >= ALPHA_MIN:
+                    w = a * T
+                    c = vec3(packed[row + 6], packed[row + 7], packed[row + 8])
+                    rest -= w * c
+                    T -= w
+                    m = SUMS * e
+                    for j in qd.static(range(3)):
+                        qd.atomic_add(sums[m + 6 + j], w * g[j])
+                    qd.atomic_add(sums[m + 9], w)
+                    qd.atomic_add(sums[m + 19], w * g.dot(g))
+                    if full <= ALPHA_MAX:
+                        slope = w * c - a / (1.0 - a) * rest
+                        v = slope.dot(g)
+                        h = slope.norm() * influence
+                        xx = ex * ex
+                        xy = ex * ey
+                        yy = ey * ey
+                        qd.atomic_add(sums[m], v)
+                        qd.atomic_add(sums[m + 1], v * ex)
+                        qd.atomic_add(sums[m + 2], v * ey)
+                        qd.atomic_add(sums[m + 3], v * xx)
+                        qd.atomic_add(sums[m + 4], v * xy)
+                        qd.atomic_add(sums[m + 5], v * yy)
+                        qd.atomic_add(sums[m + 10], h)
+                        qd.atomic_add(sums[m + 11], h * xx)
+                        qd.atomic_add(sums[m + 12], h * xy)
+                        qd.atomic_add(sums[m + 13], h * yy)
+                        qd.atomic_add(sums[m + 14], h * xx * xx)
+                        qd.atomic_add(sums[m + 15], h * xx * xy)
+                        qd.atomic_add(sums[m + 16], h * xx * yy)
+                        qd.atomic_add(sums[m + 17], h * xy * yy)
+                        qd.atomic_add(sums[m + 18], h * yy * yy)
+                e += 1
+
+
+@qd.kernel(fastcache=True)
+def opacity_before(
+    packed: F32,
+    ids: I32,
+    starts: I32,
+    across: qd.i32,
+    pixels: F32,
+    distances: F32,
+    out: F32,
+    number: qd.i32,
+):
+    """Opacity gathered before distances along the rays of pixels; see `splat_blending.opacity_before`."""
+    for n in range(number):
+        x = pixels[2 * n] - 0.5
+        y = pixels[2 * n + 1] - 0.5
+        column = qd.cast(pixels[2 * n], qd.i32) // TILE
+        t = qd.cast(pixels[2 * n + 1], qd.i32) // TILE * across + column
+        T = 1.0
+        for e in range(starts[t], starts[t + 1]):
+            row = PACKED * ids[e]
+            dx = x - packed[row]
+            dy = y - packed[row + 1]
+            if packed[row + 10] + packed[row + 11] * dx + packed[row + 12] * dy < distances[n]:
+                l = dx + packed[row + 3] * dy
+                q = packed[row + 2] * l * l + packed[row + 4] * dy * dy
+                a = packed[row + 5] * qd.exp(-0.5 * q)
+                if a >= ALPHA_MIN:
+                    T *= 1.0 - qd.min(a, ALPHA_MAX)
+        out[n] = 1.0 - T

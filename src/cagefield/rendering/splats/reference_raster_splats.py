@@ -1,0 +1,53 @@
+"""What edits make of a field's splats, step by step in float64: the oracle of `deformed_splats`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cagefield.edits import Edit, EditStack
+from cagefield.fields.splat_field import SplatField
+from cagefield.geometry.quaternions import rotation_matrices
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.splat_provenance import at_rest, pasted_rows, with_pasted
+
+
+def deformed_splats_reference(
+    field: SplatField, edits: EditStack, *, preserve_opacity: bool = True
+) -> DeformedSplats:
+    """The splats that edits make of a field, in any order: those of all that is shown of each splat's mean.
+
+    Each edit alone is `EditStack.to_deformed` of a stack of one; a copy leaves the original besides.
+    """
+    field = with_pasted(field, edits)
+    source = np.flatnonzero(~at_rest(field))
+    p, J = field.means[source].astype(np.float64), np.tile(np.eye(3), (len(source), 1, 1))
+    for edit in edits.active:
+        mapped = EditStack([edit]).to_deformed(p)
+        shown = ~mapped.hidden
+        parts = [(source[shown], mapped.points[shown], (mapped.jacobian @ J)[shown])]
+        if edit.source is not None:
+            rows = pasted_rows(field, edit)
+            there = EditStack([Edit(edit.inner, adjustment="discrete", operations=edit.operations)])
+            moved = there.to_deformed(field.means[rows])
+            inside = edit.inner.contains(field.means[rows].astype(np.float64))
+            parts.append((rows[inside], moved.points[inside], moved.jacobian[inside]))
+        elif edit.adjustment == "discrete" and edit.keep_source:
+            original = edit.inner.contains(p) & ~edit.deformed.contains(p)
+            parts.append((source[original], p[original], J[original]))
+        source, p, J = (np.concatenate([part[n] for part in parts]) for n in range(3))
+    axes = rotation_matrices(field.quaternions.astype(np.float64))
+    axes = J @ (axes * np.exp(field.log_scales.astype(np.float64))[:, None, :])[source]
+    C = axes @ axes.transpose(0, 2, 1)
+    U, _, Vt = np.linalg.svd(J)
+    opacities = field.opacities[source].astype(np.float64)
+    if not preserve_opacity:
+        opacities = 1.0 - (1.0 - opacities) ** np.cbrt(np.abs(np.linalg.det(J)))
+    return DeformedSplats(
+        p.astype(np.float32),
+        C.reshape(-1, 9)[:, [0, 1, 2, 4, 5, 8]].astype(np.float32),
+        opacities.astype(np.float32),
+        field.sh[source],
+        (U @ Vt).astype(np.float32),
+        field.antialiased,
+        axes[:, :, :2].transpose(0, 2, 1).reshape(-1, 6).astype(np.float32) if field.discs else None,
+    )

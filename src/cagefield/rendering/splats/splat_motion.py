@@ -1,0 +1,235 @@
+"""Where edits take the splats of a field: which stay, which move, which are copied and which are hidden.
+
+A splat is where its mean is: it goes with its mean from one of an edit's regions (design: the four regions of
+an edit) as a whole. With V^c the canonical and V the deformed inner cage of a discrete edit:
+
+- in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
+- in V but not in V^c: hidden, for V shows what was in V^c.
+- pasted: it goes to V; all others stay.
+
+With a patch, splats around V^c get new light, or go, and new ones fill what was uncovered: copies of others.
+
+Of a stack, each edit takes what the ones before it made: originals and copies alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.patch import SplatPatch
+from cagefield.fields.sh import brightened
+from cagefield.fields.splat_field import SplatField
+from cagefield.rendering.splats.splat_provenance import at_rest, of_same_scene, pasted_rows
+from cagefield.typing import Array, Mask
+from cagefield.warps.discrete import DiscreteWarp
+from cagefield.warps.forward import to_deformed
+from cagefield.warps.hexahedron_map import HexahedronMap
+
+UNSEEN = 0.01
+"""The log of a change of light that is left out."""
+
+KEPT_STACKS = 6
+"""Stacks of edits of one field whose splats are kept, so that a longer stack begins where they end."""
+
+KEPT_SPLATS = 4_000_000
+"""Most moved splats that are kept of one field, 104 bytes each; the stack shown last is kept in any case."""
+
+
+@dataclass(frozen=True)
+class MovedSplats:
+    """A field's splats under edits.
+
+    Attributes:
+        left: [N], True where splat n is not shown at its own place.
+        source: [M] int64, the numbers of the splats that are shown elsewhere, any number of times.
+        points: [M,3], their means in deformed space.
+        jacobian: [M,3,3], d(deformed)/d(canonical) there.
+        gains: [M,3], what their red, green and blue are multiplied by; None where that is 1 for all.
+    """
+
+    left: Mask
+    source: NDArray[np.int64]
+    points: Array
+    jacobian: Array
+    gains: Array | None = None
+
+    def sh(self, harmonics: NDArray[np.float32]) -> NDArray[np.float32] | None:
+        """The harmonics [M,K,3] of those shown elsewhere, from the field's [N,K,3]; None for its own."""
+        if self.gains is None:
+            return None
+        return brightened(harmonics[self.source], self.gains)
+
+    @classmethod
+    def at_rest(cls, field: SplatField) -> MovedSplats:
+        """A field's splats, all in their places; those that edits are to paste are shown nowhere."""
+        none = np.zeros((0, 3))
+        return cls(at_rest(field), np.zeros(0, np.int64), none, np.zeros((0, 3, 3)))
+
+    @property
+    def is_at_rest(self) -> bool:
+        """True where all splats are in their places, and nowhere else."""
+        return not len(self.source) and not self.left.any()
+
+    @property
+    def is_whole(self) -> bool:
+        """True where each splat is shown once."""
+        elsewhere = np.zeros(len(self.left), bool)
+        elsewhere[self.source] = True
+        return len(self.source) == np.count_nonzero(elsewhere) and np.array_equal(elsewhere, self.left)
+
+    def without(self, gone: Mask) -> MovedSplats:
+        """The same, those that are True in `gone` [N] shown nowhere."""
+        kept = ~gone[self.source]
+        gains = None if self.gains is None else self.gains[kept]
+        return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
+
+    def then(
+        self, edit: Edit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
+    ) -> MovedSplats:
+        """What one more edit makes of a field's. Raises `EditError` where it cannot be evaluated."""
+        moved, carried = self._moved(edit, field.means, coarse, proceed)
+        if edit.source is not None:
+            moved, carried = moved._with(edit, field)
+        if isinstance(edit.patch, SplatPatch):
+            return moved._patched(edit, edit.patch, field, carried)
+        return moved
+
+    def _with(self, edit: Edit, field: SplatField) -> tuple[MovedSplats, Array]:
+        """(these and what an edit pastes, where those last rows [C,3] come from)."""
+        rows = pasted_rows(field, edit)
+        inside, points, jacobian = HexahedronMap(edit.deformed, edit.inner)(
+            field.means[rows].astype(np.float64)
+        )
+        gains = None
+        if self.gains is not None:
+            gains = np.concatenate([self.gains, np.ones((len(points), 3))])
+        rows = rows[inside]
+        return MovedSplats(
+            self.left,
+            np.concatenate([self.source, rows]),
+            np.concatenate([self.points, points]),
+            np.concatenate([self.jacobian, jacobian]),
+            gains,
+        ), field.means[rows].astype(np.float64)
+
+    def _moved(
+        self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
+    ) -> tuple[MovedSplats, Array]:
+        """(what an edit's map makes of these, where those of its last rows [C,3] were that it took along)."""
+        from cagefield.rendering.splats.kernels.deformation import changes, in_boxes, times
+
+        warp = edit.exact_warp
+        cages = [edit.inner.aabb] if edit.outer is None else [edit.inner.aabb, edit.outer.aabb]
+        reach = np.concatenate([edit.boxes, np.stack(cages)])
+        at_rest, elsewhere = np.empty(len(means), bool), np.empty(len(self.source), bool)
+        in_boxes(means, reach, at_rest)
+        if len(elsewhere):
+            in_boxes(self.points, reach, elsewhere)
+        still, near = np.flatnonzero(at_rest & ~self.left), np.flatnonzero(elsewhere)
+        points = np.concatenate([means[still].astype(np.float64), self.points[near]])
+        mapped = to_deformed(warp, points, coarse=coarse, proceed=proceed)
+        moves = np.empty(len(points), bool)
+        changes(points, mapped.points, mapped.jacobian, moves)
+        leaves = moves | mapped.lost
+        if isinstance(warp, DiscreteWarp) and warp.keep_source and warp.inner is not None:
+            leaves &= mapped.lost | warp.inner.deformed.contains(points)
+        left, stays = self.left.copy(), np.ones(len(self.source), bool)
+        left[still[leaves[: len(still)]]] = True
+        stays[near[leaves[len(still) :]]] = False
+        come = np.flatnonzero(moves & ~mapped.lost)
+        jacobian = mapped.jacobian[come]
+        again = come >= len(still)
+        if again.any():
+            composed = np.ascontiguousarray(jacobian[again])
+            times(composed, self.jacobian[near[come[again] - len(still)]])
+            jacobian[again] = composed
+        gains = None
+        if self.gains is not None:
+            before = np.concatenate([np.ones((len(still), 3)), self.gains[near]])
+            gains = np.concatenate([self.gains[stays], before[come]])
+        moved = MovedSplats(
+            left,
+            np.concatenate([self.source[stays], np.concatenate([still, self.source[near]])[come]]),
+            np.concatenate([self.points[stays], mapped.points[come]]),
+            np.concatenate([self.jacobian[stays], jacobian]),
+            gains,
+        )
+        return moved, points[come]
+
+    def _patched(self, edit: Edit, patch: SplatPatch, field: SplatField, carried: Array) -> MovedSplats:
+        """These with the patch of the edit that moved them; `carried` [C,3] is where its last rows were."""
+        from cagefield.rendering.splats.kernels.deformation import in_boxes
+
+        here = len(self.source) - len(carried)
+        gains = np.ones((len(self.source), 3)) if self.gains is None else self.gains.copy()
+        if patch.part is not None and len(carried):
+            gains[here:] *= np.exp(patch.part.at(carried))[:, None]
+        # What the edit left: splats in their own places, and those that earlier edits took there.
+        inside = np.empty(len(field), bool)
+        in_boxes(field.means, patch.region.aabb[None], inside)
+        still = np.flatnonzero(inside & ~self.left)
+        points = np.concatenate([field.means[still].astype(np.float64), self.points[:here]])
+        outside = np.ones(len(points), bool) if edit.source is not None else ~edit.inner.contains(points)
+        gone = patch.takes_away(points) & outside
+        log = np.where(outside, patch.light.at(points), 0.0)
+        lit = np.flatnonzero((np.abs(log[: len(still)]) > UNSEEN) & ~gone[: len(still)])
+        gains[:here] *= np.exp(log[len(still) :])[:, None]
+        left = self.left.copy()
+        left[still[gone[: len(still)]]] = True
+        left[still[lit]] = True
+        kept = np.ones(len(self.source), bool)
+        kept[:here] = ~gone[len(still) :]
+        turn = np.tile(np.eye(3), (len(lit), 1, 1))
+        parts = [
+            (self.source[kept], self.points[kept], self.jacobian[kept], gains[kept]),
+            (still[lit], points[lit], turn, np.tile(np.exp(log[lit])[:, None], 3)),
+        ]
+        if of_same_scene(patch.field, field):
+            parts.append((patch.sources, patch.points, patch.jacobian, patch.gains))
+        return MovedSplats(left, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+@dataclass(frozen=True)
+class _KnownStack:
+    """What a stack's active edits made of a field."""
+
+    edits: tuple[Edit, ...]
+    coarse: bool
+    moved: MovedSplats
+
+
+known_stacks: WeakKeyDictionary[SplatField, list[_KnownStack]] = WeakKeyDictionary()
+
+
+def moved_splats(
+    field: SplatField,
+    edits: EditStack,
+    *,
+    coarse: bool = False,
+    proceed: Callable[[], None] | None = None,
+) -> MovedSplats:
+    """A field's splats under edits, with those that they paste behind them (`pasted_splats.with_pasted`).
+
+    Raises `EditError` where an edit cannot be evaluated.
+
+    What the first of the edits made is kept between calls. `coarse` and `proceed` as for `to_deformed`.
+    """
+    active = edits.active
+    known = known_stacks.setdefault(field, [])
+    usable = [k for k in known if k.edits == active[: len(k.edits)] and (coarse or not k.coarse)]
+    start = max(usable, key=lambda k: (len(k.edits), not k.coarse), default=None)
+    moved, count = (start.moved, len(start.edits)) if start else (MovedSplats.at_rest(field), 0)
+    found = [start] if start else []
+    for number, edit in enumerate(active[count:], start=count + 1):
+        moved = moved.then(edit, field, coarse, proceed)
+        found.append(_KnownStack(active[:number], coarse, moved))
+    kept = [*reversed(found), *(k for k in known if k is not start)][:KEPT_STACKS]
+    sizes = np.cumsum([len(k.moved.source) for k in kept])
+    known[:] = [k for n, k in enumerate(kept) if n == 0 or sizes[n] <= KEPT_SPLATS]
+    return moved

@@ -1,0 +1,88 @@
+"""One edit of a stack that is replaced again and again, as by a drag, while the others stay.
+
+What the edits before it make of the field is worked out once, and so is where the edits after it take the
+points of a coarse pass. Then a refresh maps each corner by the one edit alone, however many others there are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.edits import Edit, EditStack
+from cagefield.edits.device.device_stack import DeviceStack
+from cagefield.rendering.voxels import occupancy_continuous as smooth
+from cagefield.rendering.voxels.device_grid import DeviceGrid
+from cagefield.rendering.voxels.occupancy import Occupancy
+from cagefield.rendering.voxels.occupancy_deformed import deform
+
+
+def replaced(before: EditStack, after: EditStack) -> int | None:
+    """The place of the only active edit that differs, where another one's box meets its own; else None."""
+    old, new = before.active, after.active
+    if len(old) != len(new):
+        return None
+    places = [n for n in range(len(new)) if old[n] != new[n]]
+    if len(places) != 1:
+        return None
+    own = new[places[0]].bounds
+    others = [edit.bounds for n, edit in enumerate(new) if n != places[0]]
+    meets = any((box[0] <= own[1]).all() and (own[0] <= box[1]).all() for box in others)
+    return places[0] if meets else None
+
+
+@dataclass(frozen=True)
+class Link:
+    """An edit of a chain."""
+
+    chain: Chain
+    stack: DeviceStack
+
+    def near_bricks(
+        self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """As `occupancy_continuous.near_bricks` of the whole stack, coarsely."""
+        starts = self.chain.starts(grid, lower, count)
+        return smooth.near_bricks(self.chain.below, grid, self.stack, lower, count, starts, coarse=True)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The edits before and after a place, the occupancy below it, and corners taken to it from above."""
+
+    earlier: tuple[Edit, ...]
+    later: tuple[Edit, ...]
+    below: Occupancy
+    _starts: dict[tuple[int, ...], NDArray[np.float32]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, edits: EditStack, place: int, canonical: Occupancy, grid: DeviceGrid) -> Chain:
+        """The chain around a place among the active edits, none of which is discrete."""
+        active = edits.active
+        earlier = DeviceStack.from_stack(EditStack(active[:place]))
+        below = deform(canonical, grid, earlier, jumps=False, coarse=True)
+        return cls(active[:place], active[place + 1 :], below)
+
+    def fits(self, edits: EditStack, place: int) -> bool:
+        """True where the other edits are those of the chain."""
+        active = edits.active
+        return self.earlier == active[:place] and self.later == active[place + 1 :]
+
+    def link(self, edit: Edit) -> Link:
+        """The chain with this edit at its place."""
+        return Link(self, DeviceStack.from_stack(EditStack([edit])))
+
+    def starts(
+        self, grid: DeviceGrid, lower: NDArray[np.int64], count: NDArray[np.int64]
+    ) -> NDArray[np.float32] | None:
+        """Where the later edits take the points of a coarse pass; None without later ones."""
+        if not self.later:
+            return None
+        key = (*lower.tolist(), *count.tolist())
+        if key not in self._starts:
+            self._starts.clear()
+            later = DeviceStack.from_stack(EditStack(self.later))
+            self._starts[key] = smooth.coarse_corners(grid, later, lower, count)
+        return self._starts[key]

@@ -1,0 +1,229 @@
+"""Renderer: pictures of a VoxelField seen through its edits, by the fused march."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras.camera import Camera
+from cagefield.compute import devices
+from cagefield.compute.devices import floats, ints
+from cagefield.edits import EditStack
+from cagefield.errors import CagefieldError
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.images.render_result import Background, RenderResult
+
+if TYPE_CHECKING:
+    from cagefield.rendering.voxels.device_grid import DeviceGrid
+    from cagefield.rendering.voxels.drag_occupancy import Chain
+    from cagefield.rendering.voxels.occupancy import Occupancy
+
+BAND = 4
+"""Rows of tiles rendered between two calls of `should_stop`."""
+
+KEPT = 8
+"""Cameras' intrinsics whose directions stay on the device."""
+
+
+class Renderer:
+    """Renders one field under one edit stack; the field's arrays stay on the device between frames.
+
+    `step` is the distance between samples in voxels. `with_edits` shares the field's arrays.
+    `preserve_opacity` multiplies the density by |J d|, so that optical depth is kept however an edit
+    stretches; the paper leaves it out. Against photos of scenes and parts really scaled it gained in all 16
+    cases, 1.23 dB on average and up to 3.66 dB where things were pressed together.
+    """
+
+    occupancy: Occupancy
+
+    def __init__(
+        self,
+        field: VoxelField,
+        edits: EditStack | None = None,
+        *,
+        step: float = 0.5,
+        preserve_opacity: bool = True,
+        grid: DeviceGrid | None = None,
+    ) -> None:
+        """Raises EditError where an edit cannot be evaluated, DeviceError where no device starts."""
+        devices.start()
+        from cagefield.rendering.voxels import occupancy
+        from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
+
+        self.field = field
+        self.edits = edits if edits is not None else EditStack([])
+        self.step = float(step)
+        self.preserve_opacity = preserve_opacity
+        shared = grid if grid is not None else DeviceGrid.from_field(field)
+        self.grid = shared.with_layers(self.edits.layers)
+        self._canonical = occupancy.of_field(field)
+        self._canonical_bricks = occupancy_args(self._canonical, to_device(self._canonical.codes))
+        self._pixels: dict[tuple[int, int], Any] = {}
+        self._directions: dict[int, tuple[NDArray[np.float32], Any]] = {}
+        self._coarse = False
+        self._chain: Chain | None = None
+        self._pack_edits()
+
+    def with_edits(
+        self,
+        edits: EditStack,
+        *,
+        preserve_opacity: bool | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
+    ) -> Renderer:
+        """A renderer of the same field under other edits; what they share with these is kept.
+
+        `coarse` finds the occupancy of the edited space by many cells at a time: ready sooner, same picture.
+        `proceed` is called now and then, and gives the renderer up by raising.
+        """
+        other = object.__new__(Renderer)
+        other.__dict__.update(self.__dict__)
+        other.edits = edits
+        other.grid = self.grid.with_layers(edits.layers)
+        if preserve_opacity is not None:
+            other.preserve_opacity = preserve_opacity
+        other._pack_edits(self, coarse, proceed)
+        return other
+
+    def _pack_edits(
+        self,
+        before: Renderer | None = None,
+        coarse: bool = False,
+        proceed: Callable[[], None] | None = None,
+    ) -> None:
+        from cagefield.edits.device.device_stack import DeviceStack
+        from cagefield.edits.device.packing import widened
+        from cagefield.rendering.voxels.device_grid import for_kernels, occupancy_args
+        from cagefield.rendering.voxels.drag_occupancy import Chain, replaced
+        from cagefield.rendering.voxels.occupancy_deformed import Known, deform
+
+        stack = DeviceStack.from_stack(self.edits)
+        jumps = _jumps(self.edits)
+        known = None
+        if before is not None and jumps == _jumps(before.edits) and (coarse or not before._coarse):
+            known = Known(before.occupancy, widened(self.edits.changed_boxes(before.edits)))
+        link = None
+        if before is not None and coarse and not jumps:
+            place = replaced(before.edits, self.edits)
+            if place is not None:
+                if self._chain is None or not self._chain.fits(self.edits, place):
+                    self._chain = Chain.of(self.edits, place, self._canonical, self.grid)
+                link = self._chain.link(self.edits.active[place])
+        self._coarse = coarse
+        self.occupancy = deform(self._canonical, self.grid, stack, jumps, known, coarse, proceed, link)
+        self._bricks = occupancy_args(self.occupancy, for_kernels(self.occupancy.codes))
+        self._stack = stack
+        self._boxes = for_kernels(stack.boxes.astype(np.float32))
+
+    def render(
+        self,
+        camera: Camera,
+        *,
+        background: Background = "white",
+        normals: bool = False,
+        near: float = 0.0,
+        region: tuple[int, int, int, int] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+        step: float | None = None,
+    ) -> RenderResult | None:
+        """The frame seen by `camera`, or None where `should_stop` said so between two bands of tiles.
+
+        `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
+        takes the place of the renderer's own.
+        """
+        from cagefield.compute.block_cyclic import deal_of
+        from cagefield.rendering.voxels.kernels import march
+
+        field = self.field
+        x, y, width, height = _checked_region(region, camera)
+        directions = self._device_directions(camera)
+        out = self._buffer(width, height)
+        down = -(-height // march.TILE)
+        grid = self.grid.args
+        length = step or self.step
+        if not field.contracted:
+            length /= float(np.max(grid.scale))
+        pose = march.CameraArgs(
+            directions, camera.width, floats(camera.c2w[:3, :3]), floats(camera.c2w[:3, 3])
+        )
+        how = march.MarchArgs(length, near, int(normals), int(self.preserve_opacity))
+        rows = down if should_stop is None else BAND
+        for row in range(0, down, rows):
+            if should_stop is not None and should_stop():
+                return None
+            few = min(rows, down - row)
+            march.march_tiles(
+                out,
+                deal_of(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
+                pose,
+                march.TileArgs(ints((x, y)), ints((width, height)), row, few),
+                how,
+                grid,
+                self._bricks,
+                self._canonical_bricks,
+                self._stack.args,
+                self._boxes,
+                field.sh.shape[1],
+                field.contracted,
+                self._stack.n_edits > 0,
+                self._stack.has_flows,
+            )
+        marched = out if isinstance(out, np.ndarray) else out.to_numpy()
+        return _frame(marched.reshape(height, width, 8), background, normals)
+
+    def _device_directions(self, camera: Camera) -> Any:
+        """The camera-space directions of a camera's pixels on the device; those of some sizes are kept."""
+        from cagefield.rendering.voxels.device_grid import to_device
+
+        local = camera.local_directions()
+        if id(local) not in self._directions:
+            if len(self._directions) >= KEPT:
+                del self._directions[next(iter(self._directions))]
+            self._directions[id(local)] = (local, to_device(local))
+        return self._directions[id(local)][1]
+
+    def _buffer(self, width: int, height: int) -> Any:
+        """Where a march writes to; a numpy array on the CPU."""
+        from cagefield.compute.quadrants import qd
+
+        if devices.current() == "cpu":
+            return np.empty(width * height * 8, np.float32)
+        if (width, height) not in self._pixels:
+            self._pixels = {(width, height): qd.ndarray(qd.f32, (width * height * 8,))}
+        return self._pixels[(width, height)]
+
+
+def _jumps(edits: EditStack) -> bool:
+    """True where an edit's map is not continuous."""
+    return any(edit.adjustment == "discrete" for edit in edits.active)
+
+
+def _checked_region(region: tuple[int, int, int, int] | None, camera: Camera) -> tuple[int, int, int, int]:
+    """The region, or the whole picture for None. Raises CagefieldError where it leaves the picture."""
+    if region is None:
+        return 0, 0, camera.width, camera.height
+    x, y, width, height = region
+    if min(x, y) < 0 or min(width, height) < 1 or x + width > camera.width or y + height > camera.height:
+        raise CagefieldError(
+            f"region {region} (x, y, width, height) is not inside the picture of"
+            f" {camera.width}x{camera.height} pixels; make it smaller"
+        )
+    return region
+
+
+def _frame(marched: NDArray[np.float32], background: Background, with_normals: bool) -> RenderResult:
+    opacity = marched[..., 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(opacity > 1e-6, marched[..., 4] / opacity, np.inf)
+    normals = None
+    if with_normals:
+        normals = marched[..., 5:8]
+        length = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), 0.0)
+    return RenderResult.from_premultiplied(
+        marched[..., :3], opacity, depth.astype(np.float32), normals=normals, background=background
+    )

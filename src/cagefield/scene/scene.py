@@ -1,0 +1,518 @@
+"""Scene: a trained field, the edits on it and the cameras it was seen by; a folder on disk.
+
+    SCENE/
+      field.safetensors   the VoxelField or SplatField, in canonical space; the file says which
+      original.safetensors  the NerfField that it was baked from, if any, in the same space
+      edits.yaml          the edit stack, as a person would write it
+      cameras.json        {"train": [...], "test": [...]}: cameras in world units, OpenGL camera-to-world
+      scene.json          {"format": "cagefield-scene", "version": 1, "background": [r, g, b] or null,
+                          "gains": [[r, g, b], ...] if photos were brighter or darker than the field,
+                          "preserve_opacity": false if edits leave density as it is,
+                          "source_to_world": [4,4] from the reconstruction's coordinates, if not the same}
+
+Edits may paste from other scenes (`Edit.source`), whose folders stay where they are: relative paths of
+sources are relative to SCENE.
+
+A folder is written beside its destination and renamed, so a reader sees the old scene or the new one, never
+a half of each.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache, cached_property, partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cagefield.cameras.camera import Camera
+from cagefield.cameras.camera_paths import shared_up
+from cagefield.completion.pasting.paste_content import content_box
+from cagefield.edits import Edit, EditStack, LatticeError
+from cagefield.edits.edit_files import dump_edits, load_edits
+from cagefield.edits.paste_paths import rebased
+from cagefield.edits.paste_placement import placed_paste
+from cagefield.errors import SceneError
+from cagefield.fields.frusta import in_frusta
+from cagefield.fields.nerf_field import NerfField
+from cagefield.fields.nerf_file import load_nerf, save_nerf
+from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
+from cagefield.fields.voxel_field import VoxelField
+from cagefield.files.atomic import replaced_file, replaced_folder
+from cagefield.files.safe_open import real_path
+from cagefield.images.render_result import Background, RenderResult, background_rgb
+from cagefield.scene.paste_sources import SceneSources
+from cagefield.scene.scene_files import (
+    CAMERAS,
+    EDITS,
+    FIELD,
+    FILES,
+    FORMAT,
+    MANIFEST,
+    ORIGINAL,
+    VERSION,
+    check_destination,
+    check_part,
+    read_cameras,
+    read_field,
+    read_manifest,
+    recover,
+    write_json,
+)
+from cagefield.typing import Array
+
+if TYPE_CHECKING:
+    from cagefield.completion.patcher import Patcher
+    from cagefield.datasets import Dataset
+    from cagefield.rendering.renderers import AnyRenderer
+
+    class Trained(Protocol):
+        """What a trainer hands out: the field, and the gains [train views,3] of the photos."""
+
+        @property
+        def field(self) -> VoxelField | SplatField: ...
+
+        @property
+        def gains(self) -> NDArray[np.float32]: ...
+
+
+MAX_CONDITION = 1e9
+"""Condition number of the linear part of `source_to_world`, from which on it counts as singular."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scene:
+    """A field with its edit stack, cameras by split ("train", "test", "val") and background colour.
+
+    Background None means nothing behind the scene. The field stays as it was trained; the edits are applied
+    when it is rendered. `gains` are the exposures of the training photos as they were fitted: photo = gain x
+    the field's picture, per channel, one for each "train" camera; empty where none were fitted. `original` is
+    the field that `field` was baked from, None where it was trained itself; exact pictures show the original.
+    `preserve_opacity` multiplies density by |J d| where an edit moved it. `folder` is the one that it was
+    opened from: sources of pastes are relative to that, or to the working directory where it is None.
+    `source_to_world` [4,4] maps the coordinates of the reconstruction that the cameras came from to the
+    scene's (`Dataset.source_to_world`); the identity where they are the same or nothing is known.
+
+    Raises:
+        CagefieldError: a background outside [0, 1].
+        SceneError: a version this cagefield does not write, gains that do not fit the cameras, a
+            source_to_world that cannot be inverted.
+    """
+
+    field: VoxelField | SplatField
+    edits: EditStack = dataclasses.field(default_factory=lambda: EditStack([]))
+    cameras: Mapping[str, tuple[Camera, ...]] = dataclasses.field(default_factory=dict)
+    background: tuple[float, float, float] | None = (1.0, 1.0, 1.0)
+    version: int = VERSION
+    gains: tuple[tuple[float, float, float], ...] = ()
+    original: NerfField | None = None
+    preserve_opacity: bool = True
+    folder: Path | None = None
+    source_to_world: Array = dataclasses.field(default_factory=partial(np.eye, 4))
+
+    def __post_init__(self) -> None:
+        cameras = {str(split): tuple(members) for split, members in self.cameras.items()}
+        object.__setattr__(self, "cameras", MappingProxyType(cameras))
+        object.__setattr__(self, "background", background_rgb(self.background))
+        if self.version != VERSION:
+            raise SceneError(f"scene version is {self.version!r}; this cagefield writes version {VERSION}")
+        object.__setattr__(self, "gains", _gains(self.gains, len(cameras.get("train", ()))))
+        object.__setattr__(self, "source_to_world", _affine(self.source_to_world))
+
+    @classmethod
+    def trained(cls, result: Trained, dataset: Dataset) -> Scene:
+        """The scene of a field trained on a data set, with its cameras and no edits.
+
+        Its background is the result's, where that has one, else what the photos have: white behind cut-outs,
+        else black. Splats get the data set's offset.
+        """
+        white = (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0)
+        splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
+        cameras = {split: tuple(view.camera for view in views) for split, views in splits.items() if views}
+        # Poses may have been refined.
+        cameras["train"] = getattr(result, "cameras", cameras["train"])
+        field = result.field
+        if isinstance(field, SplatField) and any(dataset.offset):
+            field = dataclasses.replace(field, offset=dataset.offset)
+        return cls(
+            field,
+            cameras=cameras,
+            background=background_rgb(getattr(result, "background", white)),
+            gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
+            source_to_world=dataset.source_to_world,
+        )
+
+    @classmethod
+    def baked(
+        cls,
+        original: NerfField | SplatField,
+        cameras: Mapping[str, tuple[Camera, ...]],
+        background: tuple[float, float, float] | None = (1.0, 1.0, 1.0),
+        *,
+        resolution: int = 256,
+        sh_degree: int = 2,
+        unbounded: bool = False,
+        on_progress: Callable[[float], None] | None = None,
+    ) -> Scene:
+        """The scene of a field's voxels, unedited; of an `unbounded` one what the cameras see is baked.
+
+        A NerfField is kept beside its voxels, splats are not.
+
+        Raises:
+            FieldError: options outside their range, a field that is empty.
+            SceneError: a field of another class.
+        """
+        if not isinstance(original, NerfField | SplatField):
+            raise SceneError(
+                f"the original must be a NerfField or a SplatField, got {type(original).__name__}; "
+                "of another field make Scene(bake(field))"
+            )
+        from cagefield.fields.baking import bake
+
+        if isinstance(original, SplatField) and any(original.offset):
+            warnings.warn(
+                f"voxels keep no offset: {list(original.offset)} is to be added to their coordinates",
+                stacklevel=2,
+            )
+        every = [camera for group in cameras.values() for camera in group]
+        near = original.near if isinstance(original, NerfField) and original.ndc is None else 0.0
+        voxels = bake(
+            original,
+            resolution,
+            sh_degree=sh_degree,
+            eyes=np.array([camera.origin for camera in every]) if every else None,
+            contracted=unbounded,
+            seen=partial(in_frusta, every, near=near) if unbounded and every else None,
+            on_progress=on_progress,
+        )
+        kept = original if isinstance(original, NerfField) else None
+        return cls(voxels, cameras=cameras, background=background, original=kept)
+
+    @classmethod
+    def open(cls, path: Path | str) -> Scene:
+        """The scene in the folder `path`; edits that cannot be evaluated are an error when it is rendered.
+
+        Raises:
+            SceneError: the folder or one of its files is missing, damaged or of a newer version; the message
+                names the file and the cure.
+        """
+        folder = Path(path)
+        recover(folder)
+        if not folder.is_dir():
+            what = "is a file, not a folder" if folder.exists() else "does not exist"
+            raise SceneError(f"scene {folder} {what}; give the folder that `cagefield train -o` wrote")
+        background, gains, preserve_opacity, source_to_world = read_manifest(folder)
+        for name in (FIELD, CAMERAS, EDITS):
+            check_part(folder / name)
+        cameras = read_cameras(folder / CAMERAS)
+        edits = load_edits(folder / EDITS, check=False, mend=True)
+        field = read_field(folder / FIELD)
+        original = load_nerf(folder / ORIGINAL) if (folder / ORIGINAL).exists() else None
+        try:
+            return cls(
+                field,
+                edits,
+                cameras,
+                background,
+                gains=gains,
+                original=original,
+                preserve_opacity=preserve_opacity,
+                folder=folder.absolute(),
+                source_to_world=np.eye(4) if source_to_world is None else source_to_world,
+            )
+        except SceneError as error:
+            raise SceneError(f"{folder / MANIFEST}: {error}") from None
+
+    def save(
+        self,
+        path: Path | str,
+        overwrite: bool = False,
+        *,
+        beside: Mapping[str, str | None] = MappingProxyType({}),
+    ) -> None:
+        """Writes the scene folder `path`, complete or not at all.
+
+        With `overwrite` a scene that is there is replaced once the new one is complete; other files in its
+        folder are kept. `beside` has the text of files that are written with it, by name; None removes one.
+        Relative sources of pastes are written as that folder sees them.
+
+        Raises:
+            SceneError: something else is there, or a scene and no `overwrite`.
+        """
+        target = check_destination(path, overwrite)
+        with replaced_folder(target, (*FILES, *beside)) as draft:
+            for name, text in beside.items():
+                if text is not None:
+                    (draft / name).write_text(text, encoding="utf-8")
+            self.field.save(draft / FIELD)
+            if self.original is not None:
+                save_nerf(self.original, draft / ORIGINAL)
+            edits = EditStack(rebased(self.edits, self.folder, target))
+            (draft / EDITS).write_text(dump_edits(edits), encoding="utf-8")
+            write_json(
+                {split: [camera.to_dict() for camera in members] for split, members in self.cameras.items()},
+                draft / CAMERAS,
+            )
+            self.save_manifest(draft)
+
+    def save_manifest(self, folder: Path) -> None:
+        """Writes the scene's manifest into a folder that holds its other files, complete or not at all."""
+        with self.draft_manifest(folder):
+            pass
+
+    @contextmanager
+    def draft_manifest(self, folder: Path) -> Iterator[None]:
+        """The manifest is written when the context begins and takes its place in the folder when it ends."""
+        manifest: dict[str, object] = {
+            "format": FORMAT,
+            "version": self.version,
+            "background": self.background,
+        }
+        if self.gains:
+            manifest["gains"] = self.gains
+        if not self.preserve_opacity:
+            manifest["preserve_opacity"] = False
+        if not np.array_equal(self.source_to_world, np.eye(4)):
+            manifest["source_to_world"] = self.source_to_world.tolist()
+        with replaced_file(folder / MANIFEST, parents=False) as draft:
+            write_json(manifest, draft)
+            yield
+
+    def with_edits(self, edits: EditStack) -> Scene:
+        """The same scene under another edit stack.
+
+        Raises:
+            SceneError: something else than a stack.
+        """
+        if not isinstance(edits, EditStack):
+            raise SceneError(f"edits must be an EditStack, got {type(edits).__name__}; give EditStack([...])")
+        scene = dataclasses.replace(self, edits=edits)
+        scene.__dict__["_origin"] = self.__dict__.get("renderer", self.__dict__.get("_origin"))
+        for shared in ("patcher", "_pasting"):
+            if shared in self.__dict__:
+                scene.__dict__[shared] = self.__dict__[shared]
+        return scene
+
+    def paste(
+        self,
+        source: Path | str,
+        *,
+        at: ArrayLike | None = None,
+        size: float | None = None,
+        name: str | None = None,
+    ) -> Edit:
+        """The edit that pastes all of another scene, a scene folder or a file of splats, upright.
+
+        Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
+        and scale it as any other edit. `at` [3] is where the middle of its base stands, beside what this
+        scene holds where it is left out; `size` is its longest edge, in this scene's units, as large as it is
+        there where it is left out. A relative path is relative to the scene's folder.
+
+        Raises:
+            CagefieldError: there is no such scene, or its field is of another kind than this one's.
+        """
+        look = self.sources.look(os.fspath(source), self.field)
+        up = self.up
+        if at is None:
+            grown = 1.0 if size is None else size / float((look.box[1] - look.box[0]).max())
+            at = _beside(content_box(self.field), up, grown * (look.box[1] - look.box[0]))
+        found = real_path(source).stem if name is None else name
+        return placed_paste(source, look.box, at, up=up, source_up=look.up, size=size, name=found)
+
+    @property
+    def offset(self) -> Offset:
+        """Coordinates of the file that the scene's splats are from, less the scene's; 0 of voxels."""
+        return self.field.offset if isinstance(self.field, SplatField) else NO_OFFSET
+
+    def lattice_errors(self) -> tuple[LatticeError, ...]:
+        """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.
+
+        That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
+        what most splats are wide.
+        """
+        return self.edits.lattice_errors(self.field.sample_spacing)
+
+    def render(
+        self,
+        camera: Camera,
+        *,
+        background: Background = None,
+        normals: bool = False,
+        exact: bool = False,
+    ) -> RenderResult:
+        """The edited scene seen by `camera`, over the scene's own background unless another is given.
+
+        "none" puts nothing behind it. The renderer is kept between calls. `exact` evaluates every edit in
+        float64, without a lattice: of voxels at every sample of the plain sampled renderer, slow, and the
+        reference; of splats at every splat; where the scene has an original field, of that one, by its own
+        hierarchical sampling.
+
+        Raises:
+            CagefieldError: no camera, or a background outside [0, 1].
+        """
+        if not isinstance(camera, Camera):
+            raise SceneError(
+                f"camera must be a Camera, got {camera!r:.60}; give one such as scene.cameras['test'][0]"
+            )
+        colour = self.background if background is None else background_rgb(background)
+        if not exact:
+            return cast(RenderResult, self.renderer.render(camera, background=colour, normals=normals))
+        return self._render_exact(camera, colour, normals)
+
+    def _render_exact(self, camera: Camera, background: Background, normals: bool) -> RenderResult:
+        from cagefield.fields.protocol import Field
+        from cagefield.rendering.reference_renderer import render_sampled
+
+        if self.original is not None:
+            return self._render_original(self.original, camera, background, normals)
+        field = self.field
+        if isinstance(field, SplatField):
+            return cast(
+                RenderResult, self._exact_splats.render(camera, background=background, normals=normals)
+            )
+        near, far = _sampling_range(field, camera)
+        samples = math.ceil(2.0 * (far - near) / float(min(field.voxel_size)))
+        return render_sampled(
+            # An unbounded field is sampled beyond its bounds: without them, up to `far`.
+            cast(Field, field.__call__) if field.contracted else field,
+            camera,
+            near=near,
+            far=far,
+            samples=min(4096, max(64, samples)),
+            background=background,
+            edits=self._exact_edits,
+            normals=normals,
+            preserve_opacity=self.preserve_opacity,
+        )
+
+    def _render_original(
+        self, original: NerfField, camera: Camera, background: Background, normals: bool
+    ) -> RenderResult:
+        original.torch  # noqa: B018  a missing PyTorch is an error with its cure here
+        from cagefield.rendering.nerf.nerf_renderer import render_nerf
+
+        # Patches are voxels: too rough for what a continuous edit bends, and for parts with soft seams.
+        edits = [edit.replace(feather=0.0) if edit.feather else edit for edit in self.edits]
+        patched = self.patcher.patched(edits, bending=False)
+        exact = EditStack(edit.replace(lattice=None) for edit in patched)
+        return render_nerf(
+            original,
+            camera,
+            edits=exact,
+            background=background,
+            preserve_opacity=self.preserve_opacity,
+            normals=normals,
+        )
+
+    @cached_property
+    def renderer(self) -> AnyRenderer:
+        """The renderer of the field's kind; a scene made by `with_edits` shares the field's arrays."""
+        from cagefield.rendering.renderers import renderer_of
+
+        origin: AnyRenderer | None = self.__dict__.get("_origin")
+        edits = self.patched_edits
+        if origin is not None:
+            return origin.with_edits(edits, preserve_opacity=self.preserve_opacity)
+        return renderer_of(self.field, edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def patcher(self) -> Patcher:
+        """What fills the places that edits uncover, and takes light along; shared by `with_edits`."""
+        from cagefield.completion.pasting.paste_loader import Pastes
+        from cagefield.completion.patcher import Patcher
+        from cagefield.rendering.renderers import renderer_of
+
+        plain = cache(lambda: renderer_of(self.field))
+
+        def render(camera: Camera) -> RenderResult:
+            return cast(RenderResult, plain().render(camera, background="black", normals=True))
+
+        return Patcher(self.field, self.cameras.get("train", ()), render, Pastes(self.sources))
+
+    @property
+    def patched_edits(self) -> EditStack:
+        """The edits with the patches that they ask for. Raises EditError for a paste that is not possible."""
+        return self.patcher.patched(self.edits.edits, preserve_opacity=self.preserve_opacity)
+
+    @cached_property
+    def up(self) -> Array:
+        """The unit direction [3] that is up for the scene's cameras; z where it has none."""
+        poses = [camera.c2w for group in self.cameras.values() for camera in group]
+        return shared_up(np.stack(poses)) if poses else np.array([0.0, 0.0, 1.0])
+
+    @cached_property
+    def sources(self) -> SceneSources:
+        """The scenes that edits paste from."""
+        return SceneSources(self.folder, _open_pasted, self.__dict__.get("_pasting", ()))
+
+    @cached_property
+    def _exact_splats(self) -> AnyRenderer:
+        return self.renderer.with_edits(self._exact_edits, preserve_opacity=self.preserve_opacity)
+
+    @property
+    def _exact_edits(self) -> EditStack:
+        return EditStack(edit.replace(lattice=None) for edit in self.patched_edits)
+
+
+def _beside(box: Array, up: Array, size: Array) -> Array:
+    """A point [3] at the foot of a box [2,3], beside it: with room for a box of a size [3], turned anyhow."""
+    middle, half = box.mean(axis=0), 0.5 * (box[1] - box[0])
+    aside = np.eye(3)[int(np.argmin(np.abs(up)))]
+    aside = aside - (aside @ up) * up
+    aside /= np.linalg.norm(aside)
+    reach = half @ np.abs(aside) + 0.5 * float(np.linalg.norm(size))
+    return np.asarray(middle + reach * aside - half @ np.abs(up) * up)
+
+
+def _open_pasted(folder: Path, pasting: tuple[Path, ...]) -> Scene:
+    """The scene of a folder, which is being pasted into the scenes of other ones."""
+    scene = Scene.open(folder)
+    scene.__dict__["_pasting"] = pasting
+    return scene
+
+
+def _gains(values: Any, count: int) -> tuple[tuple[float, float, float], ...]:
+    """The gains as tuples, none or `count` of them."""
+    try:
+        gains = tuple((float(r), float(g), float(b)) for r, g, b in values)
+    except (TypeError, ValueError):
+        raise SceneError(f"gains must be a list of [r, g, b], got {values!r}") from None
+    if gains and len(gains) != count:
+        raise SceneError(f"{len(gains)} gains for {count} train cameras; give each one, or none")
+    for index, gain in enumerate(gains):
+        if not all(0.0 < channel < math.inf for channel in gain):
+            raise SceneError(f"gains[{index}] is {list(gain)}; each must be a number above 0")
+    return gains
+
+
+def _affine(values: Any) -> Array:
+    """The matrix [4,4] of an affine map that has an inverse, read-only."""
+    try:
+        matrix = np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        matrix = np.empty(0)
+    fits = matrix.shape == (4, 4) and bool(np.isfinite(matrix).all())
+    if not fits or (matrix[3] != (0, 0, 0, 1)).any() or not np.linalg.cond(matrix[:3, :3]) < MAX_CONDITION:
+        raise SceneError(
+            "source_to_world must be 4 rows of 4 finite numbers, an affine map with an inverse, got "
+            f"{values!r:.80}"
+        )
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _sampling_range(voxels: VoxelField, camera: Camera) -> tuple[float, float]:
+    """Near and far distance from the camera that hold the field's box; 8 times that if unbounded."""
+    lower, upper = voxels.bounds
+    radius = 0.5 * float(((upper - lower) ** 2).sum()) ** 0.5
+    distance = float(((0.5 * (lower + upper) - camera.origin) ** 2).sum()) ** 0.5
+    reach = 8.0 if voxels.contracted else 1.0
+    return max(0.0, distance - reach * radius), distance + reach * radius

@@ -1,0 +1,54 @@
+"""One piece of work in a process of its own: reading and writing large files, beside the pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import signal
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from typing import Any
+
+from cagefield.errors import CagefieldError, line_of, warnings_in_one_line
+from cagefield.server.render_worker.parent_watch import end_with_parent
+
+
+async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
+    """What `work(*args)` returns; work, arguments and result can be pickled.
+
+    Cancelled, it ends the process. Raises CagefieldError: what the work raised, or that the process was lost.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_serve, args=(there, work, args), daemon=True, name="cagefield-file")
+    waiting = ThreadPoolExecutor(1)  # minutes, often: not one of those that others wait for
+    try:
+        await asyncio.to_thread(process.start)
+        there.close()
+        try:
+            result = await asyncio.get_running_loop().run_in_executor(waiting, here.recv)
+        except EOFError:
+            raise CagefieldError("the process that did this ended (out of memory?)") from None
+        if isinstance(result, Exception):
+            raise result
+        return result
+    finally:
+        if process.pid is not None:
+            process.terminate()
+        waiting.shutdown(wait=False)
+
+
+@warnings_in_one_line()
+def _serve(connection: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+    try:
+        result = work(*args)
+    except CagefieldError as error:
+        result = CagefieldError(str(error))
+    except OSError as error:
+        result = CagefieldError(line_of(error))
+    except Exception as error:
+        result = CagefieldError(f"that failed: {type(error).__name__}: {error}")
+    connection.send(result)

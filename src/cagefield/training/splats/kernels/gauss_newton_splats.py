@@ -1,0 +1,196 @@
+"""Damped Gauss-Newton steps of splats, each by its own blocks, and what becomes of a picture's error (Numba).
+
+A photo's curvature at a pixel is |J_k| sum_j |J_j| in place of |J_k|^2, J_k the derivative of its colour by
+splat
+k's log alpha: what majorises the sum over overlapping splats (separable surrogates). A splat's blocks are 3
+x 3 for its mean and for its log scales, diagonal for its turn and its logit; its colour's
+curvature is the sum of its weights, for those of a pixel add up to at most 1. Gradients and
+curvatures
+are running means over the views that see the splat. No step is longer than a cap: overlapping splats break
+the block-diagonal model where steps are long.
+
+Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping as in Levenberg-Marquardt;
+separable surrogates as in De Pierro, "A modified expectation maximization algorithm for penalized likelihood
+estimation in emission tomography" (1995).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from cagefield.compute.numba_cache import FAST, njit
+from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE, harmonics_at
+
+MOMENTS, RUNNING = 13, 17
+"""Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
+
+PRESENT = 0.5
+"""Share of this photo's own curvature that is added to the running one: a photo that sees a splat from close
+by would otherwise take steps that are too long for it."""
+
+
+@njit(parallel=True, **FAST)
+def residuals(out, target, width, height, gain, background, weights, colour, slopes, sums):
+    """The picture over its background, dL/d(picture) of L = |gain picture - photo|^2 / 2, and sums a tile.
+
+    out [tiles, >=4, AREA] is T and colour; target [tiles, 3 or 4, AREA] uint8 with straight alpha. sums
+    [tiles, 7]: squared error; gain-free picture x photo and picture^2, by channel; all of them weighted by
+    `weights` [tiles,AREA]. The slopes are not.
+    """
+    across = (width + TILE - 1) // TILE
+    alpha = target.shape[1] == 4
+    for t in prange(out.shape[0]):
+        x0, y0 = (t % across) * TILE, (t // across) * TILE
+        for j in range(7):
+            sums[t, j] = 0.0
+        for ch in range(3):
+            error = np.float32(0.0)
+            product = np.float32(0.0)
+            square = np.float32(0.0)
+            for i in range(AREA):
+                inside = x0 + i % TILE < width and y0 + i // TILE < height
+                c = out[t, 1 + ch, i] + out[t, 0, i] * background[ch]
+                photo = np.float32(target[t, ch, i]) * np.float32(1 / 255)
+                if alpha:
+                    share = np.float32(target[t, 3, i]) * np.float32(1 / 255)
+                    photo = photo * share + background[ch] * (np.float32(1) - share)
+                d = gain[ch] * c - photo if inside else np.float32(0.0)
+                colour[t, ch, i] = c
+                slopes[t, ch, i] = gain[ch] * d
+                error += weights[t, i] * d * d
+                if inside:
+                    product += weights[t, i] * c * photo
+                    square += weights[t, i] * c * c
+            sums[t, 0] += error
+            sums[t, 1 + ch] = product
+            sums[t, 4 + ch] = square
+
+
+@njit(inline="always", **FAST)
+def turn(quaternions, i, wx, wy, wz):
+    """q <- q exp(w / 2), to second order, normalised."""
+    w, a, b, c = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
+    x, y, z = 0.5 * wx, 0.5 * wy, 0.5 * wz
+    n0 = w - a * x - b * y - c * z
+    n1 = a + w * x + b * z - c * y
+    n2 = b + w * y + c * x - a * z
+    n3 = c + w * z + a * y - b * x
+    r = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2 + n3 * n3)
+    quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3] = (
+        n0 * r,
+        n1 * r,
+        n2 * r,
+        n3 * r,
+    )
+
+
+@njit(inline="always", **FAST)
+def solve3(H, at, damp, g0, g1, g2):
+    """(H + damp I)^-1 g of the symmetric block at H[at:at+6]."""
+    a = H[at] + damp
+    b = H[at + 1]
+    c = H[at + 2]
+    d = H[at + 3] + damp
+    e = H[at + 4]
+    f = H[at + 5] + damp
+    A = d * f - e * e
+    B = c * e - b * f
+    C = b * e - c * d
+    r = 1.0 / max(a * A + b * B + c * C, 1e-300)
+    return (
+        (A * g0 + B * g1 + C * g2) * r,
+        (B * g0 + (a * f - c * c) * g1 + (b * c - a * e) * g2) * r,
+        (C * g0 + (b * c - a * e) * g1 + (a * d - b * b) * g2) * r,
+    )
+
+
+@njit(inline="always", **FAST)
+def at_most(value, cap):
+    """The value, its size at most `cap`."""
+    return min(cap, max(-cap, value))
+
+
+@njit(parallel=True, **FAST)
+def gauss_newton(
+    order,
+    gradients,
+    curvatures,
+    means,
+    log_scales,
+    quaternions,
+    logits,
+    sh,
+    origin,
+    momentum,
+    running,
+    ticks,
+    memory,
+    rates,
+    damping,
+    caps,
+    terms,
+    scale_range,
+    pull,
+):
+    """One step of the splats in `order`.
+
+    memory: decay of the running gradient and of the running curvature. rates: mean, log scales, turn, logit,
+    colour. damping: relative to the block, and absolute. caps: log scales and turns; mean, in largest sigmas.
+    terms: harmonics in use. scale_range: (least, largest) sigma. pull: added to the
+    logit's gradient.
+    """
+    for q in prange(order.size):
+        i = order[q]
+        ticks[i] += 1
+        t = 1.0 / ticks[i]
+        new1 = max(1.0 - memory[0], t)
+        new2 = max(1.0 - memory[1], t)
+        g = momentum[i]
+        memory_H = running[i]
+        H = np.empty(17)
+        for j in range(16):
+            memory_H[j] += new2 * (curvatures[i, j] - memory_H[j])
+            H[j] = memory_H[j] + PRESENT * curvatures[i, j]
+        memory_H[16] += new2 * (gradients[i, 14] - memory_H[16])
+        H[16] = memory_H[16] + PRESENT * gradients[i, 14]
+        for j in range(13):
+            g[j] += new1 * (gradients[i, j] - g[j])
+        rel, tiny, cap = damping[0], damping[1], caps[0]
+        damp = rel * (H[0] + H[3] + H[5]) / 3.0 + 1e-30
+        x, y, z = solve3(H, 0, damp, g[0], g[1], g[2])
+        x, y, z = -rates[0] * x, -rates[0] * y, -rates[0] * z
+        big = np.exp(max(log_scales[i, 0], max(log_scales[i, 1], log_scales[i, 2])))
+        f = min(1.0, caps[1] * big / (np.sqrt(x * x + y * y + z * z) + 1e-30))
+        means[i, 0] += f * x
+        means[i, 1] += f * y
+        means[i, 2] += f * z
+        damp = rel * (H[6] + H[9] + H[11]) / 3.0 + tiny
+        x, y, z = solve3(H, 6, damp, g[3], g[4], g[5])
+        low, high = np.log(scale_range[0]), np.log(scale_range[1])
+        log_scales[i, 0] = min(high, max(low, log_scales[i, 0] + at_most(-rates[1] * x, cap)))
+        log_scales[i, 1] = min(high, max(low, log_scales[i, 1] + at_most(-rates[1] * y, cap)))
+        log_scales[i, 2] = min(high, max(low, log_scales[i, 2] + at_most(-rates[1] * z, cap)))
+        damp = rel * (H[12] + H[13] + H[14]) / 3.0 + tiny
+        turn(
+            quaternions,
+            i,
+            at_most(-rates[2] * g[6] / (H[12] + damp), cap),
+            at_most(-rates[2] * g[7] / (H[13] + damp), cap),
+            at_most(-rates[2] * g[8] / (H[14] + damp), cap),
+        )
+        step = -rates[3] * (g[9] + pull) / (H[15] * (1.0 + rel) + tiny)
+        logits[i] = at_most(logits[i] + at_most(step, 4.0 * cap), 7.0)
+        dx = np.float64(means[i, 0]) - origin[0]
+        dy = np.float64(means[i, 1]) - origin[1]
+        dz = np.float64(means[i, 2]) - origin[2]
+        r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
+        basis = np.empty(MAX_TERMS)
+        harmonics_at(dx * r, dy * r, dz * r, terms, basis)
+        norm = 0.0
+        for j in range(terms):
+            norm += basis[j] * basis[j]
+        for ch in range(3):
+            step = -rates[4] * gradients[i, 10 + ch] / (norm * (H[16] + 1e-2))
+            for j in range(terms):
+                sh[i, j, ch] += step * basis[j]

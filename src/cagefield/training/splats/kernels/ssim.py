@@ -1,0 +1,122 @@
+"""What structural similarity says of a picture's pixels, beside their squared error (Numba).
+
+The loss is half the sum of 1 - SSIM over windows and channels, of windows that fit the picture: with n of
+them, n (1 - `images.metrics.ssim`) / 2, which is the oracle of this module's gradient.
+
+Source: Wang et al., "Image quality assessment: from error visibility to structural similarity" (2004),
+equation 13; the derivative worked out here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from cagefield.compute.numba_cache import FAST, njit
+from cagefield.rendering.splats.kernels.projection import TILE
+
+WINDOW = 11
+"""Pixels of a window's side; its Gaussian's standard deviation is 1.5."""
+
+MOMENTS = 5
+"""Planes of a channel between the passes: means of the picture, the photo, their squares, their product."""
+
+_HALF = WINDOW // 2
+_OFFSETS = np.arange(WINDOW) - _HALF
+_WEIGHTS = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
+_WEIGHTS = (_WEIGHTS / _WEIGHTS.sum()).astype(np.float32)
+_C1, _C2 = np.float32(0.01**2), np.float32(0.03**2)
+
+
+@njit(parallel=True, **FAST)
+def structure(
+    colour, target, width, height, gain, background, weights, weight, moments, slopes_of, pixels, slopes
+):
+    """Adds `weight` times the loss's derivative by the picture (before its gain) to `slopes`.
+
+    colour and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
+    background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal.
+    moments [3,MOMENTS,H,W], slopes_of [3,3,H,W] and pixels [3,2,H,W] are room to work in.
+    """
+    across = (width + TILE - 1) // TILE
+    alpha = target.shape[1] == 4
+    for row in prange(3 * height):
+        ch, y = row // height, row % height
+        first = (y // TILE) * across
+        line = (y % TILE) * TILE
+        x = pixels[ch, 0, y]
+        p = pixels[ch, 1, y]
+        for tile in range(across):
+            for i in range(min(TILE, width - tile * TILE)):
+                at = line + i
+                photo = np.float32(target[first + tile, ch, at]) * np.float32(1 / 255)
+                if alpha:
+                    share = np.float32(target[first + tile, 3, at]) * np.float32(1 / 255)
+                    photo = photo * share + background[ch] * (np.float32(1) - share)
+                shown = gain[ch] * colour[first + tile, ch, at]
+                x[tile * TILE + i] = shown
+                p[tile * TILE + i] = photo if weights[first + tile, at] > np.float32(0) else shown
+        out = moments[ch, :, y]
+        out[:] = np.float32(0)
+        for k in range(WINDOW):
+            w = _WEIGHTS[k]
+            for i in range(width - 2 * _HALF):
+                a, b = x[i + k], p[i + k]
+                out[0, _HALF + i] += w * a
+                out[1, _HALF + i] += w * b
+                out[2, _HALF + i] += w * a * a
+                out[3, _HALF + i] += w * b * b
+                out[4, _HALF + i] += w * a * b
+    for row in prange(3 * height):
+        ch, y = row // height, row % height
+        result = slopes_of[ch, :, y]
+        result[:] = np.float32(0)
+        if y < _HALF or y >= height - _HALF:
+            continue
+        sums = np.zeros((MOMENTS, width), np.float32)
+        for k in range(WINDOW):
+            w = _WEIGHTS[k]
+            for j in range(MOMENTS):
+                source = moments[ch, j, y + k - _HALF]
+                for i in range(width):
+                    sums[j, i] += w * source[i]
+        by = np.zeros((3, width), np.float32)
+        for i in range(_HALF, width - _HALF):
+            mx, my = sums[0, i], sums[1, i]
+            a1 = np.float32(2) * mx * my + _C1
+            a2 = np.float32(2) * (sums[4, i] - mx * my) + _C2
+            b1 = mx * mx + my * my + _C1
+            b2 = sums[2, i] - mx * mx + sums[3, i] - my * my + _C2
+            per = np.float32(1) / (b1 * b2)
+            similarity = a1 * a2 * per
+            by_square = -similarity / b2
+            by_product = np.float32(2) * a1 * per
+            by[0, i] = (
+                np.float32(2) * my * a2 * per
+                - np.float32(2) * mx * (similarity / b1 + by_square)
+                - my * by_product
+            )
+            by[1, i] = by_square
+            by[2, i] = by_product
+        for k in range(WINDOW):
+            w = _WEIGHTS[k]
+            for j in range(3):
+                for i in range(width - 2 * _HALF):
+                    result[j, i + k] += w * by[j, _HALF + i]
+    for row in prange(3 * height):
+        ch, y = row // height, row % height
+        total = np.zeros((3, width), np.float32)
+        for k in range(max(0, _HALF - y), min(WINDOW, height - y + _HALF)):
+            w = _WEIGHTS[k]
+            for j in range(3):
+                source = slopes_of[ch, j, y + k - _HALF]
+                for i in range(width):
+                    total[j, i] += w * source[i]
+        first = (y // TILE) * across
+        line = (y % TILE) * TILE
+        scale = np.float32(-0.5) * np.float32(weight) * gain[ch]
+        for tile in range(across):
+            for i in range(min(TILE, width - tile * TILE)):
+                at = tile * TILE + i
+                g = total[0, at] + np.float32(2) * pixels[ch, 0, y, at] * total[1, at]
+                slopes[first + tile, ch, line + i] += scale * (g + pixels[ch, 1, y, at] * total[2, at])

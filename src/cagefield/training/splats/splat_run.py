@@ -1,0 +1,380 @@
+"""The state of one training of a SplatField, from photo to photo."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.cameras.camera import Camera
+from cagefield.datasets.views import Dataset
+from cagefield.fields.splat_field import SplatField
+from cagefield.rendering.splats.kernels.blending import SUMS
+from cagefield.rendering.splats.kernels.projection import AREA, TILE
+from cagefield.rendering.splats.raster_splats import DeformedSplats
+from cagefield.rendering.splats.rasterizer import (
+    COLOUR,
+    Buffers,
+    Projection,
+    intrinsics,
+    kernels,
+    near_depth,
+    project,
+    world_to_camera,
+)
+from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.checkpoint_checks import (
+    Form,
+    check_arrays,
+    check_finite,
+    check_run,
+    refusing_damage,
+)
+from cagefield.training.splats.densification import fading, needles, split
+from cagefield.training.splats.free_space import FreeSpace
+from cagefield.training.splats.initialization import (
+    NEAREST_SHARE,
+    Seeds,
+    camera_scale,
+    depths_seen,
+    first_splats,
+    in_front_of,
+)
+from cagefield.training.splats.kernels.gauss_newton_splats import gauss_newton, residuals
+from cagefield.training.splats.kernels.splat_backward import chain, shapes
+from cagefield.training.splats.kernels.ssim import MOMENTS, WINDOW, structure
+from cagefield.training.splats.pose_optimization import FROM, PoseRefinement
+from cagefield.training.splats.robust_weights import FROM as ROBUST_FROM
+from cagefield.training.splats.robust_weights import RobustWeights
+from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.splat_state import SplatState
+from cagefield.training.splats.training_views import load_views
+
+LEVEL_UNTIL = ((2, 0.04), (1, 0.15))
+"""(level of the photos, progress until which it is used); then whole photos."""
+
+STRUCTURE_FROM = 0.6
+"""Progress from which structural similarity counts: while surfaces are being found it would favour fog."""
+
+DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
+"""Progress from which harmonics of each degree are used."""
+
+GROWTH = (0.02, 0.6)
+"""Progress between which splats become more."""
+
+GROWTH_EVERY = 60
+"""Steps between two growths."""
+
+CLEAR = 0.7
+"""Share of a photo's least depth within which no splat may stand in its picture: such ones are fog."""
+
+CARVE_EVERY = 120
+"""Steps between two removals of those."""
+
+PIXEL_SHARE = 0.15
+"""Most splats after five minutes, in shares of a photo's pixels."""
+
+STEPS_A_MINUTE = 800
+"""Steps that count as a minute where a run is limited by steps."""
+
+
+def most_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
+    """The most splats of a training: what is asked for, else what the photos' detail and the time allow."""
+    if config.splats is not None:
+        return config.splats
+    pixels = float(np.median([camera.width * camera.height for camera in cameras]))
+    minutes = config.minutes or config.steps / STEPS_A_MINUTE
+    return int(np.clip(PIXEL_SHARE * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
+
+
+class SplatRun:
+    """A training run; see `loop.Run`."""
+
+    def __init__(self, dataset: Dataset, config: SplatConfig, seeds: Seeds | None = None) -> None:
+        """`seeds` are what to begin with; left out, they are looked for in the photos (`first_splats`)."""
+        self._config, self._dataset = config, dataset
+        self.views = load_views(dataset.train)
+        self._rng = np.random.default_rng(config.seed)
+        self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
+        self._near = near_depth(dataset.bounds)
+        self._most = most_splats([view.cameras[0] for view in self.views], config)
+        self.state, self.empty = seeds or first_splats(dataset, self.views, config, self._most)
+        self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
+        self._free_space = FreeSpace(
+            [view.cameras[0] for view in self.views],
+            [None if depth is None else depth[0] / NEAREST_SHARE for depth in self._depths],
+            self.state.means,
+        )
+        alpha = self.views[0].has_alpha
+        self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
+        self._fitted = (not alpha) if config.exposure is None else config.exposure
+        self.gains = np.ones((len(self.views), 3), np.float32)
+        sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
+        self._robust = (
+            RobustWeights([(-(-h // TILE), -(-w // TILE)) for w, h in sizes]) if config.robust else None
+        )
+        self.poses = PoseRefinement(len(self.views), self._scale)
+        self._buffers = Buffers()
+        self._queue: list[int] = []
+        self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
+        self._cold = True
+
+    @property
+    def done(self) -> float:
+        """Progress of the run, 0 to 1."""
+        if self._config.minutes is not None:
+            return min(1.0, self.seconds / (60.0 * self._config.minutes))
+        return min(1.0, self.step / self._config.steps)
+
+    def advance(self) -> None:
+        """One photo: a step of all splats that it shows; before it, a growth where one is due."""
+        began = time.perf_counter()
+        done = self.done
+        if self.step % GROWTH_EVERY == GROWTH_EVERY - 1 and GROWTH[0] <= done < GROWTH[1]:
+            self._grow(done)
+        if self.step % CARVE_EVERY == CARVE_EVERY - 1 and done < 0.95:
+            self._carve()
+        if not self._queue:
+            self.poses.centre()
+            if self._robust is not None:
+                self._robust.update_scale()
+            self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
+        self.step_photo(self._queue.pop(), done)
+        self.step += 1
+        self.seconds += 0.0 if self._cold else time.perf_counter() - began
+        self._cold = False
+
+    def step_photo(self, index: int, done: float) -> None:
+        config, state = self._config, self.state
+        level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
+        camera, target = self.views[index].level(level)
+        if config.refine_poses:
+            camera = self.poses.camera(index, camera)
+        count = len(state)
+        covariances = self._buffers.take("covariances", (count, 6), np.float32)
+        opacities = self._buffers.take("opacities", (count,), np.float32)
+        with kernels():
+            shapes(state.log_scales, state.quaternions, state.logits, covariances, opacities)
+        if config.dropout > 0.0:
+            opacities *= self._rng.random(count, np.float32) >= config.dropout * done
+        splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
+        projected = project(splats, camera, near=self._near, buffers=self._buffers)
+        out, stops = projected.blend(COLOUR)
+        colour = self._buffers.take("colour", (projected.tiles, 3, AREA), np.float32)
+        slopes = self._buffers.take("slopes", (projected.tiles, 3, AREA), np.float32)
+        tile_sums = np.empty((projected.tiles, 7), np.float32)
+        background = self._behind()
+        gain = self.gains[index]
+        lens = intrinsics(camera)
+        rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
+        degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
+        weights = self._weights(index, level, projected.tiles)
+        with kernels():
+            size = projected.width, projected.height
+            residuals(out, target, *size, gain, background, weights, colour, slopes, tile_sums)
+            if self._robust is not None and level == 0:
+                self._robust.add(index, slopes, gain, self.views[index].valid_at(0))
+            structured = config.structure > 0.0 and done >= STRUCTURE_FROM
+            if structured and min(size) >= WINDOW:
+                self._structure(projected, colour, target, gain, background, weights, slopes)
+            sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
+            projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil, weights)
+            chain(
+                projected.order, projected.firsts, projected.slots, sums, projected.packed, splats.means,
+                state.log_scales, state.quaternions, splats.opacities, splats.sh, world_to_camera(camera),
+                camera.origin, lens.focal, lens.limits, lens.model, lens.coefficients, config.antialiased,
+                False, state.gradients, state.curvatures,
+            )  # fmt: skip
+            if config.refine_poses and done >= FROM:
+                self.poses.step(index, camera.origin, state, projected.order, min(rate, 1.0))
+            gauss_newton(
+                projected.order, state.gradients, state.curvatures, state.means, state.log_scales,
+                state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
+                state.ticks, np.array(config.memory), np.array([rate, rate, rate, rate, 0.5 * rate]),
+                np.array(config.damping), np.array([config.cap, config.cap]), (degree + 1) ** 2,
+                np.array([1e-5, 1e3]) * self._scale, -config.opaque,
+            )  # fmt: skip
+        state.error[projected.order] += state.gradients[projected.order, 15]
+        state.hits[projected.order] += 1
+        self._expose(index, tile_sums)
+        loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
+        self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
+
+    def _structure(
+        self,
+        projected: Projection,
+        colour: NDArray[np.float32],
+        target: NDArray[np.uint8],
+        gain: NDArray[np.float32],
+        background: NDArray[np.float32],
+        weights: NDArray[np.float32],
+        slopes: NDArray[np.float32],
+    ) -> None:
+        """Adds what structural similarity says of the picture's pixels to the slopes of their error."""
+        size = (projected.height, projected.width)
+        structure(
+            colour, target, projected.width, projected.height, gain, background, weights,
+            self._config.structure,
+            self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
+            self._buffers.take("slopes_of", (3, 3, *size), np.float32),
+            self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
+        )  # fmt: skip
+
+    def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32]:
+        """Weights [tiles,AREA] of a photo's pixels: 0 where its mask excludes them."""
+        weights = self._buffers.take("weights", (tiles, AREA), np.float32)
+        valid = self.views[index].valid_at(level)
+        weights[:] = 1.0 if valid is None else valid
+        if self._robust is not None and level == 0 and self.done >= ROBUST_FROM:
+            self._robust.weigh(index, weights)
+        return weights
+
+    def _behind(self) -> NDArray[np.float32]:
+        """The background of the next picture: behind cut-outs a random one, so that they become opaque."""
+        if self.views[0].has_alpha:
+            return self._rng.uniform(size=3).astype(np.float32)
+        return self.background
+
+    def _expose(self, index: int, tile_sums: NDArray[np.float32]) -> None:
+        """Takes the photo's sums into its gain."""
+        if not self._fitted:
+            return
+        sums = tile_sums[:, 1:].sum(axis=0, dtype=np.float64)
+        if self.done > 0.05 and sums[3:].mean() > 0:
+            fit = (sums[:3] + 0.02 * sums[3:].mean()) / (sums[3:] + 0.02 * sums[3:].mean())
+            self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
+            self.gains /= self.gains.mean(axis=0)
+
+    def _carve(self) -> None:
+        """Takes out needles, and what stands nearer to a camera than anything that it shows can be."""
+        state = self.state
+        close = needles(state.log_scales) | self._free_space.occupied(state)
+        for view, depth in zip(self.views, self._depths, strict=True):
+            if depth is not None:
+                close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
+        if close.any() and not close.all():
+            state.take(np.flatnonzero(~close))
+
+    def _grow(self, done: float) -> None:
+        """Takes out what shows nothing, and splits what has the most error."""
+        state, config = self.state, self._config
+        kept = np.flatnonzero(~fading(state, config.prune, 20.0 * self._scale))
+        state.take(kept if len(kept) else np.arange(1))
+        rounds = max(1.0, (GROWTH[1] - done) / max(done / max(self.step, 1), 1e-9) / GROWTH_EVERY)
+        if len(state) < self._most:
+            want = int(len(state) * ((self._most / len(state)) ** (1.0 / rounds) - 1.0))
+            want = min(want, len(state) // 2, self._most - len(state))
+            rows = np.argsort(-state.error)[:want]
+            split(state, rows[state.error[rows] > 0])
+        state.error[:] = 0.0
+        state.hits[:] = 0
+
+    def cameras(self) -> tuple[Camera, ...]:
+        """The photos' cameras where they are now."""
+        return tuple(self.poses.camera(n, view.cameras[0]) for n, view in enumerate(self.views))
+
+    def field(self) -> SplatField:
+        """The field as it is now."""
+        field = self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
+        thin = needles(field.log_scales)
+        return field if thin.all() else field.take(~thin)
+
+    def progress(self) -> SplatProgress:
+        """Where the run stands."""
+        done = self.done
+        left = self.seconds * (1.0 - done) / done if done > 0 else float("nan")
+        if self._config.minutes is not None:
+            left = 60.0 * self._config.minutes - self.seconds
+        return SplatProgress(
+            done=done,
+            step=self.step,
+            loss=self.running_loss,
+            psnr=-10.0 * float(np.log10(max(self.running_loss, 1e-10))),
+            seconds=self.seconds,
+            seconds_left=max(left, 0.0),
+            splats=len(self.state),
+        )
+
+    def store(self, path: Path) -> None:
+        """Writes the run's state, atomically."""
+        scalars = {
+            "step": self.step,
+            "seconds": self.seconds,
+            "running_loss": self.running_loss,
+            "queue": self._queue,
+            "random": self._rng.bit_generator.state,
+        }
+        arrays = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        arrays |= {"gains": self.gains, "motions": self.poses.motions}
+        if self._robust is not None:
+            arrays |= {"residuals": self._robust.residuals, "visits": self._robust.visits}
+            scalars["robust_scale"] = self._robust.scale
+        write_checkpoint(path, self._signature(), scalars, arrays)
+
+    def restore(self, path: Path) -> None:
+        """Takes the run's state from a file written by `store`.
+
+        Raises:
+            CagefieldError: a file that cannot be read, or of other photos or settings.
+        """
+        scalars, arrays = read_checkpoint(path, self._signature())
+        with refusing_damage(path):
+            self._take(scalars, arrays)
+
+    def _take(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Takes the state of a checkpoint. Raises ValueError where numbers or arrays cannot be a run's."""
+        own = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
+        forms: dict[str, Form] = {
+            name: (str(array.dtype), ("N", *array.shape[1:])) for name, array in own.items()
+        }
+        count = len(self.views)
+        forms |= {"gains": ("float32", (count, 3)), "motions": ("float64", (count, 6))}
+        if self._robust is not None:
+            forms |= {"residuals": ("float32", (len(self._robust.residuals),)), "visits": ("int64", (count,))}
+            check_finite(arrays, ("residuals",))
+        lengths = check_arrays(arrays, forms)
+        check_finite(arrays, ("means", "log_scales", "quaternions", "logits", "sh", "gains", "motions"))
+        check_run(scalars, "running_loss")
+        queue = scalars["queue"]
+        if len(arrays) != len(forms) or not lengths["N"]:
+            raise ValueError(f"{lengths['N']} splats and {len(arrays)} arrays")
+        if not isinstance(queue, list) or not set(queue) <= set(range(count)) or len(queue) > count:
+            raise ValueError(f"photos that come next: {queue!s:.40}")
+        self._rng.bit_generator.state = scalars["random"]
+        self.gains, self.poses.motions = arrays.pop("gains"), arrays.pop("motions")
+        if self._robust is not None:
+            self._robust.residuals, self._robust.visits = arrays.pop("residuals"), arrays.pop("visits")
+            self._robust.scale = float(scalars["robust_scale"])
+        self.state = SplatState(**arrays)
+        self.step, self.seconds = scalars["step"], scalars["seconds"]
+        self.running_loss, self._queue = scalars["running_loss"], [int(number) for number in queue]
+
+    def _signature(self) -> str:
+        """What a file must have been written for."""
+        sizes = [[view.cameras[0].width, view.cameras[0].height] for view in self.views]
+        settings = dataclasses.asdict(self._config)
+        return json.dumps(["splats", settings, [view.name for view in self.views], sizes])
+
+
+@dataclasses.dataclass(frozen=True)
+class SplatProgress:
+    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, seconds, splats."""
+
+    done: float
+    step: int
+    loss: float
+    psnr: float
+    seconds: float
+    seconds_left: float
+    splats: int
+
+    def __str__(self) -> str:
+        """Loss, PSNR, speed and number of splats."""
+        rate = self.step / max(self.seconds, 1e-9)
+        return f"loss {self.loss:.5f}, PSNR {self.psnr:.1f} dB, {rate:.0f} photos/s, {self.splats} splats"

@@ -1,0 +1,97 @@
+"""The splats of a training as arrays that steps change in place, with what the steps remember of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cagefield.fields.splat_field import SplatField
+from cagefield.training.splats.kernels.gauss_newton_splats import MOMENTS, RUNNING
+from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS
+from cagefield.typing import Float32
+
+
+@dataclass(eq=False)
+class SplatState:
+    """N splats in training; arrays by row.
+
+    means [N,3], log_scales [N,3], quaternions [N,4], logits [N] of the opacities, sh [N,K,3]: as SplatField.
+    momentum, running, ticks: of `gauss_newton`. error [N], hits [N]: what `growth` weighs.
+    gradients, curvatures: of the last step, valid for the splats that it saw.
+    """
+
+    means: Float32
+    log_scales: Float32
+    quaternions: Float32
+    logits: Float32
+    sh: Float32
+    momentum: Float32
+    running: Float32
+    ticks: NDArray[np.int32]
+    error: Float32
+    hits: NDArray[np.int32]
+    gradients: Float32
+    curvatures: Float32
+
+    @classmethod
+    def new(
+        cls, means: NDArray[Any], scales: NDArray[Any], rgb: Float32, opacity: float, sh_degree: int
+    ) -> SplatState:
+        """Round splats: means [N,3], standard deviations [N], rgb [N,3]."""
+        n = len(means)
+        quaternions = np.zeros((n, 4), np.float32)
+        quaternions[:, 0] = 1.0
+        sh = np.zeros((n, (sh_degree + 1) ** 2, 3), np.float32)
+        sh[:, 0] = (rgb - 0.5) / 0.28209479177387814
+        return cls(
+            np.array(means, np.float32),
+            np.repeat(np.log(scales)[:, None], 3, axis=1).astype(np.float32),
+            quaternions,
+            np.full(n, np.log(opacity / (1.0 - opacity)), np.float32),
+            sh,
+            *_memory(n),
+        )
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    def take(self, rows: NDArray[np.int64]) -> None:
+        """Keeps these rows, in this order; a row may be there more than once."""
+        for field in fields(self):
+            setattr(self, field.name, np.ascontiguousarray(getattr(self, field.name)[rows]))
+
+    def append(self, other: SplatState) -> None:
+        """Adds the rows of another state behind these."""
+        for field in fields(self):
+            both = np.concatenate([getattr(self, field.name), getattr(other, field.name)])
+            setattr(self, field.name, both)
+
+    def to_field(self, antialiased: bool, bounds: NDArray[np.float64], unbounded: bool) -> SplatField:
+        """The splats as a field."""
+        opacities = 1.0 / (1.0 + np.exp(-self.logits.astype(np.float64)))
+        return SplatField(
+            self.means,
+            self.log_scales,
+            self.quaternions,
+            opacities.astype(np.float32),
+            self.sh,
+            antialiased,
+            bounds,
+            unbounded,
+        )
+
+
+def _memory(n: int) -> tuple[Any, ...]:
+    """Empty optimiser rows of n splats, in the order of SplatState's fields."""
+    return (
+        np.zeros((n, MOMENTS), np.float32),
+        np.zeros((n, RUNNING), np.float32),
+        np.zeros(n, np.int32),
+        np.zeros(n, np.float32),
+        np.zeros(n, np.int32),
+        np.zeros((n, GRADIENTS), np.float32),
+        np.zeros((n, CURVATURES), np.float32),
+    )
