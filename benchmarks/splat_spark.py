@@ -63,7 +63,7 @@ FLAGS = [
 ]
 NOTES = (
     "PSNR in dB of our pictures, on white or on black, the lower, 99 at most.",
-    "`oracle`: against `rendering/splats/reference_rasterizer.py` in float64, whole pictures of the same view with `side`"
+    "`oracle`: against `reference_rasterizer.py` in float64, whole pictures of the same view with `side`"
     f" pixels a side, {SMALL} above {MANY} splats.",
     f"`Spark as it is`: against Spark 2.2.0, pictures of {SIZE}x{SIZE} in 8 bits. `Spark, alike`: with the"
     " file's filter, our end of splats, our order by depth, and its precise storage of splats.",

@@ -17,7 +17,7 @@ import cagefield
 from cagefield.cameras.camera import Camera
 from editor_page import CHROMIUM, FLAGS, USUAL
 
-VIEWER = Path(cagefield.__file__).parent / "exporting" / "viewer" / "viewer.js"
+VIEWER = Path(cagefield.__file__).parent / "pages" / "viewer" / "viewer.js"
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ def test_converting_many_batches_is_writing_the_field(
     field = random_splats(900, degree=1)
     write_splats(field, tmp_path / "a.ply")
     for module in ("splat_table", "splat_ply"):
-        monkeypatch.setattr(f"cagefield.formats.{module}.BATCH", 128)
+        monkeypatch.setattr(f"cagefield.formats.splats.{module}.BATCH", 128)
     shares: list[float] = []
     assert convert_splats(tmp_path / "a.ply", tmp_path / f"b{ending}", on_progress=shares.append) == (
         900,

@@ -127,7 +127,7 @@ def test_a_process_writes_no_kernels_as_it_ends_without_room(
         "import atexit",
         "from quadrants.lang import impl",
         "atexit.register(lambda: print(impl.current_cfg().offline_cache))",  # after what is registered later
-        "from cagefield import devices",
+        "from cagefield.compute import devices",
         "devices.start()",
         trouble,
     ]

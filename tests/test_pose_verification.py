@@ -23,7 +23,7 @@ from cagefield.datasets.sfm.epipolar_error import (
 from cagefield.datasets.sfm.pose_alignment import align_poses
 from cagefield.datasets.sfm.pose_refinement import camera_groups
 from cagefield.datasets.sfm.pose_verification import all_views, describe, verify_poses
-from cagefield.datasets.transforms.transforms_writer import write_transforms
+from cagefield.datasets.sfm.transforms_writer import write_transforms
 from cagefield.datasets.views import Dataset
 from posed_photos import ring, textured_capture
 

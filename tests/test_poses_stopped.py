@@ -85,7 +85,7 @@ def test_what_processes_have_done_is_summed(tmp_path: Path, monkeypatch: pytest.
 
 def test_a_process_ends_with_the_one_that_started_it() -> None:
     program = (
-        "import time\nfrom cagefield.datasets import colmap_tasks\n"
+        "import time\nfrom cagefield.datasets.sfm import colmap_tasks\n"
         "def work(on_done):\n    on_done(1)\n    time.sleep(600)\n"
         "colmap_tasks._TASKS['wait'] = work\ncolmap_tasks.main()"
     )

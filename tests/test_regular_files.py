@@ -111,7 +111,7 @@ def test_arrays_take_no_more_than_their_files(tmp_path: Path, monkeypatch: pytes
     with pytest.raises(ValueError, match="it says that it unpacks to"):
         read_arrays(tmp_path / "a.npz")
     assert read_arrays(tmp_path / "a.npz", DEFLATED)["pictures"].shape == (100, 100)
-    monkeypatch.setattr("cagefield.compute.devices.free_memory", lambda: 1000)
+    monkeypatch.setattr("cagefield.files.memory.free_memory", lambda: 1000)
     with pytest.raises(ValueError, match=r"GB of memory, 0\.0 are free; end other programs"):
         read_arrays(tmp_path / "a.npz", DEFLATED)
 

@@ -138,7 +138,7 @@ def test_what_memory_cannot_hold_is_refused_before_its_digest(
     huge = tmp_path / "huge.splat"
     huge.touch()
     os.truncate(huge, 20 << 30)
-    monkeypatch.setattr("cagefield.compute.devices.free_memory", lambda: 16 << 30)
+    monkeypatch.setattr("cagefield.files.memory.free_memory", lambda: 16 << 30)
     monkeypatch.setattr(splat_file_scene, "_digest", lambda *_: pytest.fail("it was gone through"))
     monkeypatch.setattr(
         "cagefield.formats.splats.antimatter15_splat._plausible", lambda *_: True

@@ -15,7 +15,6 @@ from PIL import Image
 
 from cagefield.cameras.camera_paths import load_camera_path
 from cagefield.cameras.keyframe_files import load_keys
-from cagefield.compute import devices
 from cagefield.datasets import load_dataset
 from cagefield.datasets.photos import read_photo
 from cagefield.edits import EditStack, parse_edits
@@ -24,7 +23,7 @@ from cagefield.errors import CagefieldError, DatasetError, EditError, EditFileEr
 from cagefield.fields.field_files import write_tensors
 from cagefield.fields.nerf_file import load_nerf
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.files import json_text
+from cagefield.files import json_text, memory
 from cagefield.images import image_files
 from cagefield.images.image_files import read_image
 from cagefield.scene.scene_files import is_scene, read_cameras
@@ -248,9 +247,9 @@ def test_json_that_is_honest_is_read() -> None:
 
 
 def test_a_lattice_that_would_take_most_of_the_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    free = devices.free_memory()
+    free = memory.free_memory()
     assert free is None or free > 1 << 20
-    monkeypatch.setattr(devices, "free_memory", lambda: 3 * 10**9)
+    monkeypatch.setattr(memory, "free_memory", lambda: 3 * 10**9)
     (edit,) = parse_edits(
         '{"edits": [{"inner": {"center": [0, 0, 0], "size": 1}, "outer": {"margin": 0.5}, "lattice": 512,'
         ' "operations": [{"translate": [0.1, 0, 0]}]}]}',

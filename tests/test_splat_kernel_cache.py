@@ -73,8 +73,8 @@ def test_a_change_of_what_a_module_imports_is_another_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "cagefield"
-    source = Path(numba_cache.__file__).parent
-    names = ["rendering/splats/kernels/blending.py", "rendering/splats/kernels/projection.py", "sh.py"]
+    source = Path(numba_cache.__file__).parents[1]
+    names = ["rendering/splats/kernels/blending.py", "rendering/splats/kernels/projection.py", "fields/sh.py"]
     for name in names:
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(source / name, package / name)

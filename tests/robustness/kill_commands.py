@@ -29,7 +29,7 @@ from kill_points import Say
 
 from cagefield import Scene
 from cagefield.datasets import load_dataset
-from cagefield.datasets.transforms.transforms_writer import write_transforms
+from cagefield.datasets.sfm.transforms_writer import write_transforms
 from cagefield.images.image_files import write_png
 from cagefield.procedural import make_scene
 from cagefield.server.editor.persistence import SceneStore

@@ -46,7 +46,7 @@ from cagefield.typing import Mask, UInt8
 Move = Callable[[float, float, str], None]
 Bar = Callable[[str], AbstractContextManager[Move]]
 
-_MODELLED = ("datasets/procedural", "cameras.py")
+_MODELLED = ("procedural", "cameras")
 _MAPPED = (
     "edits", "warps", "cages.py", "trilinear_hex.py", "benchmarking/mapped_photographs.py",
     "benchmarking/exact.py", "benchmarking/peers", "benchmarking/methods.py",

@@ -150,7 +150,7 @@ class BenchCaptures:
 
         path = Path(name)
         if is_capture(name) and not path.exists():
-            key = digest([name, self.room_views, self.room_size], ("datasets/procedural", "cameras.py"))
+            key = digest([name, self.room_views, self.room_size], ("procedural", "cameras"))
             path = folder / f"photos-{key}" / name
             if not path.is_dir():
                 with progress_bar(f"{name}: photos") as move:

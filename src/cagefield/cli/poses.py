@@ -44,7 +44,7 @@ class Poses:
         """Makes the data set; prints what became of the photos."""
         from cagefield.datasets import load_dataset
         from cagefield.datasets.dataset_loader import has_photos_alone
-        from cagefield.datasets.transforms.transforms_writer import RECORD, write_transforms
+        from cagefield.datasets.sfm.transforms_writer import RECORD, write_transforms
 
         check_number("--frames", self.frames, 3, 10_000)
         check_folder(self.out, self.overwrite, RECORD)
@@ -87,7 +87,7 @@ def posed(photos: Path, target: Path, masks: Path | None = None) -> Path:
     """
     from cagefield.datasets.dataset_loader import has_photos_alone
     from cagefield.datasets.sfm.structure_from_motion import is_made_of
-    from cagefield.datasets.transforms.transforms_writer import RECORD
+    from cagefield.datasets.sfm.transforms_writer import RECORD
 
     photos = photos.expanduser()
     if not has_photos_alone(photos):

@@ -9,7 +9,6 @@ import contextlib
 import io
 import os
 import warnings
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -100,32 +99,6 @@ def threads() -> int:
         return max(1, len(os.sched_getaffinity(0)))
     except AttributeError:
         return max(1, os.cpu_count() or 1)
-
-
-def free_memory() -> int | None:
-    """Bytes of memory that programs can have now, those of a container at most; None where it is not told."""
-    free: list[int] = []
-    with contextlib.suppress(OSError, ValueError, IndexError):
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                free.append(int(line.split()[1]) << 10)
-    with contextlib.suppress(OSError, ValueError, KeyError):
-        group = Path("/sys/fs/cgroup")
-        most = int((group / "memory.max").read_text())  # "max", no number, where there is no limit
-        parts = dict(line.split() for line in (group / "memory.stat").read_text().splitlines())
-        free.append(max(0, most - int(parts["anon"]) - int(parts.get("kernel", 0))))
-    return min(free, default=None)
-
-
-def lacking_memory(needed: int) -> str | None:
-    """Why so many bytes cannot be had now, and the cure; None where they can, or nobody knows."""
-    free = free_memory()
-    if free is None or needed <= free:
-        return None
-    return (
-        f"it takes {needed / 1e9:.1f} GB of memory, {free / 1e9:.1f} are free; end other programs, or use a "
-        "machine with more"
-    )
 
 
 def floats(values: ArrayLike) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from cagefield.compute.kernel_cache import cache_folder, tell_that_none_are_kept
 FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
 """Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _TOLD: list[Exception] = []
 
 

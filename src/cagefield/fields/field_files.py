@@ -12,10 +12,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from cagefield.compute.devices import lacking_memory
 from cagefield.errors import FieldError
 from cagefield.fields.tensor_file import Tensor, read_header
 from cagefield.files.atomic import replaced_file
+from cagefield.files.memory import lacking_memory
 from cagefield.files.safe_open import UnreadableError, check_regular, open_regular
 
 

@@ -11,7 +11,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.devices import lacking_memory
+from cagefield.files.memory import lacking_memory
 from cagefield.files.safe_open import open_regular
 
 DEFLATED = 1040

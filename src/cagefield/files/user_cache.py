@@ -22,7 +22,7 @@ def cache_root() -> Path:
 @functools.cache
 def source_digest(mark: bytes = b"") -> str:
     """A digest of the package's source: of the folders that have a file with `mark` in it."""
-    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))}
+    sources = {path: path.read_bytes() for path in sorted(Path(__file__).parents[1].rglob("*.py"))}
     folders = {path.parent for path, source in sources.items() if mark in source}
     digest = hashlib.sha256()
     for path, source in sources.items():

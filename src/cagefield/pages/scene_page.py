@@ -36,7 +36,7 @@ from cagefield.rendering.splats.splitting import split_of
 from cagefield.rendering.voxels.voxel_renderer import Renderer
 from cagefield.scene.scene import Scene
 
-_HERE = files("cagefield.exporting")
+_HERE = files("cagefield.pages")
 
 STILLS_A_SECOND = 12.0
 """Of the camera path; between two of them the page goes straight."""

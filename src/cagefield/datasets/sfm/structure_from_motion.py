@@ -39,7 +39,7 @@ from cagefield.datasets.sfm.sfm_workspace import (
     work_folder,
     work_photos,
 )
-from cagefield.datasets.transforms.transforms_writer import FILES, RECORD
+from cagefield.datasets.sfm.transforms_writer import FILES, RECORD
 from cagefield.errors import DatasetError
 from cagefield.files import json_text
 from cagefield.files.atomic import recover_folder, replaced_folder

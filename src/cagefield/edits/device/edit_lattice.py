@@ -12,6 +12,7 @@ from cagefield.compute.identity_memo import kept
 from cagefield.edits.device.kernels.edit_lattice import sample_lattice
 from cagefield.edits.device.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
 from cagefield.errors import EditError
+from cagefield.files import memory
 from cagefield.warps import flow_lattice
 from cagefield.warps.continuous import ContinuousWarp
 from cagefield.warps.flow_shell import FlowShell
@@ -72,7 +73,7 @@ def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
 
 
 def _check_memory(resolution: int) -> None:
-    needed, free = NODE_BYTES * resolution**3, devices.free_memory()
+    needed, free = NODE_BYTES * resolution**3, memory.free_memory()
     if resolution > _ALWAYS and free is not None and needed > free // 2:
         raise EditError(
             f"a lattice of {resolution} nodes per axis takes {needed / 1e9:.1f} GB, of the "

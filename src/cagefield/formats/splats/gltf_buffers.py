@@ -19,8 +19,8 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
-from cagefield.compute.devices import lacking_memory
 from cagefield.files import json_text
+from cagefield.files.memory import lacking_memory
 from cagefield.files.safe_open import (
     MOST_TEXT,
     check_regular,

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.compute.devices import lacking_memory
 from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
+from cagefield.files.memory import lacking_memory
 from cagefield.formats.splats.antimatter15_splat import write_splat_rows
 from cagefield.formats.splats.axes import PLY, Axes, signs, with_axes
 from cagefield.formats.splats.compressed_ply import write_compressed_ply
