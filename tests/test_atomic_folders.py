@@ -64,7 +64,7 @@ _KILLED = textwrap.dedent("""
     import os, shutil, signal, sys
     from pathlib import Path
     import cagefield.edits.edit_files, cagefield.scene.scene
-    from cagefield import atomic_files
+    from cagefield.files import atomic
     from cagefield.cli import main
     source, edits, way = sys.argv[1:]
 
@@ -82,9 +82,9 @@ _KILLED = textwrap.dedent("""
             setattr(module, name, call)
 
         if way == "renames":
-            atomic_files.exchanged = lambda one, other: False
+            atomic.exchanged = lambda one, other: False
         else:
-            counted(atomic_files, "exchanged")
+            counted(atomic, "exchanged")
         for name in ("rename", "replace", "link", "unlink", "rmdir", "mkdir", "chmod", "open"):
             counted(os, name)
         return main(["edit", "out", edits, "--overwrite"])

@@ -368,7 +368,7 @@ def test_settings_are_checked() -> None:
 
 def test_digests_follow_content_and_sources() -> None:
     assert digest([1, "a"]) == digest([1, "a"]) != digest([1, "b"])
-    assert len({digest([]), digest([], ["cages.py"]), digest([], ["warps"])}) == 3
+    assert len({digest([]), digest([], ["geometry/cage.py"]), digest([], ["warps"])}) == 3
 
 
 def test_what_is_measured_has_the_light_of_its_truth() -> None:

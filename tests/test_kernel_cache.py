@@ -19,7 +19,7 @@ import json
 import numpy as np
 from cagefield import Cage, Edit
 from cagefield.edits import EditStack
-from cagefield.warps import device_stack
+from cagefield.edits.device import device_stack
 
 inner = Cage.box((0, 0, 0), 0.5)
 edit = Edit(inner, inner.grown(0.5), shell="trilinear").translate((0.1, 0, 0))
@@ -34,7 +34,7 @@ DOUBLE = """
 import sys
 import numpy as np
 import quadrants as qd
-from cagefield import devices
+from cagefield.compute import devices
 from cagefield.errors import warnings_in_one_line
 
 I32 = qd.types.ndarray(qd.i32, 1)

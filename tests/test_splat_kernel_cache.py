@@ -85,7 +85,7 @@ def test_a_change_of_what_a_module_imports_is_another_folder(
     before = [folder_of(blending), folder_of(projection)]
     assert folder_of(blending) == before[0] and before[0] != before[1]
     # The harmonics' constants are compiled into both, by way of the projection.
-    with (package / "sh.py").open("a") as file:
+    with (package / "fields" / "sh.py").open("a") as file:
         file.write("C0 = 1.0\n")
     assert folder_of(blending) != before[0] and folder_of(projection) != before[1]
     between = folder_of(projection)

@@ -98,7 +98,7 @@ def test_splats_that_are_cut_off_while_they_are_read_are_a_line(tmp_path: Path, 
 _CUT_OFF = """
 import os, sys
 from pathlib import Path
-from cagefield.datasets import colmap_files
+from cagefield.datasets.colmap import colmap_files
 from cagefield.errors import DatasetError
 file, walk = Path(sys.argv[1]), colmap_files._walk
 def cut_off(*args):

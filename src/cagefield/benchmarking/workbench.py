@@ -48,7 +48,7 @@ Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("procedural", "cameras")
 _MAPPED = (
-    "edits", "warps", "cages.py", "trilinear_hex.py", "benchmarking/mapped_photographs.py",
+    "edits", "warps", "geometry", "benchmarking/mapped_photographs.py",
     "benchmarking/exact.py", "benchmarking/peers", "benchmarking/methods.py",
 )  # fmt: skip
 
