@@ -1,6 +1,6 @@
 """What it costs to refresh a renderer for one edit of ten that share an outer cage, against that edit alone.
 
-    python benchmarks/chain_refresh.py SCENE [-o benchmarks/results/chain_refresh.md]
+    python -m benchmarks.chain_refresh SCENE [-o benchmarks/results/chain_refresh.md]
 
 A refresh is everything until a picture can be rendered: the edit's lattice, and where the edited field is
 occupied. "Dragging" is what the editor does while the mouse moves (the coarse occupancy), "at rest" the fine
@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number, write_text
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage
@@ -51,7 +51,7 @@ def main() -> None:
         (
             "Medians of wall times; the ratio is the median of the pairs'.",
             f"Machine: {Machine.here()}",
-            "Command: `python benchmarks/chain_refresh.py SCENE`",
+            "Command: `python -m benchmarks.chain_refresh SCENE`",
         ),
     )
     print(table.markdown())

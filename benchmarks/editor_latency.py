@@ -1,6 +1,6 @@
 """Measures the editor in headless Chromium: from the mouse's move to the presented frame that shows it.
 
-python benchmarks/editor_latency.py SCENE [-o benchmarks/results/editor.md]
+python -m benchmarks.editor_latency SCENE [-o benchmarks/results/editor.md]
 
 The arm of the digger is dragged up and down by the gizmo in an 800x600 window, as a continuous edit. A move
 counts from the time of its mouse event to the time at which the frame after the one that drew it begins, by
@@ -25,7 +25,7 @@ import numpy as np
 import tyro
 from playwright.sync_api import Page, sync_playwright
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 from cagefield.errors import CagefieldError
 
@@ -94,7 +94,7 @@ class EditorLatency:
                 server.terminate()
                 server.wait(10)
         machine = f"{cpu_model()}, {devices.threads()} cores, pages drawn in software"
-        command = "python benchmarks/editor_latency.py SCENE"
+        command = "python -m benchmarks.editor_latency SCENE"
         text = f"# The editor's latency\n\n{table}\nMachine: {machine}. `{command}`\n"
         print(text)
         if self.out is not None:

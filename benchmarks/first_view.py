@@ -1,6 +1,6 @@
 """Measures the first view of `cagefield view`: from the command to a whole picture on the page.
 
-python benchmarks/first_view.py SCENE [--before SOURCE] [-o benchmarks/results/first_view.md]
+python -m benchmarks.first_view SCENE [--before SOURCE] [-o benchmarks/results/first_view.md]
 
 SCENE is a scene folder; SOURCE the `src` folder of another version, to compare with. Each version is started
 with an empty cache of kernels, as on a newcomer's machine, and again with the one that it has made then. CPU
@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from playwright.sync_api import sync_playwright
 
 import cagefield
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from editor_page import CHROMIUM, FLAGS
 
 PATIENCE = 600.0
@@ -73,7 +73,7 @@ class FirstView:
             self.out.write_text(text)
 
     def _command(self) -> str:
-        return "python benchmarks/first_view.py SCENE" + (" --before SOURCE" if self.before else "")
+        return "python -m benchmarks.first_view SCENE" + (" --before SOURCE" if self.before else "")
 
     def _once(self, source: Path, cache: Path) -> tuple[float, ...]:
         """Seconds until there is a page, a picture and a whole one; CPU seconds of server and browser."""

@@ -1,6 +1,6 @@
 """What it costs to refresh the flow shell's lattice while an edit is dragged, and how far the lattice is off.
 
-    python benchmarks/flow_lattice.py
+    python -m benchmarks.flow_lattice
 
 A refresh is everything from the new edit to its packed lattice: checks, the cage's way, the kernel. "CPU" is
 the process's time, all cores together, least over the rounds; the estimate is Python's share of it plus the
@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number, write_text
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.device.device_stack import DeviceStack
@@ -154,7 +154,7 @@ def main() -> None:
     cores = devices.threads()
     machine = f"Machine: {Machine.here()}"
     command = (
-        "Command: `python benchmarks/flow_lattice.py`. CPU: milliseconds of all cores together, least of "
+        "Command: `python -m benchmarks.flow_lattice`. CPU: milliseconds of all cores together, least of "
     )
     command += f"{options.rounds} rounds; wall: while the machine did other things, too."
     measured = ("CPU", "estimate", "wall", "voxels")

@@ -1,6 +1,6 @@
 """Prints least det J and largest stretch of the flow shell for several weights, over a fixed set of edits.
 
-python benchmarks/flow_profiles.py
+python -m benchmarks.flow_profiles
 
 The edits are the nine continuous ones of `cagefield bench edits`, then fourteen of a box; the trilinear shell
 is there to compare with.
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.benchmarking.cases import CASES
-from cagefield.benchmarking.compare import continuous
-from cagefield.benchmarking.distortion import between
+from benchmarks.common.cases import CASES
+from benchmarks.edits.compare_shells import continuous
+from benchmarks.edits.distortion import shell_samples
 from cagefield.edits import Edit
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
@@ -109,7 +109,7 @@ def measure(edit: Edit, weight: Weight | None) -> tuple[float, float]:
     near *= np.linspace(1.0, 1.2, len(near))[:, None] / np.abs(near).max(axis=1, keepdims=True)
     p = Extended.of(edit.deformed).points(near)
     p = p[edit.outer.contains(p) & ~edit.deformed.contains(p)]
-    J = shell.to_canonical(np.concatenate([p, between(edit.deformed, edit.outer, 1000)]))[1]
+    J = shell.to_canonical(np.concatenate([p, shell_samples(edit.deformed, edit.outer, 1000)]))[1]
     det = np.linalg.det(J)
     s = np.linalg.svd(J, compute_uv=False)
     if (det <= 0.0).any():

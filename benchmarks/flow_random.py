@@ -1,6 +1,6 @@
 """Prints the worst of the flow shell's promises over many random edits, and writes them as a table.
 
-    python benchmarks/flow_random.py --edits 10000 --out benchmarks/results/flow_random.md
+    python -m benchmarks.flow_random --edits 10000 --out benchmarks/results/flow_random.md
 
 Each of the cages is bent in six of ten edits, by corners moved to up to 95% of what keeps it valid; then come
 one to three operations: turns to 180 degrees, scales from 0.3 to what fits, shears, moves, drags of corners,
@@ -23,8 +23,8 @@ import numpy as np
 import quadrants as qd
 from scipy.spatial.transform import Rotation
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, write_text
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, write_text
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.operations import (
@@ -302,7 +302,7 @@ def main() -> None:
                 f"{time.monotonic() - start:6.0f} s: {len(rows)} edits, least det J {worst:.1e}", flush=True
             )
     kind = " --float32" if options.float32 else ""
-    command = f"python benchmarks/flow_random.py --edits {options.edits} --points {options.points}{kind}"
+    command = f"python -m benchmarks.flow_random --edits {options.edits} --points {options.points}{kind}"
     result = table(np.array(rows), refused, options.points, command)
     result.show()
     if options.out is not None:

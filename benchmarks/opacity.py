@@ -1,7 +1,7 @@
 """Whether stretched content should keep its opacity: both choices against scenes with parts really scaled.
 
-    python benchmarks/opacity.py WORKDIR --steps 6000 [-o benchmarks/results/opacity.md]
-    python benchmarks/opacity.py WORKDIR --field splat --steps 600 --size 200 --no-continuous
+    python -m benchmarks.opacity WORKDIR --steps 6000 [-o benchmarks/results/opacity.md]
+    python -m benchmarks.opacity WORKDIR --field splat --steps 600 --size 200 --no-continuous
         -o benchmarks/results/opacity_splats.md
 
 WORKDIR is the work folder of `cagefield bench edits`; its fields of that many steps are used, or trained.
@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking import compare
-from cagefield.benchmarking.cases import CASES, chosen
-from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr, supersampled
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number, write_text
-from cagefield.benchmarking.workbench import Settings, Workbench
+from benchmarks.common.cases import CASES, chosen
+from benchmarks.common.figures import changed_pixels, mean_psnr, pooled_psnr, supersampled
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
+from benchmarks.common.workbench import Settings, Workbench
+from benchmarks.edits import compare_shells
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.edits import Edit, EditStack
@@ -110,7 +110,7 @@ def main() -> None:
             f"Gained on average by preserving: {'; '.join(means)}.",
             f"Fields: {options.field}s, {options.steps} steps, photos of {options.size}x{options.size}.",
             f"Machine: {Machine.here()}",
-            f"Command: `python benchmarks/opacity.py {options.workdir.name} --field {options.field} "
+            f"Command: `python -m benchmarks.opacity {options.workdir.name} --field {options.field} "
             f"--steps {options.steps} --size {options.size} --views {options.views} "
             f"--scenes {' '.join(options.scenes)}"
             f"{' --no-continuous' if options.no_continuous else ''}`",
@@ -169,7 +169,9 @@ def continuous(bench: Workbench, scenes: Sequence[str]) -> Iterator[tuple[str, .
         before = bench.mapped(case.scene, None, cameras)
         truth = bench.mapped(case.scene, case.edits, cameras)
         name = case.name.replace("_", " ")
-        yield _row(bench, case.scene, name, "continuous", case.edits, cameras, before, truth, compare.FINER)
+        yield _row(
+            bench, case.scene, name, "continuous", case.edits, cameras, before, truth, compare_shells.FINER
+        )
 
 
 def _row(

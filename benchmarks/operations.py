@@ -1,7 +1,7 @@
 """The paper's operations on the original NeRF and on its voxels, beside each other, from three views each.
 
     cagefield import CHECKPOINT --data DATA -o SCENE
-    python benchmarks/operations.py SCENE -o OUT.png
+    python -m benchmarks.operations SCENE -o OUT.png
 
 SCENE holds the original NeRF that its voxels were baked from; the edit files in `benchmarks/operations` are
 for nerf-pytorch's chair. Rows: unedited, then one for each file; columns: the original and the voxels, for
@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.common.image_strips import Panel, strip
 from cagefield import EditStack, Scene, load_edits
-from cagefield.benchmarking.strips import Panel, strip
 from cagefield.compute import devices
 from cagefield.errors import SceneError
 from cagefield.images.image_files import write_png

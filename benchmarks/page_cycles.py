@@ -1,6 +1,6 @@
 """Opens and closes pages again and again, and measures what stays: heap, GPU's objects, processes' memory.
 
-python benchmarks/page_cycles.py [--cycles 100] [-o benchmarks/results/page_cycles.md]
+python -m benchmarks.page_cycles [--cycles 100] [-o benchmarks/results/page_cycles.md]
 
 On tiny scenes with an edit, of voxels and of splats: the editor (voxels) with `?render=page`, whose view is
 turned until the page has drawn it, and the pages of `cagefield export`. One tab goes there and back to an
@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from playwright.sync_api import Page, sync_playwright
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.fields.splat_field import SplatField
 from cagefield.pages.scene_page import ScenePage
 from cagefield.scene.scene import Scene
@@ -73,7 +73,7 @@ class PageCycles:
             "- Heap: of the tab, after garbage was collected. MB: resident (shared pages in parts), of all "
             "processes of the browser; of the server and its rendering process.\n"
             "- Slope: of the last three quarters, a hundred times.\n"
-            f"- {cpu_model()}, Chromium drawing in software. `python benchmarks/page_cycles.py`",
+            f"- {cpu_model()}, Chromium drawing in software. `python -m benchmarks.page_cycles`",
         ]
         text = "\n\n".join(parts) + "\n"
         print(text)

@@ -1,6 +1,6 @@
 """Compares pictures that a page draws with its own GPU with the fused renderer's, and counts what they cost.
 
-python benchmarks/page_pictures.py FOLDER [-o benchmarks/results/page_pictures.md] [--pictures FOLDER]
+python -m benchmarks.page_pictures FOLDER [-o benchmarks/results/page_pictures.md] [--pictures FOLDER]
 
 FOLDER holds scenes of voxels called digger, chair, microphone, plant and, if there, room (one that is
 unbounded), as `cagefield train` writes them. Chromium draws in software, so only counts say what a GPU has to
@@ -24,7 +24,7 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import cagefield
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack, load_edits
 from cagefield.fields.voxel_field import VoxelField
@@ -109,7 +109,7 @@ class PagePictures:
                 "largest and mean error of halves, in voxels, against float32 nodes; of the lattice itself "
                 "see `flow_lattice.md`.",
                 "- Page, kernel: a picture of 200x150, the page's in software (SwiftShader).",
-                f"- {cpu_model()}, 2 cores. `python benchmarks/page_pictures.py FOLDER`",
+                f"- {cpu_model()}, 2 cores. `python -m benchmarks.page_pictures FOLDER`",
                 "",
             ]
         )

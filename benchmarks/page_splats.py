@@ -1,6 +1,6 @@
 """Compares pictures of splats that a page draws with its own GPU with the rasteriser's, and counts bytes.
 
-python benchmarks/page_splats.py FILE... [-o benchmarks/results/page_splats.md] [--pictures FOLDER]
+python -m benchmarks.page_splats FILE... [-o benchmarks/results/page_splats.md] [--pictures FOLDER]
 
 Each splat file is seen as it is, with its middle twisted, and with a part of it moved away. Chromium draws in
 software.
@@ -20,7 +20,7 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.cameras.camera import turntable
 from cagefield.edits import Edit, EditStack
 from cagefield.fields.splat_field import SplatField
@@ -66,7 +66,7 @@ class PageSplats:
             f"- rgb, opacity, depth, normals: PSNR in dB at {self.width}x{self.width * 3 // 4}, of depth and "
             "normals where opacity is above a half. Half floats for colour, floats for depth.",
             "- Changed: splats that come with the edit, children of split ones too. Upload: the edits' file.",
-            f"- {cpu_model()}. `python benchmarks/page_splats.py FILE...`",
+            f"- {cpu_model()}. `python -m benchmarks.page_splats FILE...`",
         )
         if self.out:
             self.out.write_text(

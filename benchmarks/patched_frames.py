@@ -1,6 +1,6 @@
 """What fill, light and feather cost in each frame: discrete edits with them over the same edits without.
 
-python benchmarks/patched_frames.py WORK [-o FILE.md] [--steps 4000] [--frames 24]
+python -m benchmarks.patched_frames WORK [-o FILE.md] [--steps 4000] [--frames 24]
 
 WORK is the work folder of `cagefield bench edits` of as many steps; what it lacks is made. Frames of 400x400
 pixels from six test cameras, taken in turn with and without; their medians.
@@ -14,9 +14,9 @@ import statistics
 import time
 from pathlib import Path
 
-from cagefield.benchmarking.cases import CASES
-from cagefield.benchmarking.machine import cpu_model
-from cagefield.benchmarking.workbench import Settings, Workbench
+from benchmarks.common.cases import CASES
+from benchmarks.common.machine import cpu_model
+from benchmarks.common.workbench import Settings, Workbench
 from cagefield.cli.options import TrainingOptions
 from cagefield.compute import devices
 from cagefield.edits import EditStack
@@ -61,7 +61,7 @@ def main() -> None:
     print(summary)
     if options.out is not None:
         title = "# Frames of discrete edits with fill, light and feather, over the same edits without"
-        command = "`python benchmarks/patched_frames.py WORK`"
+        command = "`python -m benchmarks.patched_frames WORK`"
         machine = f"{cpu_model()}, {os.cpu_count()} cores, device {devices.current()}; {command}: {summary}."
         options.out.write_text("\n".join([title, "", machine, "", *lines, ""]), encoding="utf-8")
 

@@ -1,6 +1,6 @@
 """Measures when a scene shows over a slow line: first its coarse level, then all of it.
 
-python benchmarks/slow_line.py SCENE [--mbit 10] [--latency 40] [-o benchmarks/results/slow_line.md]
+python -m benchmarks.slow_line SCENE [--mbit 10] [--latency 40] [-o benchmarks/results/slow_line.md]
 
 SCENE is a scene folder of voxels. Chromium's own throttle slows what it loads from a server on this machine:
 the folder of `cagefield export --embed`, the one file of `cagefield export`, and the editor, whose kernels an
@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from playwright.sync_api import sync_playwright
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.pages.page_file import bytes_until
 from cagefield.pages.scene_page import INDEX, NAMES, SCRIPT, ScenePage, write_folder
 from cagefield.scene.scene import Scene
@@ -108,7 +108,7 @@ class SlowLine:
                 "",
                 f"- The field: {len(field) / 1e6:.2f} MB, of it the coarse level {coarse / 1e6:.2f}; "
                 f"{', '.join(f'{NAMES[name]} {len(data) / 1e6:.2f}' for name, data in page.files.items())}.",
-                f"- {cpu_model()}, drawn in software at 500x420. `python benchmarks/slow_line.py SCENE`",
+                f"- {cpu_model()}, drawn in software at 500x420. `python -m benchmarks.slow_line SCENE`",
                 "",
             ]
         )

@@ -1,7 +1,7 @@
 """Attacks the readers of splat files with damage, and converts a large file.
 
-    python benchmarks/splat_files.py damage [--count 1000]
-    python benchmarks/splat_files.py large [--splats 10000000] [--sh-degree 0]
+    python -m benchmarks.splat_files damage [--count 1000]
+    python -m benchmarks.splat_files large [--splats 10000000] [--sh-degree 0]
 
 Damage: files of each format with some bytes changed, or cut off; each must be read, or refused in one line.
 Large: each conversion runs in a process of its own; its largest resident memory, seconds and size.

@@ -1,7 +1,7 @@
 """Pictures of splat files by this rasteriser, by its oracle, and by Spark in a browser.
 
     mkdir spark && cd spark && npm install @sparkjsdev/spark@2.2.0 three@0.180
-    python benchmarks/splat_spark.py FILE_OR_FOLDER... --modules spark/node_modules [--formats FILE]
+    python -m benchmarks.splat_spark FILE_OR_FOLDER... --modules spark/node_modules [--formats FILE]
         [--choices FILE] [--pictures DIR] [--out TABLE.md]
 
 Each file is seen by three cameras around the middle of its splats, on white and on black; a folder gives all
@@ -32,11 +32,12 @@ from PIL import Image
 from playwright.sync_api import Error as PlaywrightError
 from playwright.sync_api import sync_playwright
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number, write_text
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
-from cagefield.formats.splats.splat_files import READABLE, ending_of, read_splats, write_splats
+from cagefield.formats.splats.open_splats import READABLE, ending_of
+from cagefield.formats.splats.splat_files import read_splats, write_splats
 from cagefield.images.image_files import write_png
 from cagefield.images.render_result import RenderResult
 from cagefield.rendering.splats import reference_rasterizer

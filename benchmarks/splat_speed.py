@@ -1,8 +1,8 @@
 """How long frames and training steps of splats take, and how that grows with splats and pixels.
 
-    python benchmarks/splat_speed.py [--ply FILE] [--out benchmarks/results/splat_speed.md]
-    python benchmarks/splat_speed.py --landscape 10000000 [--out benchmarks/results/splat_millions.md]
-    python benchmarks/splat_speed.py --edits 1000000 [--out benchmarks/results/splat_edits_speed.md]
+    python -m benchmarks.splat_speed [--ply FILE] [--out benchmarks/results/splat_speed.md]
+    python -m benchmarks.splat_speed --landscape 10000000 [--out benchmarks/results/splat_millions.md]
+    python -m benchmarks.splat_speed --edits 1000000 [--out benchmarks/results/splat_edits_speed.md]
 
 Frames are colour, opacity and depth of a PLY file's splats seen from its turntable, or, without one, of
 random
@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number, write_text
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number, write_text
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import Dataset, SparsePoints, View
 from cagefield.edits import Edit, EditStack

@@ -1,6 +1,6 @@
 """Draws edits that bend splats, whole and split, and says how far both are from what they should show.
 
-    python benchmarks/splat_splitting.py [-o docs/edits/splat_splitting.png]
+    python -m benchmarks.splat_splitting [-o docs/edits/splat_splitting.png]
 
 Rods of 9 long splats, a sheet of 40 wide ones, a ball of 90 flat ones. A row is: at rest, whole, split, and
 the truth: the splats as a volume that is bent point by point (`splat_volume`). Figures are PSNR, dB, to it.

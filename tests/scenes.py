@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from benchmarks.common.workbench import Settings
 
-from cagefield.benchmarking.workbench import Settings
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.scene.scene import Scene

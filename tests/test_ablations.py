@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.common.cases import chosen
+from benchmarks.common.image_strips import difference, strip
+from benchmarks.common.workbench import Settings, Workbench, beside
+from benchmarks.edits import ablations
+from benchmarks.edits.ablations import Subject, around
+from benchmarks.edits.compare_shells import continuous
+from benchmarks.edits.edit_quality import eye
+from benchmarks.edits.failure_modes import limits
 
-from cagefield.benchmarking import ablations
-from cagefield.benchmarking.ablations import Subject, around
-from cagefield.benchmarking.cases import chosen
-from cagefield.benchmarking.compare import continuous
-from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.limits import limits
-from cagefield.benchmarking.strips import difference, strip
-from cagefield.benchmarking.workbench import Settings, Workbench, beside
 from cagefield.cli import main
 from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image

@@ -12,23 +12,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.captures import frame_times, training_curves
+from benchmarks.commands.bench_edits import BenchEdits
+from benchmarks.commands.bench_training import BenchSpeed, BenchTraining
+from benchmarks.commands.command_lines import command_line
+from benchmarks.common.cases import CASES, Case, chosen
+from benchmarks.common.figures import Figures, changed_pixels, compare, mean_psnr, supersampled
+from benchmarks.common.machine import Machine, device_name
+from benchmarks.common.tables import Table, number
+from benchmarks.common.timing import interleaved
+from benchmarks.common.workbench import Workbench, digest
+from benchmarks.edits.compare_shells import seen
+from benchmarks.edits.edit_quality import measure, write_picture
+from benchmarks.edits.edits_table import Revealed, Score, table
+from benchmarks.edits.mapped_photographs import MappedScene
 
-from cagefield.benchmarking import speed, training
-from cagefield.benchmarking.cases import CASES, Case, chosen
-from cagefield.benchmarking.compare import seen
-from cagefield.benchmarking.edits import measure, write_picture
-from cagefield.benchmarking.edits_table import Revealed, Score, table
-from cagefield.benchmarking.figures import Figures, changed_pixels, compare, mean_psnr, supersampled
-from cagefield.benchmarking.machine import Machine, device_name
-from cagefield.benchmarking.mapped_photographs import MappedScene
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.timing import interleaved
-from cagefield.benchmarking.workbench import Workbench, digest
 from cagefield.cameras.camera import Camera
 from cagefield.cli import main, parse
-from cagefield.cli.bench_command import command_line
-from cagefield.cli.bench_edits import BenchEdits
-from cagefield.cli.bench_training import BenchSpeed, BenchTraining
 from cagefield.cli.options import TrainingOptions
 from cagefield.cli.photo_options import PhotoOptions
 from cagefield.edits import Edit, EditStack
@@ -266,7 +266,7 @@ def test_scores_table_and_second_run(bench: Workbench, monkeypatch: pytest.Monke
         raise AssertionError("made again")
 
     for name in ("train_voxel", "make_scene", "unseen_pixels", "uncovered_pixels"):
-        monkeypatch.setattr(f"cagefield.benchmarking.workbench.{name}", never)
+        monkeypatch.setattr(f"benchmarks.common.workbench.{name}", never)
     monkeypatch.setattr(ProceduralScene, "photograph", never)
     monkeypatch.setattr(MappedScene, "photograph", never)
     again = list(measure(cases, Workbench(TINY, bench.folder)))
@@ -437,17 +437,17 @@ def test_interleaved_takes_turns() -> None:
 def test_default_edit_covers_a_quarter_of_the_picture() -> None:
     scene = ball_scene()
     cameras = [camera.resized(128, 128) for camera in scene.cameras["test"]]
-    edit = speed.default_edit(scene, cameras)
+    edit = frame_times.default_edit(scene, cameras)
     edit.check()
     # coverage is counted on 32 x 32 rays; a box's outline moves by a row of them at a time
-    assert speed.covered(edit.boxes, cameras) == pytest.approx(speed.COVERED, abs=0.04)
-    assert speed.covered(np.array([[[-9.0] * 3, [9.0] * 3]]), cameras) == 1.0
-    assert speed.covered(np.array([[[50.0] * 3, [51.0] * 3]]), cameras) == 0.0
+    assert frame_times.covered(edit.boxes, cameras) == pytest.approx(frame_times.COVERED, abs=0.04)
+    assert frame_times.covered(np.array([[[-9.0] * 3, [9.0] * 3]]), cameras) == 1.0
+    assert frame_times.covered(np.array([[[50.0] * 3, [51.0] * 3]]), cameras) == 0.0
 
 
 def test_frame_times() -> None:
     scene = ball_scene()
-    report = speed.measure(scene, scene.cameras["test"], rounds=2, lattices=(None, 8))
+    report = frame_times.measure(scene, scene.cameras["test"], rounds=2, lattices=(None, 8))
     assert [row.variant for row in report.rows] == [
         "unedited", "continuous, exact", "continuous, lattice 8", "discrete",
     ]  # fmt: skip
@@ -459,13 +459,12 @@ def test_frame_times() -> None:
     assert json.loads(json.dumps(document))["machine"] == {"cpu": "c", "cores": 2, "device": "cpu"}
     assert "| unedited |" in report.table(Machine("c", 2, "cpu"), "x").markdown()
     gone = EditStack([Edit.delete(Cage.box((0, 0, 0), 0.5))])
-    assert [row.variant for row in speed.measure(scene, scene.cameras["test"], gone, rounds=1).rows] == [
-        "unedited", "discrete",
-    ]  # fmt: skip
+    rows = frame_times.measure(scene, scene.cameras["test"], gone, rounds=1).rows
+    assert [row.variant for row in rows] == ["unedited", "discrete"]
     with pytest.raises(CagefieldError, match="at least one camera"):
-        speed.measure(scene, [])
+        frame_times.measure(scene, [])
     with pytest.raises(CagefieldError, match="edits change nothing"):
-        speed.measure(scene, scene.cameras["test"], EditStack([]))
+        frame_times.measure(scene, scene.cameras["test"], EditStack([]))
 
 
 # -- training curves ---------------------------------------------------------------------------------------
@@ -473,7 +472,7 @@ def test_frame_times() -> None:
 
 def test_curve_is_taken_on_the_way_to_the_same_field(bench: Workbench) -> None:
     dataset = bench.photos("microphone")
-    curve = training.measure(dataset, TINY.config, views=2, shares=(0.2, 0.6))
+    curve = training_curves.measure(dataset, TINY.config, views=2, shares=(0.2, 0.6))
     assert [point.step for point in curve.points] == [12, 36, 60]
     assert [point.views for point in curve.points] == [2, 2, 3]
     assert np.all(np.diff([point.seconds for point in curve.points]) > 0)
@@ -490,11 +489,11 @@ def test_curve_is_taken_on_the_way_to_the_same_field(bench: Workbench) -> None:
 def test_curves_refuse_what_they_cannot_measure(bench: Workbench) -> None:
     dataset = bench.photos("microphone")
     with pytest.raises(CagefieldError, match="no test views; choose another --holdout"):
-        training.measure(replace(dataset, test=()), TINY.config)
+        training_curves.measure(replace(dataset, test=()), TINY.config)
     with pytest.raises(CagefieldError, match=r"shares must grow and lie between 0 and 1, got \[0.5, 0.2\]"):
-        training.measure(dataset, TINY.config, shares=(0.5, 0.2))
+        training_curves.measure(dataset, TINY.config, shares=(0.5, 0.2))
     with pytest.raises(CagefieldError, match="views is 0"):
-        training.measure(dataset, TINY.config, views=0)
+        training_curves.measure(dataset, TINY.config, views=0)
 
 
 # -- commands ----------------------------------------------------------------------------------------------
@@ -572,7 +571,7 @@ def test_bench_training_writes_curve_and_scene(
     argv += ["-o", str(tmp_path / "curve.csv"), "--scene-out", str(tmp_path / "scene")]
     assert main(argv) == 0
     assert "test PSNR" in capsys.readouterr().out
-    assert len((tmp_path / "curve.csv").read_text().splitlines()) == 2 + len(training.SHARES)
+    assert len((tmp_path / "curve.csv").read_text().splitlines()) == 2 + len(training_curves.SHARES)
     assert (tmp_path / "curve.md").read_text().startswith("# Test PSNR against training time: photos-")
     assert len(Scene.open(tmp_path / "scene").cameras["test"]) == 3
 

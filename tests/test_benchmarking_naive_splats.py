@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from benchmarks.common.cases import CASES
+from benchmarks.common.figures import Figures
+from benchmarks.common.workbench import Settings
+from benchmarks.edits.edits_table import Score, table
+from benchmarks.edits.naive_splats import NAIVE, naive_splats, seen_naively
 
-from cagefield.benchmarking.cases import CASES
-from cagefield.benchmarking.edits_table import Score, table
-from cagefield.benchmarking.figures import Figures
-from cagefield.benchmarking.naive_splats import NAIVE, naive_splats, seen_naively
-from cagefield.benchmarking.workbench import Settings
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.common import workbench
+from benchmarks.common.cases import chosen
+from benchmarks.common.workbench import Settings, Workbench
+from benchmarks.edits.compare_shells import seen
+from benchmarks.edits.edit_quality import measure
+from benchmarks.edits.edits_table import table
 
-from cagefield.benchmarking import workbench
-from cagefield.benchmarking.cases import chosen
-from cagefield.benchmarking.compare import seen
-from cagefield.benchmarking.edits import measure
-from cagefield.benchmarking.edits_table import table
-from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cli import main
 from cagefield.images.metrics import psnr
 from commands import refused

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cagefield.benchmarking.edits_table import table
-from cagefield.benchmarking.learning import Budget, splat_config
-from cagefield.benchmarking.workbench import Settings
-from cagefield.cli.bench_edits import BenchEdits
+from benchmarks.captures.train_captures import Budget, splat_config
+from benchmarks.commands.bench_edits import BenchEdits
+from benchmarks.common.workbench import Settings
+from benchmarks.edits.edits_table import table
+
 from cagefield.cli.options import TrainingOptions
 from cagefield.training.splats.splat_config import SplatConfig
 from commands import refused

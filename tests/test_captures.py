@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.captures import captures
+from benchmarks.captures.captures import CaptureScore, DepthFigures, for_training, sighted_points, table
+from benchmarks.captures.train_captures import Budget, Learnt, Show, learn, sampled_opacity
+from benchmarks.common.cases import ROOM_CASES, Case
+from benchmarks.edits import room_edits
 from PIL import Image
 
-from cagefield.benchmarking import captures, room_edits
-from cagefield.benchmarking.captures import CaptureScore, DepthFigures, for_training, sighted_points, table
-from cagefield.benchmarking.cases import ROOM_CASES, Case
-from cagefield.benchmarking.learning import Budget, Learnt, Show, learn, sampled_opacity
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.views import PhotoMask, SparsePoints

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.common.tables import write_texts
 
 from cagefield import Scene, datasets
-from cagefield.benchmarking.tables import write_texts
 from cagefield.files.atomic import check_writable, replaced_file
 from cagefield.formats.splats.splat_files import write_splats
 from cagefield.images.image_files import video_writer

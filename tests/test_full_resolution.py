@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.captures.full_resolution import full_camera, measure, table
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from cagefield.benchmarking.full_resolution import full_camera, measure, table
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
 from cagefield.errors import CagefieldError

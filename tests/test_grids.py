@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.edits.distortion import Distortion
+from benchmarks.edits.methods import exact_map
+from benchmarks.edits.warp_grids import _RED, VIEW, Style, caption, grids, lattice_picture, turned
 
-from cagefield.benchmarking.distortion import Distortion
-from cagefield.benchmarking.grids import _RED, VIEW, Style, caption, grids, lattice_picture, turned
-from cagefield.benchmarking.methods import exact_map
 from cagefield.cli import main
 from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image

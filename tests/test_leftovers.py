@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.common.workbench import Settings, Workbench
 
-from cagefield.benchmarking.workbench import Settings, Workbench
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.sfm import sparse_points
 from cagefield.datasets.views import SparsePoints

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.common.cases import chosen
+from benchmarks.edits.edit_quality import eye
+from benchmarks.edits.exact_maps import KernelSamples, exact
+from benchmarks.edits.mapped_photographs import MappedScene
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.cases import chosen
-from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.exact import KernelSamples, exact
-from cagefield.benchmarking.mapped_photographs import MappedScene
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import SceneError

@@ -9,10 +9,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-
-from cagefield.benchmarking import perceptual
-from cagefield.benchmarking.cases import CASES, Case, chosen
-from cagefield.benchmarking.compare import (
+from benchmarks.common import perceptual
+from benchmarks.common.cases import CASES, Case, chosen
+from benchmarks.common.figures import compare
+from benchmarks.common.workbench import Workbench
+from benchmarks.edits.compare_shells import (
     Comparison,
     MapTime,
     continuous,
@@ -21,11 +22,10 @@ from cagefield.benchmarking.compare import (
     summaries,
     table,
 )
-from cagefield.benchmarking.distortion import Distortion
-from cagefield.benchmarking.exact import KernelMap, exact
-from cagefield.benchmarking.figures import compare
-from cagefield.benchmarking.methods import METHODS, peers
-from cagefield.benchmarking.workbench import Workbench
+from benchmarks.edits.distortion import Distortion
+from benchmarks.edits.exact_maps import KernelMap, exact
+from benchmarks.edits.methods import METHODS, peers
+
 from cagefield.cli import main
 from cagefield.edits import EditStack
 from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Rotate, Scale, Shear, Translate

@@ -8,13 +8,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from benchmarks.edits.baselines import PEERS, HarmonicShell
+from benchmarks.edits.baselines.harmonic import RESOLUTION, conjugate_gradients
+from benchmarks.edits.baselines.mean_value import ClosedMesh, cube_surface
+from benchmarks.edits.distortion import distortion, shell_points
+from benchmarks.edits.methods import MAPS, METHODS, check_known, exact_map, peers
 from scipy import sparse
 
-from cagefield.benchmarking.distortion import distortion, shell_points
-from cagefield.benchmarking.methods import MAPS, METHODS, check_known, exact_map, peers
-from cagefield.benchmarking.peers import PEERS, HarmonicShell
-from cagefield.benchmarking.peers.harmonic import RESOLUTION, conjugate_gradients
-from cagefield.benchmarking.peers.mean_value import ClosedMesh, cube_surface
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.errors import CagefieldError, EditError

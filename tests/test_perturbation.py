@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.captures.perturbation import perturbed
+from benchmarks.commands.bench_captures import BenchCaptures
 
-from cagefield.benchmarking.perturbation import perturbed
 from cagefield.cameras.camera import Camera
-from cagefield.cli.bench_captures import BenchCaptures
 from cagefield.datasets import Dataset, View, load_dataset
 from cagefield.procedural import make_capture
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.captures.perturbation import perturbed
 from scipy.spatial.transform import Rotation
 
-from cagefield.benchmarking.perturbation import perturbed
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import load_dataset
 from cagefield.datasets.natural_order import natural_key

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from benchmarks.captures.visibility import uncovered_pixels, unseen_pixels
 
-from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
 from cagefield.cameras.camera import Camera, turntable
 from cagefield.procedural.parts import Part, Primitive, place
 from cagefield.procedural.scene import ProceduralScene

@@ -1,6 +1,6 @@
 """Damages files of every format that is read, and pages' messages, and counts what came of them.
 
-python benchmarks/robustness/files.py [--inputs 10000] [--readers NAME ...] [--out FILE.md] [--large]
+python -m benchmarks.robustness.files [--inputs 10000] [--readers NAME ...] [--out FILE.md] [--large]
 
 Each reader has a process of its own that tells of every input (`tests/robustness`), so that an input that
 ends it, or that it never ends, is counted and the next one tried. Inputs with faults are kept in --kept.
@@ -15,7 +15,7 @@ import sys
 from dataclasses import fields
 from pathlib import Path
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -73,7 +73,7 @@ the inputs before.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
-    python benchmarks/robustness/files.py --inputs {inputs} --out benchmarks/results/robustness_files.md
+    python -m benchmarks.robustness.files --inputs {inputs} --out benchmarks/results/robustness_files.md
 
 | reader | {" | ".join(head)} |
 | --- |{" ---: |" * len(head)}
@@ -95,7 +95,7 @@ honest file takes{f" and {LARGE_SLACK >> 20} MiB" if LARGE_SLACK else ""}.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
-    python benchmarks/robustness/files.py --large --inputs {inputs} --out FILE.md
+    python -m benchmarks.robustness.files --large --inputs {inputs} --out FILE.md
 
 | reader | {" | ".join(head)} |
 | --- |{" ---: |" * len(head)}

@@ -1,6 +1,6 @@
 """Floods an editor in every way, and measures how long another page waits for its answers meanwhile.
 
-python benchmarks/robustness/floods.py [--seconds 20] [--floods 4] [--out FILE.md]
+python -m benchmarks.robustness.floods [--seconds 20] [--floods 4] [--out FILE.md]
 
 Four pages or programs flood at a time (`tests/robustness/flood_kinds.py`), in a process of their own. The
 floods and the editor share this machine's processors, so the first row, of an editor that nobody floods, is
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -76,7 +76,7 @@ from its question to the answer, how many took more than a second, and by how mu
 
 {cpu_model()}, {devices.threads()} cores, on which the floods and other work ran too.
 
-    python benchmarks/robustness/floods.py --seconds {options.seconds:g} --floods {options.floods}{secure}
+    python -m benchmarks.robustness.floods --seconds {options.seconds:g} --floods {options.floods}{secure}
 
 | flood | questions | median, s | 95 %, s | longest, s | above 1 s | memory, MiB |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |

@@ -1,6 +1,6 @@
 """Runs every command that writes on disks that are too small for what it writes; as root, on Linux.
 
-python benchmarks/robustness/full_disks.py [--short KIND] [--levels 6] [--only NAME ...] [--out FILE.md]
+python -m benchmarks.robustness.full_disks [--short KIND] [--levels 6] [--only NAME ...] [--out FILE.md]
 
 Each command (`tests/robustness/disk_commands.py`) is run with no room at all, with a page of 4 kB, and with
 shares of the room that its result takes, so that it fails early and late: with nothing at its place, and
@@ -21,7 +21,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -99,7 +99,7 @@ of their own of which they did not tell.
 
 {cpu_model()}, {devices.threads()} cores.
 
-    python benchmarks/robustness/full_disks.py{short} --levels {options.levels}
+    python -m benchmarks.robustness.full_disks{short} --levels {options.levels}
 
 | command | result, {unit} | runs | fitted | code | line | changed | left |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |

@@ -1,6 +1,6 @@
 """Kills commands where they write, and editors while pages edit and save, and counts what is lost.
 
-python benchmarks/robustness/kills.py [--rounds 1] [--random 40] [--slow 10] [--servers 10]
+python -m benchmarks.robustness.kills [--rounds 1] [--random 40] [--slow 10] [--servers 10]
     [--step 1] [--but N] [--minutes M] [--tried N] [--forked] [--writes] [--only NAME ...] [--out FILE.md]
 
 Each command is killed at every call that changes something (`tests/robustness/kills.py`), as many rounds as
@@ -28,7 +28,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -235,7 +235,7 @@ stayed: seconds that the last of them was there at most.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
-    python benchmarks/robustness/kills.py {command} --out benchmarks/results/robustness_kills.md
+    python -m benchmarks.robustness.kills {command} --out benchmarks/results/robustness_kills.md
 
 | command | calls | kills | lost | unreadable | left | outlived | stayed, s |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |

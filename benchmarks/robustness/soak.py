@@ -1,6 +1,6 @@
 """Eight pages edit, play, have jobs rendered and reconnect for two hours; what that takes up.
 
-python benchmarks/robustness/soak.py [--hours 2] [--warm 15] [--pages 8] [--out FILE.md]
+python -m benchmarks.robustness.soak [--hours 2] [--warm 15] [--pages 8] [--out FILE.md]
 
 A real editor (`cagefield view`) of a small scene; the pages are programs that talk to it as a browser's do
 (`tests/robustness/soak.py`). All of them are there for `--warm` minutes first, until the history has as many
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cagefield.benchmarking.machine import cpu_model
+from benchmarks.common.machine import cpu_model
 from cagefield.compute import devices
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -123,7 +123,7 @@ the slope is in MiB an hour.
 
 {cpu_model()}, {devices.threads()} cores, other work beside.
 
-    python benchmarks/robustness/soak.py {command}
+    python -m benchmarks.robustness.soak {command}
 
 | process | before | 1 | 2 | 3 | 4 | after | slope |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |

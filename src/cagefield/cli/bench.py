@@ -1,33 +1,37 @@
-"""`cagefield bench`: what is measured, one command each."""
+"""`cagefield bench`: the benchmarks of a source checkout; the installed package holds none."""
 
 from __future__ import annotations
 
+import importlib
+import sys
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Any
 
-import tyro
-
-from cagefield.cli.bench_captures import BenchCaptures
-from cagefield.cli.bench_edits import BenchEdits
-from cagefield.cli.bench_maps import BenchAblation, BenchGrids
-from cagefield.cli.bench_training import BenchSpeed, BenchTraining
+import cagefield
+from cagefield.errors import CagefieldError
 
 
 @dataclass(frozen=True)
 class Bench:
-    """Measurements: edits against ground truth, frame times, training curves, captures of real places."""
+    """Measurements: edits against ground truth, frame times, training curves, captures of real places.
 
-    what: tyro.conf.OmitSubcommandPrefixes[
-        tyro.conf.OmitArgPrefixes[
-            Annotated[BenchEdits, tyro.conf.subcommand("edits")]
-            | Annotated[BenchGrids, tyro.conf.subcommand("grids")]
-            | Annotated[BenchAblation, tyro.conf.subcommand("ablation")]
-            | Annotated[BenchSpeed, tyro.conf.subcommand("speed")]
-            | Annotated[BenchTraining, tyro.conf.subcommand("training")]
-            | Annotated[BenchCaptures, tyro.conf.subcommand("captures")]
-        ]
-    ]
+    Part of the source checkout.
+    """
 
     def run(self) -> None:
-        """Runs the chosen benchmark."""
-        self.what.run()
+        """Raises CagefieldError: benchmarks are not installed."""
+        raise CagefieldError(
+            "the benchmarks are part of the source checkout, not of the installed package; in the checkout "
+            "run `pip install -e '.[dev]'`, then this command, or `python -m benchmarks`"
+        )
+
+
+def bench_command() -> Any:
+    """The class of the `bench` command: the checkout's, or `Bench` where there is none."""
+    checkout = Path(cagefield.__file__).resolve().parents[2]
+    if "benchmarks" not in sys.modules:
+        if not (checkout / "benchmarks" / "commands" / "bench.py").is_file():
+            return Bench
+        sys.path.append(str(checkout))
+    return importlib.import_module("benchmarks.commands.bench").Bench

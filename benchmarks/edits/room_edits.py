@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.cases import ROOM_CASES, Case
-from cagefield.benchmarking.figures import Figures, compare
-from cagefield.benchmarking.learning import Learnt
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.timing import interleaved
+from benchmarks.captures.train_captures import Learnt
+from benchmarks.common.cases import ROOM_CASES, Case
+from benchmarks.common.figures import Figures, compare
+from benchmarks.common.tables import Table, number
+from benchmarks.common.timing import interleaved
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset
 from cagefield.errors import CagefieldError

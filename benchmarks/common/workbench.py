@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 import cagefield
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.exact import exact
-from cagefield.benchmarking.mapped_photographs import MappedScene
-from cagefield.benchmarking.visibility import uncovered_pixels, unseen_pixels
+from benchmarks.captures.visibility import uncovered_pixels, unseen_pixels
+from benchmarks.common.cases import Case
+from benchmarks.edits.exact_maps import exact
+from benchmarks.edits.mapped_photographs import MappedScene
 from cagefield.cameras.camera import Camera
 from cagefield.datasets import Dataset, load_dataset
 from cagefield.edits import EditStack
@@ -48,12 +48,12 @@ Bar = Callable[[str], AbstractContextManager[Move]]
 
 _MODELLED = ("procedural", "cameras")
 _MAPPED = (
-    "edits", "warps", "geometry", "benchmarking/mapped_photographs.py",
-    "benchmarking/exact.py", "benchmarking/peers", "benchmarking/methods.py",
+    "edits", "warps", "geometry", "benchmarks/edits/mapped_photographs.py",
+    "benchmarks/edits/exact_maps.py", "benchmarks/edits/baselines", "benchmarks/edits/methods.py",
 )  # fmt: skip
 
-_TRULY_MOVED = (*_MODELLED, "benchmarking/cases.py")
-_HIDDEN = (*_TRULY_MOVED, "benchmarking/visibility.py")
+_TRULY_MOVED = (*_MODELLED, "benchmarks/common/cases.py")
+_HIDDEN = (*_TRULY_MOVED, "benchmarks/captures/visibility.py")
 
 BAKED = 64
 """Voxels along the longest axis that are baked of a NeRF; its pictures are its own."""
@@ -288,10 +288,16 @@ def beside(camera: Camera, other: Camera, degrees: float) -> bool:
 
 
 def digest(content: object, sources: Sequence[str] = ()) -> str:
-    """Ten hexadecimal digits that change with the content (JSON) and with source files of the package."""
+    """Ten hexadecimal digits that change with the content (JSON) and with source files.
+
+    A source is relative to the package, or to the checkout where it begins with "benchmarks".
+    """
     total = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
     for name in sources:
-        entry = Path(cagefield.__file__).parent / name
+        root = (
+            Path(__file__).parents[2] if name.startswith("benchmarks/") else Path(cagefield.__file__).parent
+        )
+        entry = root / name
         for file in sorted(entry.rglob("*.py")) if entry.is_dir() else [entry]:
             total.update(file.read_bytes())
     return total.hexdigest()[:10]

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.distortion import Distortion, distortion, shell_points
-from cagefield.benchmarking.figures import Figures, compare, stacked, supersampled
-from cagefield.benchmarking.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.workbench import Workbench
+from benchmarks.common.cases import Case
+from benchmarks.common.figures import Figures, compare, stacked, supersampled
+from benchmarks.common.tables import Table, number
+from benchmarks.common.workbench import Workbench
+from benchmarks.edits.distortion import Distortion, distortion, shell_points
+from benchmarks.edits.methods import MAPS, METHODS, PEER_LATTICE, Method, check_known, peers
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.edits.device.device_stack import DeviceStack

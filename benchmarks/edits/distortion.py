@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.benchmarking.methods import BackwardMap
+from benchmarks.edits.methods import BackwardMap
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage

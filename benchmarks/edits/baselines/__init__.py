@@ -13,8 +13,8 @@ from typing import Protocol
 
 import numpy as np
 
-from cagefield.benchmarking.peers.harmonic import HarmonicShell
-from cagefield.benchmarking.peers.mean_value import MeanValueShell
+from benchmarks.edits.baselines.harmonic import HarmonicShell
+from benchmarks.edits.baselines.mean_value import MeanValueShell
 from cagefield.errors import EditError
 from cagefield.geometry.cage import Cage
 from cagefield.typing import Array

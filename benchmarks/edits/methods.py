@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
-from cagefield.benchmarking.peers import PEERS, PeerShell
+from benchmarks.edits.baselines import PEERS, PeerShell
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage

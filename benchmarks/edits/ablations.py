@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import FINER, compared_cameras, continuous, seen
-from cagefield.benchmarking.distortion import distortion
-from cagefield.benchmarking.edits import eye, frame_ratio
-from cagefield.benchmarking.figures import Figures, compare
-from cagefield.benchmarking.strips import Panel, difference, strip
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.workbench import Workbench
+from benchmarks.common.cases import Case
+from benchmarks.common.figures import Figures, compare
+from benchmarks.common.image_strips import Panel, difference, strip
+from benchmarks.common.tables import Table, number
+from benchmarks.common.workbench import Workbench
+from benchmarks.edits.compare_shells import FINER, compared_cameras, continuous, seen
+from benchmarks.edits.distortion import distortion
+from benchmarks.edits.edit_quality import eye, frame_ratio
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.geometry.cage import Cage

@@ -8,15 +8,15 @@ from typing import cast
 
 import numpy as np
 
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import FINER, continuous, map_time, seen, shown
-from cagefield.benchmarking.distortion import distortion
-from cagefield.benchmarking.edits_table import TIMED_EXACTLY, Revealed, Score
-from cagefield.benchmarking.figures import changed_pixels, compare, floats, mean_psnr, pooled_psnr
-from cagefield.benchmarking.naive_splats import seen_naively
-from cagefield.benchmarking.perceptual import lpips
-from cagefield.benchmarking.timing import interleaved
-from cagefield.benchmarking.workbench import Workbench
+from benchmarks.common.cases import Case
+from benchmarks.common.figures import changed_pixels, compare, floats, mean_psnr, pooled_psnr
+from benchmarks.common.perceptual import lpips
+from benchmarks.common.timing import interleaved
+from benchmarks.common.workbench import Workbench
+from benchmarks.edits.compare_shells import FINER, continuous, map_time, seen, shown
+from benchmarks.edits.distortion import distortion
+from benchmarks.edits.edits_table import TIMED_EXACTLY, Revealed, Score
+from benchmarks.edits.naive_splats import seen_naively
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
 from cagefield.images.image_files import side_by_side, write_png

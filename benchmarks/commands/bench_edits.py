@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from cagefield.cli.bench_command import command_line, work_folder
+from benchmarks.commands.command_lines import command_line, work_folder
 from cagefield.cli.options import (
     Device,
     Flag,
@@ -21,8 +21,8 @@ from cagefield.cli.train import Preset, nerf_config
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
-    from cagefield.benchmarking.cases import Case
-    from cagefield.benchmarking.workbench import Workbench
+    from benchmarks.common.cases import Case
+    from benchmarks.common.workbench import Workbench
     from cagefield.training.nerf.nerf_config import NerfConfig
     from cagefield.training.splats.splat_config import SplatConfig
     from cagefield.training.voxels.voxel_config import VoxelConfig
@@ -85,10 +85,10 @@ class BenchEdits:
 
     def run(self) -> None:
         """Trains what is missing, measures, shows the table, says where the files are."""
-        from cagefield.benchmarking.cases import chosen
-        from cagefield.benchmarking.edits import picture_path
-        from cagefield.benchmarking.methods import check_known
-        from cagefield.benchmarking.workbench import Settings, Workbench
+        from benchmarks.common.cases import chosen
+        from benchmarks.common.workbench import Settings, Workbench
+        from benchmarks.edits.edit_quality import picture_path
+        from benchmarks.edits.methods import check_known
         from cagefield.compute import devices
 
         cases = chosen(self.scenes, self.edits)
@@ -137,7 +137,7 @@ class BenchEdits:
             return nerf_config(self.training, self.preset)
         if self.field == "voxel":
             return self.training.config()
-        from cagefield.benchmarking.learning import Budget, splat_config
+        from benchmarks.captures.train_captures import Budget, splat_config
 
         chosen = self.training
         return splat_config(
@@ -145,10 +145,10 @@ class BenchEdits:
         )
 
     def _measure(self, cases: tuple[Case, ...], bench: Workbench) -> None:
-        from cagefield.benchmarking.edits import measure
-        from cagefield.benchmarking.edits_table import table
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_text
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import write_text
+        from benchmarks.edits.edit_quality import measure
+        from benchmarks.edits.edits_table import table
 
         scores = []
         for score in measure(cases, bench, taught=self.taught):
@@ -170,10 +170,10 @@ class BenchEdits:
         return self.out.with_name(f"{self.out.stem}_methods{self.out.suffix}")
 
     def _compare(self, cases: tuple[Case, ...], bench: Workbench) -> None:
-        from cagefield.benchmarking.compare import measure, table
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.methods import METHODS
-        from cagefield.benchmarking.tables import write_text
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import write_text
+        from benchmarks.edits.compare_shells import measure, table
+        from benchmarks.edits.methods import METHODS
 
         rows = []
         for row in measure(cases, self.methods or tuple(METHODS), bench):
@@ -192,7 +192,7 @@ class BenchEdits:
         print(f"table written to {self._beside()}")
 
     def _draw(self, cases: tuple[Case, ...], bench: Workbench, folder: Path) -> None:
-        from cagefield.benchmarking.edits import write_picture
+        from benchmarks.edits.edit_quality import write_picture
 
         for case in cases:
             path = write_picture(case, bench, folder, self.picture_size, error=self.error_panel)

@@ -14,9 +14,9 @@ from cagefield.cli.options import SEEDS, Device, Flag, Output, check_file, check
 from cagefield.errors import CagefieldError
 
 if TYPE_CHECKING:
-    from cagefield.benchmarking.captures import CaptureScore
-    from cagefield.benchmarking.learning import Budget, Learnt
-    from cagefield.benchmarking.room_edits import RoomScore
+    from benchmarks.captures.captures import CaptureScore
+    from benchmarks.captures.train_captures import Budget, Learnt
+    from benchmarks.edits.room_edits import RoomScore
     from cagefield.datasets import Dataset
 
 
@@ -78,12 +78,12 @@ class BenchCaptures:
 
     def run(self) -> None:
         """Makes the photos that are missing, trains, measures, shows the table, says where the files are."""
-        from cagefield.benchmarking import room_edits
-        from cagefield.benchmarking.captures import table
-        from cagefield.benchmarking.learning import Budget
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_texts
-        from cagefield.cli.bench_command import command_line, work_folder
+        from benchmarks.captures.captures import table
+        from benchmarks.captures.train_captures import Budget
+        from benchmarks.commands.command_lines import command_line, work_folder
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import write_texts
+        from benchmarks.edits import room_edits
         from cagefield.compute import devices
 
         if not self.data:
@@ -128,7 +128,7 @@ class BenchCaptures:
 
     def _edit(self, name: str, dataset: Dataset, learnt: Learnt) -> list[RoomScore]:
         """The scores of a room's edits, and their pictures, where they are asked for."""
-        from cagefield.benchmarking import room_edits
+        from benchmarks.edits import room_edits
 
         cases = room_edits.cases_of(name)
         if self.edit_pictures is not None:
@@ -141,8 +141,8 @@ class BenchCaptures:
 
         A built-in room is photographed where the work folder lacks it.
         """
-        from cagefield.benchmarking.perturbation import perturbed
-        from cagefield.benchmarking.workbench import digest
+        from benchmarks.captures.perturbation import perturbed
+        from benchmarks.common.workbench import digest
         from cagefield.cli.poses import verified
         from cagefield.datasets import load_dataset
         from cagefield.datasets.training_resolution import at_training_resolution
@@ -177,8 +177,8 @@ class BenchCaptures:
 
     def _measure(self, dataset: Dataset, field: str, budget: Budget) -> tuple[CaptureScore, Learnt]:
         """The score of a field trained on the data set, and the field; writes pictures if asked."""
-        from cagefield.benchmarking import captures
-        from cagefield.benchmarking.learning import learn
+        from benchmarks.captures import captures
+        from benchmarks.captures.train_captures import learn
 
         points = captures.sighted_points(dataset)
         captures.forget_memory()

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import FINER, MapTime
-from cagefield.benchmarking.distortion import Distortion
-from cagefield.benchmarking.figures import Figures
-from cagefield.benchmarking.naive_splats import NAIVE
-from cagefield.benchmarking.perceptual import lpips
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.workbench import Settings
+from benchmarks.common.cases import Case
+from benchmarks.common.figures import Figures
+from benchmarks.common.perceptual import lpips
+from benchmarks.common.tables import Table, number
+from benchmarks.common.workbench import Settings
+from benchmarks.edits.compare_shells import FINER, MapTime
+from benchmarks.edits.distortion import Distortion
+from benchmarks.edits.naive_splats import NAIVE
 from cagefield.training.nerf.nerf_config import NerfConfig
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.voxels.voxel_config import VoxelConfig

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cagefield.benchmarking.ablations import Ablation, title
-from cagefield.benchmarking.cases import Case
-from cagefield.benchmarking.compare import seen
-from cagefield.benchmarking.edits import eye
-from cagefield.benchmarking.figures import changed_pixels, mean_psnr, pooled_psnr, stacked
-from cagefield.benchmarking.strips import strip
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.workbench import Workbench, beside
+from benchmarks.common.cases import Case
+from benchmarks.common.figures import changed_pixels, mean_psnr, pooled_psnr, stacked
+from benchmarks.common.image_strips import strip
+from benchmarks.common.tables import Table, number
+from benchmarks.common.workbench import Workbench, beside
+from benchmarks.edits.ablations import Ablation, title
+from benchmarks.edits.compare_shells import seen
+from benchmarks.edits.edit_quality import eye
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.exact import BoxedMap
+from benchmarks.edits.exact_maps import BoxedMap
 from cagefield.cameras.camera import Camera
 from cagefield.errors import SceneError
 from cagefield.images.render_result import Background, RenderResult

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from cagefield.benchmarking.figures import floats
+from benchmarks.common.figures import floats
 from cagefield.errors import CagefieldError
 from cagefield.typing import UInt8
 

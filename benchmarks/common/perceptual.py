@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cagefield.benchmarking.figures import floats
+from benchmarks.common.figures import floats
 from cagefield.typing import AnyArray
 
 WEIGHTS = "alexnet-owt-7be5be79.pth"

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.machine import Machine
-from cagefield.benchmarking.tables import Table, number
-from cagefield.benchmarking.timing import interleaved
+from benchmarks.common.machine import Machine
+from benchmarks.common.tables import Table, number
+from benchmarks.common.timing import interleaved
 from cagefield.cameras.camera import Camera
 from cagefield.edits import Edit, EditStack
 from cagefield.errors import CagefieldError

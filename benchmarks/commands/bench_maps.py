@@ -13,9 +13,9 @@ from cagefield.errors import CagefieldError
 from cagefield.files.safe_open import real_path
 
 if TYPE_CHECKING:
-    from cagefield.benchmarking.ablations import Ablation
-    from cagefield.benchmarking.cases import Case
-    from cagefield.benchmarking.workbench import Workbench
+    from benchmarks.common.cases import Case
+    from benchmarks.common.workbench import Workbench
+    from benchmarks.edits.ablations import Ablation
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class BenchGrids:
 
     def run(self) -> None:
         """Draws, says what was measured, writes the file."""
-        from cagefield.benchmarking.grids import Style, grids
-        from cagefield.benchmarking.methods import MAPS, check_known
+        from benchmarks.edits.methods import MAPS, check_known
+        from benchmarks.edits.warp_grids import Style, grids
         from cagefield.images.image_files import write_png
 
         check_known(self.methods, MAPS)
@@ -82,12 +82,12 @@ class BenchAblation:
 
     def run(self) -> None:
         """Trains what is missing, measures, writes both files."""
-        from cagefield.benchmarking.ablations import with_notes
-        from cagefield.benchmarking.cases import chosen
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import write_text
-        from cagefield.benchmarking.workbench import Settings, Workbench
-        from cagefield.cli.bench_command import command_line
+        from benchmarks.commands.command_lines import command_line
+        from benchmarks.common.cases import chosen
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import write_text
+        from benchmarks.common.workbench import Settings, Workbench
+        from benchmarks.edits.ablations import with_notes
         from cagefield.compute import devices
         from cagefield.files.atomic import replaced_file
         from cagefield.images.image_files import write_png
@@ -124,8 +124,8 @@ class BenchAblation:
         print(f"written to {picture} and {text}")
 
     def _measure(self, case: Case, bench: Workbench) -> Ablation:
-        from cagefield.benchmarking import ablations
-        from cagefield.benchmarking.limits import limits
+        from benchmarks.edits import ablations
+        from benchmarks.edits.failure_modes import limits
 
         if self.what == "limits":
             return limits(case, bench, self.picture_size)

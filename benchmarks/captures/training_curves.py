@@ -8,7 +8,7 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from cagefield.benchmarking.tables import Table, number
+from benchmarks.common.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.errors import CagefieldError
 from cagefield.fields.voxel_field import VoxelField

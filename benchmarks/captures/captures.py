@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.benchmarking.learning import Learnt
-from cagefield.benchmarking.tables import Table, number
+from benchmarks.captures.train_captures import Learnt
+from benchmarks.common.tables import Table, number
 from cagefield.datasets import Dataset, View
 from cagefield.datasets.photos import EXTENSIONS
 from cagefield.datasets.views import SparsePoints

@@ -13,8 +13,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy import ndimage
 
-from cagefield.benchmarking.distortion import Distortion, distortion
-from cagefield.benchmarking.methods import BackwardMap, exact_map
+from benchmarks.edits.distortion import Distortion, distortion
+from benchmarks.edits.methods import BackwardMap, exact_map
 from cagefield.edits import Edit
 from cagefield.errors import CagefieldError
 from cagefield.geometry.cage import Cage

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from cagefield.cli.bench_command import command_line
+from benchmarks.commands.command_lines import command_line
 from cagefield.cli.options import (
     Device,
     Flag,
@@ -52,9 +52,9 @@ class BenchSpeed:
         """Measures, shows the table, writes the files."""
         import json
 
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.speed import measure
-        from cagefield.benchmarking.tables import write_texts
+        from benchmarks.captures.frame_times import measure
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import write_texts
         from cagefield.compute import devices
         from cagefield.edits.edit_files import load_edits
         from cagefield.scene.scene import Scene
@@ -100,9 +100,9 @@ class BenchTraining:
 
     def run(self) -> None:
         """Trains, evaluates on the way, shows the table, writes the files."""
-        from cagefield.benchmarking.machine import Machine
-        from cagefield.benchmarking.tables import drafted_texts
-        from cagefield.benchmarking.training import Point, measure
+        from benchmarks.captures.training_curves import Point, measure
+        from benchmarks.common.machine import Machine
+        from benchmarks.common.tables import drafted_texts
         from cagefield.compute import devices
         from cagefield.scene.scene import Scene
         from cagefield.scene.scene_files import check_destination

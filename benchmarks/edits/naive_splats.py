@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import cast
 
-from cagefield.benchmarking.figures import stacked, supersampled
+from benchmarks.common.figures import stacked, supersampled
 from cagefield.cameras.camera import Camera
 from cagefield.edits import EditStack
 from cagefield.errors import CagefieldError

@@ -1,0 +1,1 @@
+"""Benchmarks of cagefield: `python -m benchmarks`, or `cagefield bench` in a checkout."""

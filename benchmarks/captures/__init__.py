@@ -1,0 +1,1 @@
+"""Training of captures: curves, held-out views, frame times."""

@@ -1,0 +1,1 @@
+"""Machine, tables, figures and test cases that benchmarks share."""

@@ -1,0 +1,1 @@
+"""Quality of edits against ground truth, and of the maps behind them."""

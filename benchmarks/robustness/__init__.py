@@ -1,0 +1,1 @@
+"""Long runs that damage files, kill commands, fill disks and flood the editor."""

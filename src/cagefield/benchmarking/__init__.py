@@ -1,1 +1,0 @@
-"""Measurements: edits against ground truth, frame times, PSNR against training time."""
