@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.continuous_relighting import bent_voxels
 from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.continuous_relighting import bent_voxels
 from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import bent_splats
 from cagefield.completion.surfaces.grid_block import block_of

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.ambient_occlusion import Lighting
+from cagefield.completion.lighting.light_change import Lighting
 from cagefield.completion.surfaces.footprint import Footprint, footprint_of
 from cagefield.completion.surfaces.grid_block import Block, block_of
 from cagefield.completion.surfaces.support_plane import Support

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
+from cagefield.completion.continuous_relighting import bent_voxels
 from cagefield.completion.edit_context import Work
 from cagefield.completion.inpainting.support_inpainting import rebuilt
 from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.continuous_relighting import bent_voxels
 from cagefield.completion.lighting.shadow_strength import STRONG, WEAK, strength_of
 from cagefield.completion.surfaces.footprint import Footprint
 from cagefield.completion.surfaces.grid_block import block_of
@@ -64,7 +64,7 @@ def test_the_strength_of_a_shade_is_measured_around_it() -> None:
         work = Work.of(field, EditStack(), Edit.delete(cage()), weaker, False, True, None, seen)
         support = work.support()
         assert support is not None
-        return strength_of(work, weaker, support)
+        return strength_of(work.gone, work.others, work.before, work.edit.inner, work.sight, weaker, support)
 
     right = strength(1.0)
     assert WEAK < right < STRONG and strength(0.6) > right + 0.15

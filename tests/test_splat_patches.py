@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera, turntable
+from cagefield.completion.continuous_relighting import light_edit
 from cagefield.completion.lighting.ambient_occlusion import Ambience
-from cagefield.completion.lighting.continuous_relighting import light_edit
 from cagefield.completion.patcher import Patcher
 from cagefield.completion.splat_patch import splat_patch_of
 from cagefield.completion.surfaces.splat_voxelization import voxelised

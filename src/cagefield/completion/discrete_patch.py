@@ -7,16 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from cagefield.completion.edit_context import UNSURE, VIEWS, Work, lit_by
+from cagefield.completion.edit_context import Work
 from cagefield.completion.inpainting.cloning import cloned
 from cagefield.completion.inpainting.end_caps import capped
 from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.ambient_occlusion import Ambience, Lighting
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.light_change import UNSURE, Lighting, known_points, lit_by
 from cagefield.completion.lighting.shadow_strength import strength_of
 from cagefield.completion.surfaces.footprint import Footprint, footprint_of
 from cagefield.completion.surfaces.grid_block import Block
 from cagefield.completion.surfaces.support_plane import Support
-from cagefield.completion.surfaces.visibility import Sight
+from cagefield.completion.surfaces.visibility import VIEWS, Sight, views
 from cagefield.edits import Edit
 from cagefield.edits.options import Clone
 from cagefield.edits.patch import Patch
@@ -82,7 +83,7 @@ def made_of(
     found = work.support() if edit.source is None else None
     if lit is not None:
         if found is not None:
-            strength = strength_of(work, lit, found)
+            strength = strength_of(work.gone, work.others, work.before, edit.inner, work.sight, lit, found)
         logs = strength * work.without_part(lit)
         lighting = Lighting.of(under, work.lit, logs, work.apart)
         under = lit_by(under, lighting)
@@ -94,10 +95,10 @@ def made_of(
         footprint = footprint_of(support, work.part, work.close, unsure)
     if footprint is not None and sight is not None:
         footprint = footprint.without_air(
-            work.views(footprint.points(under), below, sight, -THROUGH) >= VIEWS
+            views(footprint.points(under), below, sight, -THROUGH * work.voxel) >= VIEWS
         )
         points = footprint.points(under)
-        known = work.known(points, below, sight, under, lighting) & ~edit.inner.contains(points)
+        known = known_points(points, below, sight, under, lighting) & ~edit.inner.contains(points)
         footprint = footprint.without(known, work.part)
     if footprint is None or not footprint.hole.any():
         support = footprint = None
@@ -140,6 +141,6 @@ def patch_of(
     region, under = made.under.around(changed, made.work.region)
     whole = lit_by(made.before, made.part_light)
     if settled and edit.source is None and edit.fill != "none" and not edit.deleted:
-        whole = capped(made.work, whole, made.part_light, below, sight)
+        whole = capped(whole, made.inside, made.work.gone, made.part_light, below, sight)
     part = made.work.shown_part(whole, made.under)
     return Patch(region, under.layer(), None if part is None else part.layer())

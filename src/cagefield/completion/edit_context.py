@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cagefield.completion.inpainting.feathering import feathered
-from cagefield.completion.lighting.ambient_occlusion import Ambience, Lighting
-from cagefield.completion.surfaces.footprint import Footprint
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.light_change import Lighting
+from cagefield.completion.surfaces.footprint import CLOSE, Footprint
 from cagefield.completion.surfaces.grid_block import Block, block_of
 from cagefield.completion.surfaces.patch_bounds import RIM, patch_box
 from cagefield.completion.surfaces.plane_snapping import flattened
 from cagefield.completion.surfaces.support_plane import Support, support_around
-from cagefield.completion.surfaces.surface_color import steadied
 from cagefield.completion.surfaces.surfels import Surfels, cut_through, joined, surfels_of, with_seen
 from cagefield.completion.surfaces.visibility import Sight
 from cagefield.edits import Edit
@@ -27,9 +27,6 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array, Mask
 from cagefield.warps.hexahedron_map import HexahedronMap
 
-CLOSE = 3.0
-"""Surfaces are hidden by what comes this near to them, voxels."""
-
 APART, FINE = 2.0, 1.0 / 16.0
 """Cells that light is worked out for, in voxels and as a share of how far it reaches, at most."""
 
@@ -38,21 +35,6 @@ WITHIN = 0.75
 
 UNSEEN = 0.01
 """The log of a change of light that is left out."""
-
-UNSURE = 0.6
-"""Where light is to grow by more than this (log), what was photographed there is noise: it is filled."""
-
-BEFORE = 0.7
-"""What is so little behind what a camera shows, in voxels, is seen."""
-
-VIEWS = 2
-"""Cameras that see a surface from which on it counts as known."""
-
-
-def lit_by(block: Block, light: Lighting | None) -> Block:
-    if light is None:
-        return block
-    return steadied(block, light.where, light.log_ratio).relit(light.where, np.exp(light.log_ratio))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,22 +116,6 @@ class Work:
     def close(self) -> Array:
         """Block coordinates [N,3] of surfaces that the part hides from close by."""
         return self.rest_at[self.rim & (self._away(self.part) < CLOSE)]
-
-    def views(self, points: Array, below: EditStack, sight: Sight, within: float) -> NDArray[np.int64]:
-        """How many cameras see points [N,3], of surfaces as the edits below make them; `within` in voxels.
-
-        What an edit below made up is as good as it gets.
-        """
-        mapped = below.to_canonical(points)
-        count = sight.views_of(mapped.points, within * self.voxel)
-        return np.where(mapped.layer != 0, VIEWS if within >= 0.0 else 0, count)
-
-    def known(
-        self, points: Array, below: EditStack, sight: Sight, block: Block, light: Lighting | None
-    ) -> NDArray[np.bool_]:
-        """Which surface points [N,3] cameras saw well enough for a block's new light."""
-        known = self.views(points, below, sight, BEFORE) >= VIEWS
-        return known if light is None else known & (light.at(block, points) < UNSURE)
 
     def support(self) -> Support | None:
         """What the part stood on."""

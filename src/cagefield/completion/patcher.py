@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import cast
 
 from cagefield.cameras.camera import Camera
+from cagefield.completion.continuous_relighting import bent_block, bent_voxels, light_edit
 from cagefield.completion.discrete_patch import patch_of
 from cagefield.completion.lighting.ambient_occlusion import Ambience, ambience_of, with_facing, with_sun
-from cagefield.completion.lighting.continuous_relighting import bent_block, bent_voxels, light_edit
 from cagefield.completion.pasting.paste_composite import joined
 from cagefield.completion.pasting.paste_loader import Pastes
 from cagefield.completion.patch_cache import DiskCache
@@ -65,7 +65,7 @@ class Patcher:
         """The stack of the edits, in order, with their patches.
 
         Before a continuous edit that takes light along comes one of its own for that
-        (`completion.lighting.continuous_relighting`),
+        (`completion.continuous_relighting`),
         unless it is `moving`; with `bending` False there is none, and the stack is as long as the edits.
 
         While an edit is `moving` its patch shows what it left, without the shadow of the part at its new

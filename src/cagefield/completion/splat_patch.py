@@ -2,7 +2,7 @@
 
 The splats around the edit are put on a voxel grid (`completion.surfaces.splat_voxelization`), where fill and
 light are worked out
-as for voxel fields (`completion.discrete_patch`, `completion.lighting.continuous_relighting`). What the
+as for voxel fields (`completion.discrete_patch`, `completion.continuous_relighting`). What the
 light is multiplied by is looked up at the
 splats' means. What was filled is laid out with new splats (`completion.inpainting.splat_inpainting`).
 """
@@ -12,16 +12,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.completion.discrete_patch import made_of
-from cagefield.completion.inpainting.splat_inpainting import NONE, KnownSplats
-from cagefield.completion.lighting.ambient_occlusion import Ambience, Lighting
-from cagefield.completion.lighting.continuous_relighting import (
+from cagefield.completion.continuous_relighting import (
     bending_light,
     filled,
     in_light_of,
     light_box,
     light_edit,
 )
+from cagefield.completion.discrete_patch import made_of
+from cagefield.completion.inpainting.splat_inpainting import NONE, KnownSplats
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.light_change import Lighting
 from cagefield.completion.surfaces.grid_block import Block, block_of
 from cagefield.completion.surfaces.patch_bounds import patch_box
 from cagefield.completion.surfaces.splat_voxelization import voxel_for, voxelised
@@ -75,7 +76,7 @@ def splat_patch_of(
     known, new = KnownSplats.of(field, splats, grid, moved), NONE
     fresh = made.under.differs(made.emptied, OTHER)
     if isinstance(edit.fill, Clone) and not edit.keep_source:
-        new = known.cloned(made, edit.inner, edit.fill.source)
+        new = known.cloned(made.under, edit.inner, edit.fill.source)
     elif made.support is not None:
         new = known.filled(made.under, fresh, made.work.region, edit.inner, made.support)
     part = None if made.part_light is None else _new_light(made.before, made.part_light)
@@ -87,7 +88,7 @@ def bent_splats(
     field: SplatField, below: EditStack, edit: Edit, ambience: Ambience, sight: Sight | None = None
 ) -> Edit:
     """The edit that changes the light of splats under a continuous edit
-    (`completion.lighting.continuous_relighting`)."""
+    (`completion.continuous_relighting`)."""
     field = with_pasted(field, below)
     box = light_box(edit, 0.0, ambience.reach, ambience.falls)
     moved = _around(field, moved_splats(field, below), box)

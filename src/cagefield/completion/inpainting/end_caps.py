@@ -9,36 +9,42 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from cagefield.completion.edit_context import CLOSE, UNSURE, Work
 from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.ambient_occlusion import Lighting
-from cagefield.completion.surfaces.footprint import footprint_of
+from cagefield.completion.lighting.light_change import UNSURE, Lighting, known_points
+from cagefield.completion.surfaces.footprint import CLOSE, footprint_of
 from cagefield.completion.surfaces.grid_block import Block
 from cagefield.completion.surfaces.patch_bounds import RIM
 from cagefield.completion.surfaces.support_plane import support_around
 from cagefield.completion.surfaces.surfels import Surfels
 from cagefield.completion.surfaces.visibility import Sight
 from cagefield.edits.stack import EditStack
+from cagefield.typing import Mask
 
 TOUCHES = 4
 """What comes this near to a part touches it; voxels."""
 
 
-def capped(work: Work, block: Block, light: Lighting | None, below: EditStack, sight: Sight | None) -> Block:
+def capped(
+    block: Block,
+    inside: Mask,
+    part: Surfels,
+    light: Lighting | None,
+    below: EditStack,
+    sight: Sight | None,
+) -> Block:
     """The part's block, which is in its new light, with its face going on where it was held.
 
     As it is, where the part has no face that something stood on.
     """
-    held = work.before.solid & ~work.inside
-    held &= ndimage.binary_dilation(work.part, iterations=TOUCHES)
-    part = work.gone
+    held = block.solid & ~inside
+    held &= ndimage.binary_dilation(block.solid & inside, iterations=TOUCHES)
     if not held.any() or not len(part.points):
         return block
-    at = work.before.coordinates(part.points)
+    at = block.coordinates(part.points)
     away = ndimage.distance_transform_edt(~held)
     away = np.asarray(ndimage.map_coordinates(away, at.T, order=1, mode="nearest"))
     near = away < max(RIM, 0.5 * float(np.median(np.ptp(at, axis=0))))
-    support = support_around(held, part, at, near, work.voxel)
+    support = support_around(held, part, at, near, max(block.spacing))
     if support is None:
         return block
     log = np.zeros(len(at)) if light is None else light.at(block, part.points)
@@ -48,5 +54,5 @@ def capped(work: Work, block: Block, light: Lighting | None, below: EditStack, s
         return block
     points = footprint.points(block)
     if sight is not None:
-        footprint = footprint.without(work.known(points, below, sight, block, light), held)
-    return rebuilt(block, footprint, ~work.inside) if footprint.hole.any() else block
+        footprint = footprint.without(known_points(points, below, sight, block, light), held)
+    return rebuilt(block, footprint, ~inside) if footprint.hole.any() else block

@@ -17,7 +17,6 @@ from scipy import ndimage
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from cagefield.completion.discrete_patch import Made
 from cagefield.completion.surfaces.footprint import KNOTS
 from cagefield.completion.surfaces.grid_block import Block, interpolated, world_of
 from cagefield.completion.surfaces.support_plane import Support
@@ -158,12 +157,12 @@ class KnownSplats:
         flat = np.abs(axes[np.arange(len(kept)), :, thin] @ normal) > FLAT
         return kept[flat] if flat.sum() >= ENOUGH else kept
 
-    def cloned(self, made: Made, inner: Cage, source: Cage) -> NewSplats:
+    def cloned(self, under: Block, inner: Cage, source: Cage) -> NewSplats:
         """Copies of the splats of the source cage, in colours that go with V^c's surroundings."""
         means = self.splats.means.astype(np.float64)
         rows = np.flatnonzero(source.contains(means))
         within, there, shapes = HexahedronMap(inner, source)(means[rows])
-        rows, under = rows[within], made.under
+        rows = rows[within]
         now = _colours(under, under.field.grid_coordinates(there) - under.low)
         before = 0.5 + C0 * interpolated(self.grid, means[rows])[1][:, 0].astype(np.float64)
         own = self.colours(rows)

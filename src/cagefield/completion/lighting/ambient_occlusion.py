@@ -25,12 +25,11 @@ from scipy import optimize
 from cagefield.completion.lighting.diffuse_irradiance import Facing, TurnedPairs, facing_of, turned_pairs
 from cagefield.completion.lighting.directional_light import Sun, sun_of
 from cagefield.completion.surfaces.charbonnier import noise_of, softened
-from cagefield.completion.surfaces.grid_block import SOLID, Block
+from cagefield.completion.surfaces.grid_block import SOLID
 from cagefield.completion.surfaces.surfels import Surfels, gridded
 from cagefield.completion.surfaces.visibility import SeenPairs, Sight
-from cagefield.edits.patch import NewLight
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.typing import Array, Mask
+from cagefield.typing import Array
 
 REACHES = (0.01, 0.02, 0.04, 0.08, 0.12)
 """The reaches r, shares of the diagonal of what the field holds."""
@@ -53,15 +52,6 @@ ENOUGH = 150
 
 FINE = 0.4
 """Cells of surfaces that light is found out about with, as a share of the smallest reach."""
-
-AMONG = 8
-"""Surface elements that the light on a vertex is the mean of."""
-
-FACING = 3.0
-"""How much more surface elements count for a vertex that face as it does: e^FACING across an edge."""
-
-DEEP = 10.0
-"""How far from a surface what shows is lit as it is; voxels."""
 
 
 @dataclass(frozen=True)
@@ -191,65 +181,3 @@ def with_sun(
     distance = gridded([sight.surface], reaches[0])
     sun = sun_of(distance, pairs.first, pairs.second, change, reaches, direction)
     return ambience if sun is None else replace(ambience, facing=None, sun=sun)
-
-
-@dataclass(frozen=True, eq=False)
-class Lighting:
-    """The light on some vertices (`where` [X,Y,Z]) of a block: the log of what it is multiplied by, [N]."""
-
-    where: Mask
-    log_ratio: Array
-
-    @classmethod
-    def of(cls, block: Block, surface: Surfels, logs: Array, apart: float) -> Lighting:
-        """The light on a block's coloured vertices, by the logs [N] of its surface, so far apart.
-
-        What lies within DEEP of a surface, mostly beneath it, shows through it, as fields are foggy there.
-        """
-        changed = np.flatnonzero(logs)
-        where, log = np.zeros(block.shape, bool), np.zeros(0)
-        if len(changed):
-            reach = DEEP * max(block.spacing)
-            g = block.coordinates(surface.points[changed])
-            low = np.maximum(np.floor(g.min(axis=0) - DEEP).astype(np.int64), 0)
-            high = np.ceil(g.max(axis=0) + DEEP).astype(np.int64) + 1
-            part = tuple(slice(a, max(a, b)) for a, b in zip(low, high, strict=True))
-            where[part] = block.slot[part] >= 0
-            found, rows = surface.nearest(block.positions(where), AMONG, reach)
-            near = np.isfinite(found[:, 0])
-            found, rows = found[near], rows[near]
-            where[where] = near
-            rows = np.where(np.isfinite(found), rows, rows[:, :1])
-            # Around an edge each side has a light of its own; what is thin shows the vertices of both sides.
-            facing = np.abs(np.einsum("nkc,nc->nk", surface.normals[rows], block.normals[where]))
-            weight = np.exp(-0.5 * (found**2 - found[:, :1] ** 2) / apart**2 + FACING * facing)
-            log = (weight * logs[rows]).sum(axis=1) / weight.sum(axis=1)
-        return cls(where, log)
-
-    def plus(self, other: Lighting) -> Lighting:
-        """Both lights, on vertices of the same block."""
-        where = self.where | other.where
-        dense = np.zeros(where.shape)
-        for each in (self, other):
-            dense[each.where] += each.log_ratio
-        return Lighting(where, dense[where])
-
-    def at(self, block: Block, points: Array) -> Array:
-        """The log of the ratio [N] at points [N,3]: that of the vertices around, 0 where there are none."""
-        total = block.lookup(self.where.astype(np.float32), points)
-        return np.asarray(block.lookup(self.dense(block), points) / np.maximum(total, 1e-3))
-
-    def on_grid(self, block: Block) -> NewLight:
-        """The same, for splats. Not of contracted fields."""
-        first = np.zeros(block.shape, bool)
-        first[0, 0, 0] = True
-        values = self.dense(block).astype(np.float32)
-        return NewLight(
-            block.positions(first)[0], np.array(block.spacing), values, self.where.astype(np.float32)
-        )
-
-    def dense(self, block: Block) -> Array:
-        """The log of the ratio [X,Y,Z], 0 elsewhere."""
-        out = np.zeros(block.shape)
-        out[self.where] = self.log_ratio
-        return out

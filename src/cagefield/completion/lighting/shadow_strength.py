@@ -15,10 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from cagefield.completion.edit_context import Work
 from cagefield.completion.lighting.ambient_occlusion import Ambience
 from cagefield.completion.surfaces.charbonnier import noise_of
+from cagefield.completion.surfaces.grid_block import Block
 from cagefield.completion.surfaces.support_plane import NEAR, Support
+from cagefield.completion.surfaces.surfels import Surfels
+from cagefield.completion.surfaces.visibility import Sight
+from cagefield.geometry.cage import Cage
 
 SPREAD = 0.3
 """Standard deviation of strengths, about 1."""
@@ -42,13 +45,23 @@ ROUNDS, HUBER = 6, 1.5
 """Rounds of the fit; standard deviations of what is left over from which on that counts by its size."""
 
 
-def strength_of(work: Work, ambience: Ambience, support: Support, *, seed: int = 0) -> float:
-    """The strength of the shade of the part of `work` on its support: 1 where photographs say nothing."""
-    if work.sight is None or not len(work.gone.points):
+def strength_of(
+    part: Surfels,
+    others: Surfels,
+    block: Block,
+    inner: Cage,
+    sight: Sight | None,
+    ambience: Ambience,
+    support: Support,
+    *,
+    seed: int = 0,
+) -> float:
+    """The strength of the shade of a part on its support: 1 where photographs say nothing."""
+    if sight is None or not len(part.points):
         return 1.0
-    near = np.flatnonzero(work.gone.distance(work.sight.surface.points, ambience.reach) < ambience.reach)
-    seen, bright = work.sight.surface.take(near), work.sight.bright[near]
-    at = work.before.coordinates(seen.points)
+    near = np.flatnonzero(part.distance(sight.surface.points, ambience.reach) < ambience.reach)
+    seen, bright = sight.surface.take(near), sight.bright[near]
+    at = block.coordinates(seen.points)
     along, height = support.local(at)
     on = np.flatnonzero((np.abs(height) < NEAR) & (seen.normals @ support.normal > ALONG))
     if len(on) > SOME:
@@ -56,9 +69,9 @@ def strength_of(work: Work, ambience: Ambience, support: Support, *, seed: int =
     seen, bright, along = seen.take(on), bright[on], along[on]
     # The support faces one way, whatever its rough normals say.
     ambience = replace(ambience, facing=None)
-    alone = ambience.log_light([work.others], seen)
-    shade = alone - ambience.log_light([work.others, work.gone], seen)
-    kept = (shade < DEEPEST) & ~work.edit.inner.contains(seen.points)
+    alone = ambience.log_light([others], seen)
+    shade = alone - ambience.log_light([others, part], seen)
+    kept = (shade < DEEPEST) & ~inner.contains(seen.points)
     if kept.sum() < 3:
         return 1.0
     shade, along, bright = shade[kept], along[kept], (bright - alone)[kept]

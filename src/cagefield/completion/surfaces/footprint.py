@@ -30,6 +30,9 @@ GAP = 3
 ALONG = 0.8
 """Least cosine between a support's normal and those of its surface in deep shade."""
 
+CLOSE = 3.0
+"""Surfaces are hidden by what comes this near to them, voxels."""
+
 KNOTS = 1500
 """Vertices through which the spline goes, at most."""
 

@@ -11,6 +11,7 @@ from scipy import ndimage
 
 from cagefield.cameras.camera import Camera
 from cagefield.completion.surfaces.surfels import Surfels, joined
+from cagefield.edits.stack import EditStack
 from cagefield.images.render_result import RenderResult
 from cagefield.typing import Array, Mask
 
@@ -28,6 +29,12 @@ WINDOW = 3
 
 ENDS = 0.5
 """Opacity from which on a pixel shows a surface."""
+
+BEFORE = 0.7
+"""What is so little behind what a camera shows, in voxels, is seen."""
+
+VIEWS = 2
+"""Cameras that see a surface from which on it counts as known."""
 
 EDGE = 0.03
 """A jump in depth between neighbouring pixels by this share of it is an edge."""
@@ -72,6 +79,16 @@ class Sight:
             away = np.linalg.norm(points[shown] - camera.origin, axis=1)
             count[shown] += depth[pixel[shown, 1], pixel[shown, 0]] > away - within
         return count
+
+
+def views(points: Array, below: EditStack, sight: Sight, within: float) -> NDArray[np.int64]:
+    """How many cameras see points [N,3], of surfaces as the edits below make them; `within` in world units.
+
+    What an edit below made up is as good as it gets.
+    """
+    mapped = below.to_canonical(points)
+    count = sight.views_of(mapped.points, within)
+    return np.where(mapped.layer != 0, VIEWS if within >= 0.0 else 0, count)
 
 
 def sight_of(

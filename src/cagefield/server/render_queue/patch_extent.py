@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
+from cagefield.completion.continuous_relighting import light_box
 from cagefield.completion.lighting.ambient_occlusion import REACHES, reaches_of
-from cagefield.completion.lighting.continuous_relighting import light_box
 from cagefield.completion.patcher import wants_light, wants_patch
 from cagefield.completion.surfaces.patch_bounds import EVERYWHERE, NOWHERE, patch_box
 from cagefield.completion.surfaces.splat_voxelization import coarsest_voxel

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.completion.edit_context import BEFORE, VIEWS
 from cagefield.completion.inpainting.support_inpainting import rebuilt
-from cagefield.completion.lighting.ambient_occlusion import Ambience, Lighting
+from cagefield.completion.lighting.ambient_occlusion import Ambience
+from cagefield.completion.lighting.light_change import Lighting
 from cagefield.completion.surfaces.footprint import footprint_of
 from cagefield.completion.surfaces.grid_block import Block, block_of
 from cagefield.completion.surfaces.patch_bounds import RIM, swept
@@ -33,7 +33,7 @@ from cagefield.completion.surfaces.plane_snapping import flattened
 from cagefield.completion.surfaces.support_plane import Support, support_around
 from cagefield.completion.surfaces.surface_color import steadied
 from cagefield.completion.surfaces.surfels import Surfels, surfels_of
-from cagefield.completion.surfaces.visibility import Sight
+from cagefield.completion.surfaces.visibility import BEFORE, VIEWS, Sight
 from cagefield.edits import Edit
 from cagefield.edits.patch import Patch, SplatPatch
 from cagefield.edits.stack import EditStack
