@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cagefield import Cage, Edit, EditStack, Scene, load_dataset
+from cagefield import Cage, Edit, EditStack, Renderer, Scene, SplatField, load_dataset, render_sampled
 from cagefield.cameras.camera import Camera
 from cagefield.errors import CagefieldError, CameraError, EditError, FieldError, SceneError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.procedural import make_scene
+from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.scene_files import check_destination
 from cagefield.training.evaluation import Evaluation
 from cagefield.training.voxels.train_voxels import TrainResult
@@ -261,6 +263,50 @@ def test_render_takes_the_scenes_own_background_unless_told() -> None:
     np.testing.assert_array_equal(scene.render(camera).rgb[0, 0], (0, 0, 1))
     np.testing.assert_array_equal(scene.render(camera, background="black").rgb[0, 0], (0, 0, 0))
     assert scene.render(camera, background="none").background is None
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_background_none_is_nothing_behind_the_field_whatever_the_scenes_own_is(exact: bool) -> None:
+    scene = Scene(ball_field(), background=(0.0, 0.0, 1.0))
+    camera = ball_scene().cameras["test"][0]
+    nothing = scene.render(camera, background=None, exact=exact)
+    assert nothing.background is None
+    # The corner shows no field: straight color 0, where the scene's own background is blue.
+    np.testing.assert_array_equal(nothing.rgb[0, 0], (0, 0, 0))
+    np.testing.assert_array_equal(nothing.rgb, scene.render(camera, background="none", exact=exact).rgb)
+    own = scene.render(camera, background="scene", exact=exact)
+    np.testing.assert_array_equal(own.rgb, scene.render(camera, exact=exact).rgb)
+    # Division by a small opacity magnifies the float32 rounding of the blue that is taken off again.
+    opaque = own.opacity > 0.1
+    np.testing.assert_allclose(own.over(None).rgb[opaque], nothing.rgb[opaque], atol=1e-5)
+
+
+def test_background_none_is_one_thing_for_all_renderers_and_results() -> None:
+    camera, voxels = ball_scene().cameras["test"][0], ball_field()
+    splats = SplatField(
+        means=np.zeros((1, 3), np.float32),
+        log_scales=np.full((1, 3), -2.5, np.float32),
+        quaternions=np.array([[1, 0, 0, 0]], np.float32),
+        opacities=np.array([0.9], np.float32),
+        sh=np.ones((1, 1, 3), np.float32),
+    )
+    renderings = [
+        partial(render_sampled, voxels, camera, samples=32),
+        partial(Renderer(voxels).render, camera),
+        partial(SplatRenderer(splats).render, camera),
+        lambda background: Scene(voxels, background="white").render(camera).over(background),
+        Scene(voxels, background=None).render(camera).over,
+    ]
+    for rendering in renderings:
+        result = rendering(background=None)
+        assert result is not None and result.background is None, rendering
+        assert 0.0 < result.opacity.max() and result.opacity[0, 0] == 0.0
+        np.testing.assert_array_equal(result.rgb[0, 0], (0, 0, 0))
+
+
+def test_scene_is_no_background_but_for_a_scene() -> None:
+    with pytest.raises(CagefieldError, match='background must be "white", "black", "none"'):
+        Scene(ball_field(), background="scene")  # type: ignore[arg-type]
 
 
 def test_with_edits_shares_the_field_and_moves_what_it_says() -> None:

@@ -110,7 +110,7 @@ def bake_scene(
     if seen:
         some = seen[:: max(1, len(seen) // options.compare)][: options.compare] if options.compare else ()
         if some:
-            found = agreement(original, voxels, some, background or (1.0, 1.0, 1.0))
+            found = agreement(original, voxels, some, background)
             against = "splats" if isinstance(original, SplatField) else "original"
             line += f"; PSNR of the voxels against the {against} {found:.2f} dB ({len(some)} views)"
     return scene, line

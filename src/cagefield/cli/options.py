@@ -132,13 +132,15 @@ def parse_size(text: str | None, width: int, height: int) -> tuple[int, int]:
     return sides[0], sides[1]
 
 
-def parse_background(text: str | None) -> str | tuple[float, float, float] | None:
-    """A name as it is, "r,g,b" (0 to 1) as numbers, None (the scene's own background) for None.
+def parse_background(text: str | None) -> str | tuple[float, float, float]:
+    """Background for `Scene.render`: a name, three numbers in [0,1] for "r,g,b", "scene" for None.
 
     Raises:
         CagefieldError: neither a name nor three numbers.
     """
-    if text is None or text in ("white", "black", "none"):
+    if text is None:
+        return "scene"
+    if text in ("white", "black", "none"):
         return text
     try:
         red, green, blue = (float(part) for part in text.split(","))

@@ -14,14 +14,17 @@ from cagefield.renamed_modules import old_names
 from cagefield.typing import Float32
 
 Background = str | Sequence[float] | NDArray[Any] | None
+"""Background of a rendered image: "white", "black", three numbers in [0,1], or None (also "none") for
+straight colour with opacity, nothing behind it. None has this meaning in every function and class."""
 
 _NAMED = {"white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0)}
 
 
 def background_rgb(background: Background) -> tuple[float, float, float] | None:
-    """The colour behind the scene as three floats in [0,1], or None for "none" (nothing behind it).
+    """Background as three floats in [0,1], or None for None and "none" (nothing behind the field).
 
-    Accepts "white", "black", "none" (or None) and three numbers in [0,1]. Raises CagefieldError otherwise.
+    Raises:
+        CagefieldError: other than "white", "black", "none", None or three numbers in [0,1].
     """
     if background is None or (isinstance(background, str) and background == "none"):
         return None
@@ -117,7 +120,7 @@ class RenderResult:
         return self.rgb - (1.0 - self.opacity)[..., None] * np.asarray(self.background, np.float32)
 
     def over(self, background: Background) -> RenderResult:
-        """This frame over another background (or over nothing, for "none")."""
+        """Image over another background; straight colour over nothing for None."""
         if background_rgb(background) == self.background:
             return self
         other = RenderResult.from_premultiplied(

@@ -24,10 +24,13 @@ PIXELS = 2500
 def agreement(
     original: NerfField | SplatField, voxels: VoxelField, cameras: Sequence[Camera], background: Background
 ) -> float:
-    """PSNR in dB of the voxels' pictures against the original's, unedited; the mean over the cameras."""
+    """Mean PSNR in dB over the cameras of the voxels' images against the original's, unedited.
+
+    Images without a background (None) are compared over white.
+    """
     from cagefield.rendering.voxels.voxel_renderer import Renderer
 
-    behind = background_rgb(background) or (0.0, 0.0, 0.0)
+    behind = background_rgb(background) or (1.0, 1.0, 1.0)
     renderer = Renderer(voxels)
     if isinstance(original, SplatField):
         scores = _against_splats(original, renderer, cameras, behind)

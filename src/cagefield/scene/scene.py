@@ -344,13 +344,14 @@ class Scene:
         self,
         camera: Camera,
         *,
-        background: Background = None,
+        background: Background = "scene",
         normals: bool = False,
         exact: bool = False,
     ) -> RenderResult:
-        """The edited scene seen by `camera`, over the scene's own background unless another is given.
+        """Image [H,W] of the edited scene, over the scene's own background unless another is given.
 
-        "none" puts nothing behind it. The renderer is kept between calls. `exact` evaluates every edit in
+        `background` is "scene", the scene's own, or any other `RenderResult` accepts: None and "none" put
+        nothing behind the field, whatever the scene's own is. The renderer is kept between calls. `exact` evaluates every edit in
         float64, without a lattice: of voxels at every sample of the plain sampled renderer, slow, and the
         reference; of splats at every splat; where the scene has an original field, of that one, by its own
         hierarchical sampling.
@@ -362,7 +363,8 @@ class Scene:
             raise SceneError(
                 f"camera must be a Camera, got {camera!r:.60}; give one such as scene.cameras['test'][0]"
             )
-        colour = self.background if background is None else background_rgb(background)
+        own = isinstance(background, str) and background == "scene"
+        colour = self.background if own else background_rgb(background)
         if not exact:
             return cast(RenderResult, self.renderer.render(camera, background=colour, normals=normals))
         return self._render_exact(camera, colour, normals)

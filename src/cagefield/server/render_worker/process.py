@@ -47,11 +47,10 @@ def serve(
     files: object = None,
     background: Colour = None,
 ) -> None:
-    """Does tasks until one is None or the pipe closes; what a task raises becomes `Failed`.
+    """Does tasks until one is None or the pipe closes; an error of a task becomes `Failed`.
 
     `files` are the states (`scene.scene_files.field_states`) of the scene that is edited, and `background`
-    its
-    colour; None for any scene, with its own.
+    its color or None for nothing behind the field. `files` None is any scene, with its own background.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
