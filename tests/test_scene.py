@@ -300,7 +300,7 @@ def test_background_none_is_one_thing_for_all_renderers_and_results() -> None:
     for rendering in renderings:
         result = rendering(background=None)
         assert result is not None and result.background is None, rendering
-        assert 0.0 < result.opacity.max() and result.opacity[0, 0] == 0.0
+        assert result.opacity.max() > 0.0 and result.opacity[0, 0] == 0.0
         np.testing.assert_array_equal(result.rgb[0, 0], (0, 0, 0))
 
 

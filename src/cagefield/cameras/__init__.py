@@ -1,5 +1,5 @@
 """Cameras: pinhole cameras, lenses, paths and keyframes."""
 
-from cagefield.cameras.camera import Camera, turntable
+import lazy_loader
 
-__all__ = ["Camera", "turntable"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,7 +1,5 @@
-"""Data sets: posed photos from transforms.json, LLFF and COLMAP."""
+"""Data sets: posed photos from transforms.json, LLFF and COLMAP; poses by structure from motion."""
 
-from __future__ import annotations
+import lazy_loader
 
-from cagefield.datasets.dataset_loader import Dataset, View, load_dataset
-
-__all__ = ["Dataset", "View", "load_dataset"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

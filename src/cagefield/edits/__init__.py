@@ -1,39 +1,5 @@
-"""Edits of a radiance field: what moves, how, and what becomes of the surroundings."""
+"""Edits of a radiance field: cages, operations, adjustment of the surroundings, stacks and files."""
 
-from __future__ import annotations
+import lazy_loader
 
-from cagefield.edits.edit import Edit
-from cagefield.edits.edit_files import dump_edits, load_edits, parse_edits, save_edits
-from cagefield.edits.operations import (
-    MoveCorner,
-    MoveCorners,
-    MoveEdge,
-    MoveFace,
-    Operation,
-    Rotate,
-    Scale,
-    Shear,
-    Translate,
-)
-from cagefield.edits.stack import CanonicalSamples, DeformedPoints, EditStack, LatticeError
-
-__all__ = [
-    "CanonicalSamples",
-    "DeformedPoints",
-    "Edit",
-    "EditStack",
-    "LatticeError",
-    "MoveCorner",
-    "MoveCorners",
-    "MoveEdge",
-    "MoveFace",
-    "Operation",
-    "Rotate",
-    "Scale",
-    "Shear",
-    "Translate",
-    "dump_edits",
-    "load_edits",
-    "parse_edits",
-    "save_edits",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,7 +1,5 @@
-"""Radiance fields: everything that maps (positions, viewdirs) to (sigma, rgb)."""
+"""Radiance fields: maps from positions and view directions to density and color."""
 
-from cagefield.fields.analytic import AnalyticField, GaussianBlob, UniformBox, UniformSphere
-from cagefield.fields.nerf_field import NerfField
-from cagefield.fields.protocol import Field
+import lazy_loader
 
-__all__ = ["AnalyticField", "Field", "GaussianBlob", "NerfField", "UniformBox", "UniformSphere"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

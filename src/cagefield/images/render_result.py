@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.errors import CagefieldError
-from cagefield.renamed_modules import old_names
 from cagefield.typing import Float32
 
 Background = str | Sequence[float] | NDArray[Any] | None
@@ -135,6 +134,3 @@ class RenderResult:
     def rgba8(self) -> NDArray[np.uint8]:
         """Straight colour and opacity [H,W,4] uint8."""
         return to_uint8(np.concatenate([self.over(None).rgb, self.opacity[..., None]], axis=-1))
-
-
-__getattr__ = old_names(__name__, {"Frame": RenderResult})

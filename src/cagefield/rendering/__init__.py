@@ -1,10 +1,5 @@
-"""Pictures of fields: renderers, frames, image files, image metrics."""
+"""Renderers of fields through edits: voxels, splats, NeRFs, and a reference renderer of any field."""
 
-from cagefield.images.metrics import psnr, ssim
-from cagefield.images.render_result import RenderResult
-from cagefield.renamed_modules import old_names
-from cagefield.rendering.reference_renderer import render_sampled
+import lazy_loader
 
-__all__ = ["RenderResult", "psnr", "render_sampled", "ssim"]
-
-__getattr__ = old_names(__name__, {"Frame": RenderResult})
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

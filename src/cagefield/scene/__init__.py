@@ -1,5 +1,5 @@
 """Scenes: a field with its edits, cameras and files."""
 
-from cagefield.scene.scene import Scene
+import lazy_loader
 
-__all__ = ["Scene"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -350,11 +350,11 @@ class Scene:
     ) -> RenderResult:
         """Image [H,W] of the edited scene, over the scene's own background unless another is given.
 
-        `background` is "scene", the scene's own, or any other `RenderResult` accepts: None and "none" put
-        nothing behind the field, whatever the scene's own is. The renderer is kept between calls. `exact` evaluates every edit in
-        float64, without a lattice: of voxels at every sample of the plain sampled renderer, slow, and the
-        reference; of splats at every splat; where the scene has an original field, of that one, by its own
-        hierarchical sampling.
+        `background` is "scene" or any other that `RenderResult` accepts; None and "none" put nothing behind
+        the field, whatever the scene's own is. The renderer is kept between calls. `exact` evaluates every
+        edit in float64, without a lattice: of voxels at every sample of the plain sampled renderer, slow, and
+        the reference; of splats at every splat; where the scene has an original field, of that one, by its
+        own hierarchical sampling.
 
         Raises:
             CagefieldError: no camera, or a background outside [0, 1].

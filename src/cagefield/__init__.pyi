@@ -1,0 +1,21 @@
+__version__: str
+
+from .cameras.camera import Camera as Camera
+from .cameras.camera import turntable as turntable
+from .datasets.dataset_loader import load_dataset as load_dataset
+from .datasets.views import Dataset as Dataset
+from .edits.edit import Edit as Edit
+from .edits.edit_files import load_edits as load_edits
+from .edits.edit_files import save_edits as save_edits
+from .edits.stack import EditStack as EditStack
+from .errors import CagefieldError as CagefieldError
+from .fields.baking import bake as bake
+from .fields.nerf_field import NerfField as NerfField
+from .fields.protocol import Field as Field
+from .fields.splat_field import SplatField as SplatField
+from .fields.voxel_field import VoxelField as VoxelField
+from .geometry.cage import Cage as Cage
+from .images.render_result import RenderResult as RenderResult
+from .rendering.reference_renderer import render_sampled as render_sampled
+from .rendering.voxels.voxel_renderer import Renderer as Renderer
+from .scene.scene import Scene as Scene

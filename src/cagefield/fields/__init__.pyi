@@ -1,0 +1,10 @@
+from .analytic import AnalyticField as AnalyticField
+from .analytic import GaussianBlob as GaussianBlob
+from .analytic import UniformBox as UniformBox
+from .analytic import UniformSphere as UniformSphere
+from .baking import bake as bake
+from .nerf_field import NerfField as NerfField
+from .protocol import Field as Field
+from .splat_field import SplatField as SplatField
+from .splat_mixture import SplatMixture as SplatMixture
+from .voxel_field import VoxelField as VoxelField

@@ -1,0 +1,1 @@
+from .cage import Cage as Cage
