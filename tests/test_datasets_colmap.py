@@ -17,9 +17,7 @@ from cagefield.datasets.nerf_normalization import in_unit_cube
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, project, ring, save, spot
 
-pycolmap = pytest.importorskip(
-    "pycolmap", reason="COLMAP models are read by pycolmap (extra cagefield[colmap])"
-)
+pycolmap = pytest.importorskip("pycolmap", reason="COLMAP models are read by pycolmap")
 
 TILT = Rotation.from_euler("XYZ", (0.7, -0.4, 1.1)).as_matrix()
 F, C = (90.0, 94.0), (46.0, 33.5)
@@ -268,5 +266,5 @@ def test_damaged_and_missing_parts(tmp_path):
 def test_without_pycolmap_the_cure_is_named(tmp_path, monkeypatch):
     _write(tmp_path, n=2)
     monkeypatch.setitem(sys.modules, "pycolmap", None)
-    with pytest.raises(DatasetError, match=r"needs pycolmap; pip install 'cagefield\[colmap\]'"):
+    with pytest.raises(DatasetError, match=r"needs pycolmap; pip install -U pycolmap"):
         load_dataset(tmp_path)

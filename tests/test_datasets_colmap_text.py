@@ -191,9 +191,7 @@ def test_damaged_rows_are_named(tmp_path, file, row, message):
 
 
 def test_binary_models_without_points_and_with_unused_cameras(tmp_path):
-    pycolmap = pytest.importorskip(
-        "pycolmap", reason="binary models are read by pycolmap (cagefield[colmap])"
-    )
+    pycolmap = pytest.importorskip("pycolmap", reason="binary models are read by pycolmap")
     unused = ("77 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 0 0 0",)
     _write(tmp_path, second="empty", points="empty", extra=unused)
     pycolmap.Reconstruction(tmp_path / "sparse/0").write_binary(tmp_path / "sparse/0")

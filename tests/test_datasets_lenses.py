@@ -14,7 +14,7 @@ from cagefield.datasets.views import PhotoMask, View
 from cagefield.errors import DatasetError
 from posed_photos import HEIGHT, POINT, WIDTH, assert_spot_is_where_the_camera_says, ring, save, spot
 
-pycolmap = pytest.importorskip("pycolmap", reason="lenses of COLMAP's are pycolmap's (cagefield[colmap])")
+pycolmap = pytest.importorskip("pycolmap", reason="lenses of COLMAP's are pycolmap's")
 
 F, C = (90.0, 94.0), (46.0, 33.5)
 PARAMS = {

@@ -232,7 +232,7 @@ def test_photos_without_texture_give_none_with_one_warning(tmp_path):
 
 def test_without_pycolmap_the_warning_names_the_cure(data, monkeypatch):
     monkeypatch.setitem(sys.modules, "pycolmap", None)
-    with pytest.warns(UserWarning, match=r"pip install 'cagefield\[colmap\]'") as caught:
+    with pytest.warns(UserWarning, match=r"pip install -U pycolmap") as caught:
         assert points_of(data) is None
     assert len(caught) == 1
 

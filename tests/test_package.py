@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import importlib.metadata
 import subprocess
 import sys
@@ -35,6 +37,74 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
     assert not heavy & set(modules.split())
     # 1 s is the promise; the lazy package itself takes a few milliseconds, so a busy machine stays below it.
     assert float(seconds) < 1.0
+
+
+RUNTIMES = {
+    "PIL", "imageio_ffmpeg", "llvmlite", "numba", "pi_heif", "pycolmap", "pydantic", "quadrants", "rich",
+    "starlette", "torch", "tyro", "uvicorn", "websockets", "zstandard",
+}  # fmt: skip
+"""Compute runtimes, servers, command lines and readers of images and poses."""
+
+NEEDS_IMAGES = {"Dataset", "load_dataset"}
+"""Exports that are about photos, and import Pillow."""
+
+
+def loaded_packages(code: str) -> set[str]:
+    """Top-level names in `sys.modules` after the code, in a process of its own."""
+    shown = "import sys; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    return set(in_new_process(f"{code}\n{shown}").stdout.split())
+
+
+def test_mathematics_imports_no_runtime() -> None:
+    names = sorted(set(dir(cagefield)) - NEEDS_IMAGES)
+    assert {"Cage", "Camera", "Edit", "EditStack", "Scene", "SplatField", "VoxelField"} <= set(names)
+    code = "\n".join(["import cagefield", *(f"cagefield.{name}" for name in names)])
+    modules = [
+        "cameras.camera_paths", "cameras.keyframes", "edits.edit_files", "fields.analytic",
+        "fields.splat_mixture", "geometry.cage", "images.metrics", "warps",
+    ]  # fmt: skip
+    loaded = loaded_packages("\n".join([code, *(f"import cagefield.{module}" for module in modules)]))
+    assert {"numpy", "cagefield"} <= loaded
+    assert sorted(loaded & RUNTIMES) == []
+
+
+def test_names_about_photos_import_pillow_alone() -> None:
+    code = "\n".join(["import cagefield", *(f"cagefield.{name}" for name in sorted(NEEDS_IMAGES))])
+    assert loaded_packages(code) & RUNTIMES == {"PIL"}
+
+
+def test_a_map_of_points_needs_no_runtime() -> None:
+    code = """
+import numpy as np
+from cagefield import Cage, Edit, EditStack
+cage = Cage.box((0, 0, 0), 1.0)
+edit = Edit(cage, cage.grown(0.5), lattice=None).translate((0.1, 0, 0))
+moved = EditStack([edit]).to_canonical(np.array([[0.1, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]))
+np.testing.assert_allclose(moved.points, [[0.0, 0.0, 0.0]], atol=1e-9)
+"""
+    assert loaded_packages(code) & RUNTIMES == set()
+
+
+def test_public_names_are_listed_once() -> None:
+    """The stub of a package is its only list: type checkers read it, and `lazy_loader` at run time."""
+    package = Path(cagefield.__file__).parent
+    stubs = sorted(package.rglob("*.pyi"))
+    assert package / "__init__.pyi" in stubs
+    for stub in stubs:
+        name = ".".join(["cagefield", *stub.relative_to(package).parent.parts])
+        module = importlib.import_module(name)
+        imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+        listed = {alias.name: f"{name}.{node.module}" for node in imports for alias in node.names}
+        assert sorted(listed) == dir(module) == sorted(module.__all__)
+        assert len(listed) == sum(len(node.names) for node in imports), f"{name} lists a name twice"
+        for public, home in listed.items():
+            assert getattr(module, public) is getattr(importlib.import_module(home), public)
+
+
+def test_wheel_includes_stubs_and_the_type_marker() -> None:
+    settings = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    section = settings.partition("[tool.setuptools.package-data]")[2].partition("\n[")[0]
+    assert '"py.typed"' in section and '"**/*.pyi"' in section
 
 
 def test_kernel_modules_print_nothing() -> None:

@@ -115,7 +115,7 @@ except DatasetError as error:
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A COLMAP model whose files are longer than what is mapped or read at a time."""
-    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed (extra colmap)")
+    pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed")
     options = pycolmap.SyntheticDatasetOptions()
     options.num_rigs, options.num_frames_per_rig, options.num_points3D = 1, 5, 200
     folder: Path = tmp_path_factory.mktemp("model")

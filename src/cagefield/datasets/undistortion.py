@@ -133,7 +133,7 @@ def colmap_camera(model: str, params: tuple[float, ...], width: int, height: int
         import pycolmap
     except ImportError:
         raise DatasetError(
-            f"photos of camera model {model} are undistorted by pycolmap; pip install 'cagefield[colmap]'"
+            f"photos of camera model {model} are undistorted by pycolmap; pip install -U pycolmap"
         ) from None
     try:
         return pycolmap.Camera(model=model, width=width, height=height, params=list(params))

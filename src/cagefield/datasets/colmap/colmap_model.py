@@ -203,7 +203,7 @@ def read_model(folder: Path) -> tuple[Any, list[Any]]:
         import pycolmap
     except ImportError:
         raise DatasetError(
-            f"{folder}: reading a COLMAP model needs pycolmap; pip install 'cagefield[colmap]'"
+            f"{folder}: reading a COLMAP model needs pycolmap; pip install -U pycolmap"
         ) from None
     try:
         with with_points_file(folder) as complete:

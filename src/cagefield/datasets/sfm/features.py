@@ -28,7 +28,8 @@ Pairs = Sequence[tuple[int, int]]
 OnProgress = Callable[[float, str], None]
 """Called with (share done from 0 to 1, a few words)."""
 
-INSTALL = "pip install 'cagefield[colmap]'"
+INSTALL = "pip install -U pycolmap"
+"""Cure of a missing or old pycolmap, at the end of an error message."""
 
 _FATAL = 3  # glog's level that only ends the process
 
@@ -56,7 +57,7 @@ def engine() -> Any:
     except ImportError:
         raise DatasetError(f"this needs pycolmap, which is not installed; {INSTALL}") from None
     if not hasattr(pycolmap, "CancellationToken"):
-        raise DatasetError(f"this needs pycolmap 4.2 or newer, not {pycolmap.__version__}; {INSTALL} -U")
+        raise DatasetError(f"this needs pycolmap 4.2 or newer, not {pycolmap.__version__}; {INSTALL}")
     return pycolmap
 
 
