@@ -3,7 +3,7 @@ from .sfm.epipolar_error import PoseError as PoseError
 from .sfm.pose_verification import Verification as Verification
 from .sfm.pose_verification import verify_poses as verify_poses
 from .sfm.structure_from_motion import make_poses as make_poses
-from .transforms.transforms_writer import write_transforms as write_transforms
+from .sfm.transforms_writer import write_transforms as write_transforms
 from .views import Dataset as Dataset
 from .views import SparsePoints as SparsePoints
 from .views import View as View
