@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
 import threading
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from cagefield.server.editor.edit_texts import read_edits
 from cagefield.server.editor.persistence import SceneStore
 from cagefield.server.editor.session import Session
 from cagefield.server.protocol.conversion import state_of
-from cagefield.server.web import patience, websocket
+from cagefield.server.web import websocket
 from cagefield.server.web.security import Allowance
 from cagefield.server.web.worker_threads import in_thread
 from scenes import ball_scene
@@ -109,28 +108,3 @@ def test_problems_of_many_edits_are_found_once(tmp_path: Path, monkeypatch: pyte
     store.autosave(edited)
     recovered = SceneStore(scene, tmp_path / "scene").recovered()
     assert recovered is not None and recovered.stack == edited.document.stack
-
-
-def test_a_connection_is_read_in_small_parts() -> None:
-    """What asyncio hands on at a time is what `read_little` says."""
-
-    class Parts(asyncio.Protocol):
-        def __init__(self) -> None:
-            self.sizes: list[int] = []
-
-        def connection_made(self, transport: asyncio.BaseTransport) -> None:
-            patience.read_little(transport)
-
-        def data_received(self, data: bytes) -> None:
-            self.sizes.append(len(data))
-
-    async def check() -> None:
-        here, there = socket.socketpair()
-        there.sendall(bytes(100_000))
-        _, parts = await asyncio.get_running_loop().connect_accepted_socket(Parts, here)
-        while sum(parts.sizes) < 100_000:
-            await asyncio.sleep(0.01)
-        there.close()
-        assert max(parts.sizes) == patience.AT_A_TIME
-
-    asyncio.run(check())

@@ -23,7 +23,7 @@ from cagefield.compute import devices
 TESTS = Path(__file__).resolve().parents[2] / "tests"
 sys.path[:0] = [str(TESTS / "robustness"), str(TESTS)]
 
-from flood_kinds import ENCRYPTED, FLOODS  # noqa: E402
+from flood_kinds import FLOODS  # noqa: E402
 from floods import during, memory  # noqa: E402
 
 from certificates import certificate_of_localhost  # noqa: E402
@@ -50,7 +50,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             ball_scene().save(Path(folder) / "scene")
             secure = []
-            if options.encrypted or name in ENCRYPTED:
+            if options.encrypted:
                 file, key = certificate_of_localhost(Path(folder))
                 secure = ["--certificate", str(file), "--certificate-key", str(key)]
             with editor_server(Path(folder) / "scene", *secure) as server:

@@ -102,10 +102,8 @@ def frame(kind: int, content: bytes) -> bytes:
     return bytes([kind, 0x80 | len(content), 0, 0, 0, 0]) + content
 
 
-def _never_reading(
-    content: bytes, pages: int = 20, at_once: int = 50, pause: float = 0.05, first: bytes = b""
-) -> Flood:
-    """Pages that send what has answers, and read none: their lines are small, and stay full."""
+def _never_reading(content: bytes, pages: int = 20) -> Flood:
+    """Pages that send messages with answers and read none: their receive buffers are small, and stay full."""
 
     def flood(server: EditorAt, over: threading.Event) -> None:
         lines: list[socket.socket | None] = [None] * pages
@@ -114,34 +112,19 @@ def _never_reading(
                 try:
                     if line is None:
                         line = page_line(server)
-                        line.sendall(first)
                         line.setblocking(False)
                         lines[number] = line
-                    line.send(content * at_once)
+                    line.send(content * 50)
                 except (BlockingIOError, ssl.SSLWantWriteError):  # full
                     pass
                 except OSError:  # closed: another page
                     lines[number] = None
-            time.sleep(pause)
+            time.sleep(0.05)
         for line in lines:
             if line is not None:
                 line.close()
 
     return flood
-
-
-def _pinging(server: EditorAt, over: threading.Event) -> None:
-    """Pings as fast as they are taken; the answers are read."""
-    frames = frame(0x89, bytes(125)) * 500
-    while not over.is_set():
-        with contextlib.suppress(OSError), page_line(server) as line:
-            line.setblocking(False)
-            while not over.is_set():
-                with contextlib.suppress(BlockingIOError, ssl.SSLWantWriteError, ssl.SSLWantReadError):
-                    line.send(frames)
-                with contextlib.suppress(BlockingIOError, ssl.SSLWantWriteError, ssl.SSLWantReadError):
-                    while line.recv(1 << 16):
-                        pass
 
 
 def _beginning(start: bytes) -> Flood:
@@ -199,17 +182,8 @@ FLOODS: dict[str, Flood] = {
         lambda number: json.dumps({"type": "scene_change", "preserve_opacity": bool(number % 2)})
     ),
     "pages that never read": _never_reading(frame(0x81, b'{"type": "nothing"}')),
-    "pings that nobody reads the answers of": _never_reading(frame(0x89, bytes(125)), 4, 500, 0.001),
-    "pings": _pinging,
-    "texts that are none": _never_reading(frame(0x81, b"\xff"), 4, 500, 0.001),
-    "empty parts of a message": _never_reading(frame(0x00, b"") * 2000, 4, 1, 0.001, frame(0x01, b"")),
     "requests half sent": _beginning(b"GET /edits.yaml HTTP/1.1\r\nHost: local"),
-    "handshakes half sent": _beginning(b"\x16\x03\x01"),
-    "connections that never shake hands": _beginning(b""),
     "screenshots": _screenshots,
     "wrong tokens": _wrong_tokens,
 }
 """The floods, by what they are of."""
-
-ENCRYPTED = ("handshakes half sent", "connections that never shake hands")
-"""Those of an editor with a certificate."""

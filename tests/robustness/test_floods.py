@@ -8,10 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from flood_kinds import ENCRYPTED
 from floods import during, memory
 
-from certificates import certificate_of_localhost
 from editor_server import EditorServer, editor_server
 from scenes import ball_scene
 
@@ -25,39 +23,17 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
         yield running
 
 
-@pytest.fixture(scope="module")
-def encrypted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:
-    """An editor with a certificate."""
-    folder = tmp_path_factory.mktemp("encrypted")
-    file, key = certificate_of_localhost(folder)
-    ball_scene().save(folder / "scene")
-    with editor_server(
-        folder / "scene", "--certificate", str(file), "--certificate-key", str(key)
-    ) as running:
-        yield running
-
-
 @pytest.mark.parametrize(
     "name",
     [
         "binary messages",
         "pages that never read",
-        "pings that nobody reads the answers of",
         "edit files of 300 edits",
         "requests half sent",
         "wrong tokens",
     ],
 )
 def test_another_page_has_its_answers(server: EditorServer, name: str) -> None:
-    _check(server, name)
-
-
-@pytest.mark.parametrize("name", (*ENCRYPTED, "pages that never read", "pings"))
-def test_another_encrypted_page_has_its_answers(encrypted: EditorServer, name: str) -> None:
-    _check(encrypted, name)
-
-
-def _check(server: EditorServer, name: str) -> None:
     before = memory(server.process.pid)
     found = during(server, name, questions=4, every=0.1)
     assert len(found.seconds) == 4

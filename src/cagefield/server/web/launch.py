@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import functools
 import hashlib
 import math
 import os
@@ -12,7 +10,6 @@ import socket
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import uvicorn
@@ -35,17 +32,17 @@ from cagefield.server.protocol import common, server_messages
 from cagefield.server.protocol.conversion import vec3
 from cagefield.server.render_queue.coordinator import Coordinator
 from cagefield.server.web.app import application
-from cagefield.server.web.patience import PatientHttp
-from cagefield.server.web.patient_socket import PatientSocket
 from cagefield.server.web.security import Guard
 from cagefield.server.web.splat_file_scene import LEFT_OUT, scene_of_file
-from cagefield.server.web.tls import TlsHttp
 
-WAITING = 128
-"""New connections that the system lets wait."""
+LISTEN_BACKLOG = 128
+"""Number of new connections that the system holds until the server accepts them."""
 
-AT_A_TIME = 8
-"""New connections that are taken before open ones have their turn."""
+MAX_CONNECTIONS = 512
+"""Number of open connections at which requests get status 503; 64 pages of six connections each are fewer."""
+
+MAX_REQUEST_HEAD_BYTES = 64 << 10
+"""Size of the line and the headers of a request."""
 
 
 def open_scene(
@@ -165,7 +162,7 @@ def bound_socket(host: str, port: int) -> socket.socket:
             if os.name == "posix":
                 listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind(address)
-            listening.listen(WAITING)
+            listening.listen(LISTEN_BACKLOG)
             return listening
         except OSError as error:
             listening.close()
@@ -186,19 +183,13 @@ class Certificate:
     key: Path | None = None
 
     def __post_init__(self) -> None:
-        self.context()
-
-    def context(self) -> ssl.SSLContext:
-        """What connections are encrypted with. Raises CagefieldError as the class says."""
-
         def no_password() -> str:
             raise CagefieldError(f"the key of {self.file} has a password; give one without")
 
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         try:
             for file in (self.file, self.key or self.file):
                 check_regular(file, MOST_TEXT)
-            context.load_cert_chain(self.file, self.key, no_password)
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.file, self.key, no_password)
         except ssl.SSLError as error:
             raise CagefieldError(
                 f"{self.file}: no certificate with its key ({error.reason or error}); give PEM files that "
@@ -207,7 +198,6 @@ class Certificate:
         except OSError as error:
             where = self.file if self.key is None else f"{self.file} and {self.key}"
             raise CagefieldError(f"{where}: cannot be read ({error.strerror})") from None
-        return context
 
 
 def serve(
@@ -227,31 +217,21 @@ def serve(
     config = uvicorn.Config(
         application(coordinator, hello, guard, reopen),
         log_level="warning",
-        http=PatientHttp if certificate is None else _encrypted(certificate),
-        ws=PatientSocket,
+        http="h11",
+        h11_max_incomplete_event_size=MAX_REQUEST_HEAD_BYTES,
+        limit_concurrency=MAX_CONNECTIONS,
+        ws="websockets-sansio",  # reads a page's next message once the last one was taken
         ws_max_size=common.MOST_BYTES,
         ws_per_message_deflate=False,
+        ssl_certfile=None if certificate is None else certificate.file,
+        ssl_keyfile=None if certificate is None else certificate.key,
         timeout_graceful_shutdown=2,
-        backlog=AT_A_TIME,
+        backlog=LISTEN_BACKLOG,
         server_header=False,
         proxy_headers=False,  # an address that a visitor writes himself would get round the limit of tokens
     )
     with contextlib.suppress(KeyboardInterrupt):
-        _Server(config).run(sockets=[listening])
-
-
-def _encrypted(certificate: Certificate) -> type[asyncio.Protocol]:
-    return cast(type[asyncio.Protocol], functools.partial(TlsHttp, certificate.context()))
-
-
-class _Server(uvicorn.Server):
-    """uvicorn's, whose loop takes a few new connections at a time while more of them wait in the system."""
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begins to listen; what asyncio takes at a time is the length of the line that it was told."""
-        await super().startup(sockets)
-        for listening in sockets or ():
-            listening.listen(WAITING)
+        uvicorn.Server(config).run(sockets=[listening])
 
 
 def _allow_many_connections() -> None:
