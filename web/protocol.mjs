@@ -1,10 +1,10 @@
-// Writes src/protocol.ts from the server's schema; with --check, says whether it is what the schema gives.
+// Writes src/net/protocol.ts from the server's schema; with --check, says whether it is what the schema gives.
 import { execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import { compile } from "json-schema-to-typescript";
 
-const target = fileURLToPath(new URL("src/protocol.ts", import.meta.url));
+const target = fileURLToPath(new URL("src/net/protocol.ts", import.meta.url));
 const python = process.env.PYTHON ?? "python3";
 const schema = JSON.parse(execFileSync(python, ["-m", "cagefield.server.protocol.schema"], { encoding: "utf8" }));
 const compiled = await compile(schema, "Protocol", {
@@ -23,6 +23,6 @@ const types = compiled
 if (!process.argv.includes("--check")) {
   writeFileSync(target, types);
 } else if (readFileSync(target, "utf8") !== types) {
-  console.error("web/src/protocol.ts is not what the server says: run `npm run protocol`");
+  console.error("web/src/net/protocol.ts is not what the server says: run `npm run protocol`");
   process.exit(1);
 }

@@ -1,6 +1,6 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { EDGES, FACES, FACE_NAMES, axesOf, cornersOf, extent, faceNormal, middle, orientation, same } from "../src/cage";
+import { EDGES, FACES, FACE_NAMES, axesOf, cornersOf, extent, faceNormal, middle, orientation, same } from "../src/editing/cage";
 import { box, expectClose } from "./cages";
 
 const turn = new Quaternion().setFromAxisAngle(new Vector3(1, 2, 3).normalize(), 0.7);

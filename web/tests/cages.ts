@@ -1,6 +1,6 @@
 import { expect } from "vitest";
 import { Quaternion, Vector3 } from "three";
-import type { Corners, Vec3 } from "../src/protocol";
+import type { Corners, Vec3 } from "../src/net/protocol";
 
 /** A box: centre, full edge lengths, turned by a quaternion. */
 export function box(centre: Vec3, size: Vec3, turn = new Quaternion()): Corners {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { Drag } from "../src/drag";
-import type { TranslateBy, Vec3 } from "../src/protocol";
+import { Drag } from "../src/editing/drag";
+import type { TranslateBy, Vec3 } from "../src/net/protocol";
 import { box, expectClose } from "./cages";
 import { FakeServer, edit } from "./fake_server";
 

@@ -1,4 +1,4 @@
-import type { Corners, Dragged, EditState, PageMessage, State } from "../src/protocol";
+import type { Corners, Dragged, EditState, PageMessage, State } from "../src/net/protocol";
 import { box } from "./cages";
 
 /** An edit with concentric boxes of half-size .3 in .8. */

@@ -3,17 +3,17 @@ import { bytesOf, Filler, layoutOf, TooLarge } from "../src/field/atlas";
 import { largest } from "../src/field/gl";
 import { joined, summed } from "../src/field/level";
 import type { Level, Vec3 } from "../src/field/level";
-import { Pacing } from "../src/field/pacing";
-import { Choice, memoryLimit } from "../src/field/choice";
+import { Pacing } from "../src/field/adaptive_resolution";
+import { Choice, memoryLimit } from "../src/field/render_location";
 import { patched } from "../src/field/page_edits";
 import { indexWith, ownBricks, readLayer } from "../src/field/page_layers";
 import type { Layer } from "../src/field/page_layers";
-import { Places } from "../src/field/places";
-import { Stored } from "../src/field/stored";
+import { Places } from "../src/field/layer_offsets";
+import { Stored } from "../src/field/quantized_vertices";
 import { ByteReader, PageFile } from "../src/field/page_file";
-import { SETTLES, Still } from "../src/field/still";
+import { SETTLES, Still } from "../src/field/progressive_still";
 import { Orbit } from "../src/viewer/orbit";
-import { viewAt } from "../src/viewer/path";
+import { viewAt } from "../src/viewer/camera_path";
 
 /** A field of 10 x 9 x 9 vertices, all stored, whose vertex (x, y, z) has the density 100 x + 10 y + z. */
 function level(): Level {

@@ -1,7 +1,7 @@
 import { Quaternion, Ray, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { cornersMove, onLine, onPlane, rotation, scaling, translation } from "../src/gestures";
-import { apply, quaternion } from "../src/operations";
+import { cornersMove, onLine, onPlane, rotation, scaling, translation } from "../src/editing/gestures";
+import { apply, quaternion } from "../src/editing/operations";
 import { box, expectClose } from "./cages";
 
 const frame = new Quaternion().setFromAxisAngle(new Vector3(1, 2, -1).normalize(), 0.8);

@@ -1,8 +1,8 @@
 import { afterEach, beforeEach, expect, it, vi } from "vitest";
-import { cagesOf } from "../src/drag";
-import { Grid } from "../src/grid";
-import { apply } from "../src/operations";
-import type { Answer, Vec3 } from "../src/protocol";
+import { cagesOf } from "../src/editing/drag";
+import { Grid } from "../src/editing/grid";
+import { apply } from "../src/editing/operations";
+import type { Answer, Vec3 } from "../src/net/protocol";
 import { edit } from "./fake_server";
 
 beforeEach(() => vi.useFakeTimers());

@@ -1,7 +1,7 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { containedPart, contains, expectedPart } from "../src/limits";
-import type { Corners } from "../src/protocol";
+import { containedPart, contains, expectedPart } from "../src/editing/limits";
+import type { Corners } from "../src/net/protocol";
 import { box } from "./cages";
 
 const turn = new Quaternion().setFromAxisAngle(new Vector3(1, -1, 2).normalize(), 0.9);

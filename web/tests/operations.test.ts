@@ -1,6 +1,6 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { amount, apply, degrees, described, lengthStep, part, quaternion, snapped, type Operation } from "../src/operations";
+import { amount, apply, degrees, described, lengthStep, part, quaternion, snapped, type Operation } from "../src/editing/operations";
 import { box, expectClose } from "./cages";
 
 const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), Math.PI / 6);

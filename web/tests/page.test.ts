@@ -1,13 +1,13 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { Connection, socketAddress, type Handlers, type Socket } from "../src/connection";
-import { HELD, bindings, named } from "../src/keys";
-import { Latency } from "../src/latency";
-import { cageOverlay } from "../src/cage_overlay";
-import { LOOKING, START, Store, awaited, fillable, maySay, obstacle, relightable, selected, target } from "../src/store";
-import { Actions } from "../src/actions";
-import type { App } from "../src/app";
-import type { Pointer } from "../src/pointer";
-import type { Hello, PageMessage, Preview } from "../src/protocol";
+import { Connection, socketAddress, type Handlers, type Socket } from "../src/net/connection";
+import { HELD, bindings, named } from "../src/editing/keys";
+import { Latency } from "../src/frames/latency";
+import { cageOverlay } from "../src/editing/cage_overlay";
+import { LOOKING, START, Store, awaited, fillable, maySay, obstacle, relightable, selected, target } from "../src/app/store";
+import { Actions } from "../src/editing/actions";
+import type { App } from "../src/app/app";
+import type { Pointer } from "../src/editing/pointer";
+import type { Hello, PageMessage, Preview } from "../src/net/protocol";
 import { edit, state } from "./fake_server";
 
 describe("the connection", () => {

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
-import { EDGES, FACE_NAMES } from "../src/cage";
-import { distanceToEdges, facesTowards, pick, pickCorner, type Project } from "../src/picking";
+import { EDGES, FACE_NAMES } from "../src/editing/cage";
+import { distanceToEdges, facesTowards, pick, pickCorner, type Project } from "../src/editing/picking";
 import { box } from "./cages";
 
 /** Looks along -z from z = 10 without perspective: 100 pixels a unit, the origin at (500, 500). */

@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { DepthImage } from "../src/depth_image";
-import type { PictureHeader } from "../src/protocol";
-import { headed, pack, unpack } from "../src/picture_message";
+import { DepthImage } from "../src/frames/depth_image";
+import type { PictureHeader } from "../src/net/protocol";
+import { headed, pack, unpack } from "../src/frames/picture_message";
 
 const HEADER: PictureHeader = {
   type: "picture", picture: 7, camera: 3, drag: 0, seq: 0, revision: 1, view: "colour", before: false, split: null,

@@ -1,9 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { Matrix4, Quaternion, Vector3 } from "three";
-import { duration, stillAt } from "../src/path";
-import { Player, type Playable } from "../src/player";
-import { Store } from "../src/store";
-import type { Answer, Hello, Key, PageMessage, Still } from "../src/protocol";
+import { duration, stillAt } from "../src/app/camera_path";
+import { Player, type Playable } from "../src/app/player";
+import { Store } from "../src/app/store";
+import type { Answer, Hello, Key, PageMessage, Still } from "../src/net/protocol";
 import { expectClose } from "./cages";
 import { state } from "./fake_server";
 

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { Throttle } from "../src/throttle";
+import { Throttle } from "../src/frames/throttle";
 
 describe("values that come often", () => {
   beforeEach(() => vi.useFakeTimers());

@@ -1,8 +1,8 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { Actions } from "../src/actions";
-import { Store } from "../src/store";
-import { isSplats, openAddress, send, type Request } from "../src/upload";
-import type { App } from "../src/app";
+import { Actions } from "../src/editing/actions";
+import { Store } from "../src/app/store";
+import { isSplats, openAddress, send, type Request } from "../src/net/upload";
+import type { App } from "../src/app/app";
 import { state } from "./fake_server";
 
 /** A request that a test answers. */

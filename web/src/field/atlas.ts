@@ -2,7 +2,7 @@
  * A level's bricks as they lie in 3D textures: (B + 1)^3 texels each, the last of an axis those of the brick behind it,
  * so that the GPU interpolates without looking elsewhere. Textures have z of the field along their x.
  */
-import { Stored } from "./stored";
+import { Stored } from "./quantized_vertices";
 import type { Level, Vec3 } from "./level";
 
 /** Where the bricks of a level lie in an atlas. */

@@ -3,7 +3,7 @@ import { bytesOf, Filler, layoutOf, TooLarge } from "./atlas";
 import type { Layout, Texels } from "./atlas";
 import { checkMemory, largest, plainUnpacking, texture3D } from "./gl";
 import type { Level, Occupancy, Vec3 } from "./level";
-import { Stored } from "./stored";
+import { Stored } from "./quantized_vertices";
 
 type GL = WebGL2RenderingContext;
 

@@ -6,8 +6,8 @@ import { checkMemory, plainUnpacking, texture3D } from "./gl";
 import type { Level } from "./level";
 import { indexWith, ownBricks } from "./page_layers";
 import type { Layer, PlacedLayer } from "./page_layers";
-import { Places } from "./places";
-import { Stored } from "./stored";
+import { Places } from "./layer_offsets";
+import { Stored } from "./quantized_vertices";
 
 type GL = WebGL2RenderingContext;
 

@@ -1,6 +1,6 @@
 /** Questions before something is written: where to, how large. */
-import type { App } from "../app";
-import type { ExportSplats } from "../protocol";
+import type { App } from "../app/app";
+import type { ExportSplats } from "../net/protocol";
 import { h } from "./dom";
 
 const FORMS: [ExportSplats["form"], string][] = [

@@ -1,9 +1,9 @@
 /** The list of edits: name, colour, shown or not, locked or not, order; and what can be done to the selected one. */
 import { ChevronDown, ChevronUp, ClipboardPaste, Copy, Eye, EyeOff, FlipHorizontal, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
-import type { Actions } from "../actions";
-import type { App } from "../app";
-import type { EditState } from "../protocol";
-import { looking, selected } from "../store";
+import type { Actions } from "../editing/actions";
+import type { App } from "../app/app";
+import type { EditState } from "../net/protocol";
+import { looking, selected } from "../app/store";
 import type { Dialogs } from "./dialogs";
 import { h, icon, iconButton, section } from "./dom";
 

@@ -1,6 +1,6 @@
 /** All keys. */
-import { HELD, type Binding } from "../keys";
-import type { App } from "../app";
+import { HELD, type Binding } from "../editing/keys";
+import type { App } from "../app/app";
 import { h } from "./dom";
 
 const GROUPS: Binding["group"][] = ["Tools", "Cages", "Edits", "View", "Scene"];

@@ -1,5 +1,5 @@
 /** What was done, to go back to. */
-import type { App } from "../app";
+import type { App } from "../app/app";
 import { h, section } from "./dom";
 
 export function historyList(app: App): HTMLElement {

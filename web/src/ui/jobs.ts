@@ -1,7 +1,7 @@
 /** Background jobs: how far they are, and a way to stop them. */
 import { X } from "lucide";
-import type { App } from "../app";
-import type { Job } from "../protocol";
+import type { App } from "../app/app";
+import type { Job } from "../net/protocol";
 import { h, iconButton } from "./dom";
 
 const WHAT: Record<Job["what"], string> = { test_views: "Test views", camera_path: "Video", splats: "Splats" };

@@ -1,12 +1,12 @@
 /** The selected edit's options and numbers. */
 import { Pane, type BladeApi } from "tweakpane";
-import type { Actions } from "../actions";
-import type { App } from "../app";
-import { extent } from "../cage";
-import { leading } from "../drag";
-import { tidy, type Operation } from "../operations";
-import type { Change, EditState, Vec3 } from "../protocol";
-import { fillable, relightable, selected, target } from "../store";
+import type { Actions } from "../editing/actions";
+import type { App } from "../app/app";
+import { extent } from "../editing/cage";
+import { leading } from "../editing/drag";
+import { tidy, type Operation } from "../editing/operations";
+import type { Change, EditState, Vec3 } from "../net/protocol";
+import { fillable, relightable, selected, target } from "../app/store";
 import { h, section } from "./dom";
 
 interface Point {

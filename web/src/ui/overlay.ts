@@ -1,9 +1,9 @@
 /** What lies over the picture: the split's slider, the drag's numbers, lines for the user, a lost server. */
-import type { App } from "../app";
-import { described } from "../operations";
-import type { Pointer } from "../pointer";
+import type { App } from "../app/app";
+import { described } from "../editing/operations";
+import type { Pointer } from "../editing/pointer";
 import { h } from "./dom";
-import { looking } from "../store";
+import { looking } from "../app/store";
 
 const TOAST_STAYS = 7000;
 

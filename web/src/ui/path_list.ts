@@ -1,9 +1,9 @@
 /** The camera path: keyframes, how far each edit has gone at them, playing, and rendering to a video. */
 import { Crosshair, Download, Play, Plus, RefreshCw, Repeat, Square, Trash2 } from "lucide";
-import type { Actions } from "../actions";
-import type { App } from "../app";
-import { duration } from "../path";
-import type { EditState, Key, Vec3 } from "../protocol";
+import type { Actions } from "../editing/actions";
+import type { App } from "../app/app";
+import { duration } from "../app/camera_path";
+import type { EditState, Key, Vec3 } from "../net/protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
 export function pathList(app: App, actions: Actions, dialogs: { render: (what: "test_views" | "camera_path") => void }): HTMLElement {

@@ -1,6 +1,6 @@
 /** The line at the bottom: why a drag stopped, what the server said, how fast pictures come. */
-import type { App } from "../app";
-import { awaited } from "../store";
+import type { App } from "../app/app";
+import { awaited } from "../app/store";
 import { h } from "./dom";
 
 const NOTICE_STAYS = 12000;

@@ -1,8 +1,8 @@
 /** The column on the left: tools, Set and Edit mode, axes, which cage, snapping. */
 import { Axis3d, Box, Boxes, Globe, Magnet, MousePointer2, Move3d, PencilRuler, Rotate3d, Scale3d, Spline, Square, SquareDashed } from "lucide";
-import type { Actions } from "../actions";
-import type { App } from "../app";
-import { looking, type Editor } from "../store";
+import type { Actions } from "../editing/actions";
+import type { App } from "../app/app";
+import { looking, type Editor } from "../app/store";
 import { h, iconButton } from "./dom";
 
 export function toolbar(app: App, actions: Actions): HTMLElement {

@@ -1,9 +1,9 @@
 /** The row on top: the scene, undo and redo, what is shown, saving. */
 import { Camera, CircleQuestionMark, Columns2, Download, FileDown, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
-import type { Actions } from "../actions";
-import type { App } from "../app";
-import { LOOKING, looking, type View } from "../store";
-import { SPLATS } from "../upload";
+import type { Actions } from "../editing/actions";
+import type { App } from "../app/app";
+import { LOOKING, looking, type View } from "../app/store";
+import { SPLATS } from "../net/upload";
 import type { Dialogs } from "./dialogs";
 import { h, iconButton, iconLink } from "./dom";
 

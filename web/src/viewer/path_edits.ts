@@ -6,8 +6,8 @@ import { ByteReader, PageFile } from "../field/page_file";
 import type { Lattice, PageEdits } from "../field/page_edits";
 import { readLayer } from "../field/page_layers";
 import type { Layer, PlacedLayer } from "../field/page_layers";
-import { mixedHalves } from "./halves";
-import { placeAt } from "./path";
+import { mixedHalves } from "./float16";
+import { placeAt } from "./camera_path";
 
 interface PathHeader {
   edits: number[];

@@ -5,7 +5,7 @@ import { axesOf, covariancesOf, rotationOf } from "../splats/shapes";
 import { changedRecords, unpackedBits } from "../splats/splat_edits";
 import type { SplatEdits } from "../splats/splat_edits";
 import { wholes } from "../splats/splat_file";
-import { placeAt } from "./path";
+import { placeAt } from "./camera_path";
 
 export const SPLAT_PATH = "cagesppa";
 

@@ -1,11 +1,11 @@
 /** An exported scene: its field and edits, with orbit, before/after and the camera path; no server of its own. */
-import { finished, Pacing } from "../field/pacing";
+import { finished, Pacing } from "../field/adaptive_resolution";
 import { AnyRenderer, magicOf, readAnyEdits } from "../splats/any_renderer";
 import type { AnyEdits } from "../splats/any_renderer";
-import { listen } from "./fingers";
+import { listen } from "./touch_controls";
 import { Orbit } from "./orbit";
-import { viewAt } from "./path";
-import type { Path, View } from "./path";
+import { viewAt } from "./camera_path";
+import type { Path, View } from "./camera_path";
 import { PathEdits } from "./path_edits";
 import { open, whole } from "./sources";
 import type { FileEntry } from "./sources";

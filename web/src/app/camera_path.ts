@@ -1,0 +1,22 @@
+/** The camera path as the page plays it: the server's stills, and what lies between two of them. */
+import { MathUtils, Matrix4, Quaternion, Vector3 } from "three";
+import type { Key, Still } from "../net/protocol";
+
+/** How long the path takes, seconds: each key's time to the next one; the last counts where the path is a loop. */
+export function duration(keys: readonly Key[], loop: boolean): number {
+  const legs = loop ? keys : keys.slice(0, -1);
+  return keys.length < 2 ? 0 : legs.reduce((sum, key) => sum + key.seconds, 0);
+}
+
+/** The camera at a share of the path's time: evenly from one of the stills beside it to the other. */
+export function stillAt(stills: readonly Still[], share: number): Still {
+  const at = MathUtils.clamp(share, 0, 1) * (stills.length - 1);
+  const before = Math.min(Math.floor(at), stills.length - 2);
+  const [one, other] = stills.slice(before);
+  const t = at - before;
+  const poses = [one, other].map(({ c2w }) => new Matrix4().fromArray(c2w).transpose());
+  const [from, to] = poses.map((pose) => new Vector3().setFromMatrixPosition(pose));
+  const [turned, turnedTo] = poses.map((pose) => new Quaternion().setFromRotationMatrix(pose));
+  const pose = new Matrix4().compose(from.lerp(to, t), turned.slerp(turnedTo, t), new Vector3(1, 1, 1));
+  return { c2w: pose.transpose().toArray(), fov_y_deg: MathUtils.lerp(one.fov_y_deg, other.fov_y_deg, t) };
+}

@@ -1,0 +1,71 @@
+import "../ui/editor.css";
+import { Actions } from "../editing/actions";
+import { App } from "./app";
+import { testApi } from "./test_api";
+import { bindings, listenForKeys } from "../editing/keys";
+import { Pointer } from "../editing/pointer";
+import { remember } from "./session_storage";
+import { LOOKING, looking } from "./store";
+import { dialogs } from "../ui/dialogs";
+import { h } from "../ui/dom";
+import { editsList } from "../ui/edits_list";
+import { help } from "../ui/help";
+import { historyList } from "../ui/history_list";
+import { jobs } from "../ui/jobs";
+import { options } from "../ui/options";
+import { overlay } from "../ui/overlay";
+import { pathList } from "../ui/path_list";
+import { status } from "../ui/status";
+import { toolbar } from "../ui/toolbar";
+import { topbar } from "../ui/topbar";
+
+const view = h("main", { class: "view" });
+const root = h("div", { class: "editor" }, view);
+document.body.append(root);
+
+const app = new App(view);
+const questions = dialogs(app);
+const actions = new Actions(app, () => questions.saveAs());
+const pointer = new Pointer(app);
+const keys = bindings(app, actions, pointer, questions);
+listenForKeys(app, actions, pointer, keys);
+
+// Who may look but not change anything finds its buttons and fields disabled.
+const controls = h(
+  "fieldset",
+  { class: "controls" },
+  editsList(app, actions, questions),
+  options(app, actions),
+  historyList(app),
+  pathList(app, actions, questions),
+  jobs(app),
+);
+const panel = h("aside", { class: "panel" }, controls);
+view.append(overlay(app, pointer));
+root.append(topbar(app, actions, questions), toolbar(app, actions), panel, status(app), help(app, keys), questions.element);
+app.store.watch(["hello"], (now) => {
+  controls.disabled = looking(now);
+  root.classList.toggle("looking", looking(now));
+});
+app.store.watch(["panel"], (now) => root.classList.toggle("wide", !now.panel));
+app.store.watch(["state", "hello"], ({ hello, state }) => {
+  document.title = `${state?.saved === false ? "● " : ""}${hello?.name ?? "cagefield"}`;
+});
+addEventListener("beforeunload", (event) => {
+  if (app.store.now.hello !== null) remember(app.store.now, app.viewport.c2w);
+  if (app.store.now.state?.saved === false && !looking(app.store.now)) event.preventDefault();
+});
+addEventListener("dragover", (event) => {
+  if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
+});
+addEventListener("drop", (event) => {
+  const file = event.dataTransfer?.files[0];
+  if (file === undefined) return;
+  event.preventDefault();
+  if (looking(app.store.now)) app.say(LOOKING, "warning");
+  else void actions.load(file);
+});
+document.addEventListener("visibilitychange", () => {
+  if (document.hidden) app.player.stop();
+});
+window.cagefield = testApi(app);

@@ -1,0 +1,97 @@
+/**
+ * Cages: hexahedra given by 8 corners, corner k = x + 2y + 4z along the cage's own axes. Edges are corner
+ * pairs that differ in one bit, faces are "+x" to "-z". World units.
+ */
+import { Matrix3, Matrix4, Quaternion, Vector3 } from "three";
+import type { Corners, Vec3 } from "../net/protocol";
+
+export type Edge = readonly [number, number];
+export type FaceName = "+x" | "-x" | "+y" | "-y" | "+z" | "-z";
+
+const ALL = [0, 1, 2, 3, 4, 5, 6, 7] as const;
+
+/** The 12 edges (i, j), i < j: four along x, four along y, four along z. */
+export const EDGES: readonly Edge[] = [0, 1, 2].flatMap((axis) =>
+  ALL.filter((k) => !((k >> axis) & 1)).map((k): Edge => [k, k | (1 << axis)]),
+);
+
+export const FACE_NAMES: readonly FaceName[] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+
+/** The four corners of each face, in the order of `FACE_NAMES`, increasing. */
+export const FACES: readonly (readonly number[])[] = FACE_NAMES.map((name) => {
+  const axis = "xyz".indexOf(name[1]);
+  const bit = name[0] === "+" ? 1 : 0;
+  return ALL.filter((k) => ((k >> axis) & 1) === bit);
+});
+
+/** A corner, an edge or a face: the parts of a cage that can be dragged. */
+export interface Part {
+  kind: "corner" | "edge" | "face";
+  /** Corner number, or index in `EDGES` or `FACES`. */
+  index: number;
+}
+
+/** The corners that belong to a part. */
+export function cornersOf(part: Part): number[] {
+  if (part.kind === "corner") return [part.index];
+  return [...(part.kind === "edge" ? EDGES : FACES)[part.index]];
+}
+
+/** Mean of some of the corners, of all 8 unless told. */
+export function middle(corners: Corners, which: readonly number[] = ALL): Vec3 {
+  const sum = new Vector3();
+  for (const k of which) sum.add(new Vector3(...corners[k]));
+  return sum.divideScalar(which.length).toArray();
+}
+
+/** Unit edge directions at the cage's middle, as the columns of a matrix. */
+export function axesOf(corners: Corners): Matrix3 {
+  const columns = [0, 1, 2].map((axis) => {
+    const sum = new Vector3();
+    for (const k of ALL) sum.addScaledVector(new Vector3(...corners[k]), (k >> axis) & 1 ? 1 : -1);
+    return sum.normalize();
+  });
+  const [x, y, z] = columns;
+  return new Matrix3().set(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z);
+}
+
+/** The rotation nearest to the cage's axes: the orthogonal factor of their polar decomposition. */
+export function orientation(corners: Corners): Quaternion {
+  let q = axesOf(corners);
+  for (let step = 0; step < 60; step++) {
+    const next = q.clone().invert().transpose();
+    let change = 0;
+    next.elements.forEach((value, i) => {
+      const mean = 0.5 * (value + q.elements[i]);
+      change = Math.max(change, Math.abs(mean - q.elements[i]));
+      next.elements[i] = mean;
+    });
+    q = next;
+    if (change < 1e-15) break;
+  }
+  return new Quaternion().setFromRotationMatrix(new Matrix4().setFromMatrix3(q));
+}
+
+/** Unit outward normal of a face at its middle. */
+export function faceNormal(corners: Corners, face: number): Vec3 {
+  const [a, b, c, d] = FACES[face].map((k) => new Vector3(...corners[k]));
+  const along = b.clone().add(d).sub(a).sub(c);
+  const across = c.clone().add(d).sub(a).sub(b);
+  const outward = new Vector3(...middle(corners, FACES[face])).sub(new Vector3(...middle(corners)));
+  const normal = along.cross(across).normalize();
+  return (normal.dot(outward) < 0 ? normal.negate() : normal).toArray();
+}
+
+/** Half the mean distance between opposite faces' middles: how large a cage is. */
+export function extent(corners: Corners): number {
+  const spans = [0, 2, 4].map((face) =>
+    new Vector3(...middle(corners, FACES[face])).distanceTo(new Vector3(...middle(corners, FACES[face + 1]))),
+  );
+  return (spans[0] + spans[1] + spans[2]) / 6;
+}
+
+/** Whether two cages have the same corners, to a millionth of their size. */
+export function same(a: Corners, b: Corners): boolean {
+  const slack = 1e-6 * extent(a);
+  return a.every((corner, k) => corner.every((x, i) => Math.abs(x - b[k][i]) <= slack));
+}

@@ -1,0 +1,71 @@
+/**
+ * How far a drag may go, told before the server's answer: by the outer cage, which is known here, and by
+ * what the server last let through. The server's answer is what holds.
+ */
+import { Matrix3, Vector3 } from "three";
+import { amount, apply, part, type Operation, type Posed } from "./operations";
+import type { Corners, Vec3 } from "../net/protocol";
+
+const SLACK = 1e-9;
+
+/** Whether a point is in the cage: the trilinear map is inverted by Newton's method. */
+export function contains(corners: Corners, point: Vec3): boolean {
+  const target = new Vector3(...point);
+  const u = new Vector3(0.5, 0.5, 0.5);
+  for (let step = 0; step < 20; step++) {
+    const { position, jacobian } = evaluate(corners, u);
+    const change = target.clone().sub(position).applyMatrix3(jacobian.invert());
+    u.add(change).clampScalar(-1, 2);
+    if (change.lengthSq() < 1e-24) break;
+  }
+  if (evaluate(corners, u).position.distanceTo(target) > 1e-6) return false;
+  return [u.x, u.y, u.z].every((x) => x >= -SLACK && x <= 1 + SLACK);
+}
+
+/** Largest share of the operation, to 1e-3, up to which the cage stays in the outer cage; 1 without one. */
+export function containedPart(operation: Operation, cage: Posed, outer: Corners | null): number {
+  if (outer === null) return 1;
+  const inside = (t: number): boolean =>
+    apply(part(operation, t), cage).corners.every((corner) => contains(outer, corner));
+  if (inside(1) || !inside(0)) return 1;
+  const steps = operation.kind === "rotate" ? 16 : 4;
+  let high = 1;
+  for (let n = 1; n <= steps; n++) {
+    if (!inside(n / steps)) {
+      high = n / steps;
+      break;
+    }
+  }
+  let low = high - 1 / steps;
+  while (high - low > 1e-3) {
+    const mid = 0.5 * (low + high);
+    if (inside(mid)) low = mid;
+    else high = mid;
+  }
+  return low;
+}
+
+/** The share of an operation that the server will let through, judged from what it let through of another. */
+export function expectedPart(operation: Operation, last: { operation: Operation; part: number } | null): number {
+  if (last === null || last.part >= 1 || last.operation.kind !== operation.kind) return 1;
+  const size = amount(operation);
+  return size > 0 ? Math.min(1, (last.part * amount(last.operation)) / size) : 1;
+}
+
+function evaluate(corners: Corners, u: Vector3): { position: Vector3; jacobian: Matrix3 } {
+  const position = new Vector3();
+  const columns = [new Vector3(), new Vector3(), new Vector3()];
+  const w = [u.x, u.y, u.z];
+  corners.forEach((corner, k) => {
+    const bits = [k & 1, (k >> 1) & 1, (k >> 2) & 1];
+    const factor = bits.map((bit, axis) => (bit ? w[axis] : 1 - w[axis]));
+    const v = new Vector3(...corner);
+    position.addScaledVector(v, factor[0] * factor[1] * factor[2]);
+    columns.forEach((column, axis) => {
+      const others = factor[(axis + 1) % 3] * factor[(axis + 2) % 3];
+      column.addScaledVector(v, bits[axis] ? others : -others);
+    });
+  });
+  const [x, y, z] = columns;
+  return { position, jacobian: new Matrix3().set(x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z) };
+}

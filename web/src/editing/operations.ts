@@ -1,0 +1,172 @@
+/**
+ * Operations on a cage, as the server does them: so that the lines can move before its answer. Angles are
+ * degrees, intrinsic XYZ; turning, scaling and shearing are about the cage's pivot.
+ */
+import { Euler, MathUtils, Matrix3, Matrix4, Quaternion, Vector3 } from "three";
+import { axesOf, orientation } from "./cage";
+import type { Corners, DragMove, Vec3 } from "../net/protocol";
+
+export type Operation = DragMove["operation"];
+export type Axes = "world" | "cage";
+
+export interface Posed {
+  corners: Corners;
+  pivot: Vec3;
+}
+
+/** The cage after the operation; the pivot travels with a translation and stays with all else. */
+export function apply(operation: Operation, { corners, pivot }: Posed): Posed {
+  switch (operation.kind) {
+    case "translate":
+      return { corners: moved(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by), pivot: sum(pivot, operation.by) };
+    case "move_corners":
+      return { corners: moved(corners, operation.corners, operation.by), pivot };
+    case "rotate":
+      return { corners: linear(corners, pivot, rotationMatrix(operation.rotation_deg, operation.axes, corners)), pivot };
+    case "scale":
+      return { corners: linear(corners, pivot, along(diagonal(operation.by), operation.axes, corners)), pivot };
+    case "shear": {
+      const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
+      const shear = new Matrix3().set(1, xy, xz, yx, 1, yz, zx, zy, 1);
+      return { corners: linear(corners, pivot, along(shear, operation.axes, corners)), pivot };
+    }
+  }
+}
+
+/** The share t of an operation: lengths and shears times t, the angle times t, factors to the power t. */
+export function part(operation: Operation, t: number): Operation {
+  switch (operation.kind) {
+    case "translate":
+    case "move_corners":
+      return { ...operation, by: scaled(operation.by, t) };
+    case "rotate": {
+      const full = quaternion(operation.rotation_deg);
+      if (full.w < 0) full.set(-full.x, -full.y, -full.z, -full.w);
+      return { ...operation, rotation_deg: degrees(new Quaternion().slerp(full, t)) };
+    }
+    case "scale":
+      return { ...operation, by: operation.by.map((s) => s ** t) as Vec3 };
+    case "shear": {
+      const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
+      return { ...operation, xy: xy * t, xz: xz * t, yx: yx * t, yz: yz * t, zx: zx * t, zy: zy * t };
+    }
+  }
+}
+
+/** How much an operation is: its length, angle in degrees, largest logarithm of a factor, or shear. */
+export function amount(operation: Operation): number {
+  switch (operation.kind) {
+    case "translate":
+    case "move_corners":
+      return Math.hypot(...operation.by);
+    case "rotate":
+      return MathUtils.radToDeg(quaternion(operation.rotation_deg).angleTo(new Quaternion()));
+    case "scale":
+      return Math.max(...operation.by.map((s) => Math.abs(Math.log(s))));
+    case "shear": {
+      const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
+      return Math.hypot(xy, xz, yx, yz, zx, zy);
+    }
+  }
+}
+
+/** Steps that a drag snaps to: world units, degrees, share of a scale factor. */
+export interface Steps {
+  length: number;
+  angle: number;
+  factor: number;
+}
+
+/** The operation with its numbers rounded to whole steps. */
+export function snapped(operation: Operation, steps: Steps): Operation {
+  const to = (v: Vec3, step: number): Vec3 => v.map((x) => tidy(Math.round(x / step) * step)) as Vec3;
+  switch (operation.kind) {
+    case "translate":
+    case "move_corners":
+      return { ...operation, by: to(operation.by, steps.length) };
+    case "rotate":
+      return { ...operation, rotation_deg: to(operation.rotation_deg, steps.angle) };
+    case "scale":
+      return { ...operation, by: to(operation.by, steps.factor).map((s) => Math.max(s, steps.factor)) as Vec3 };
+    case "shear":
+      return operation;
+  }
+}
+
+/** A power of ten, or five of it, of about a tenth of the length or less: the step of translations. */
+export function lengthStep(length: number): number {
+  const raw = Math.max(length, 1e-9) / 10;
+  const decade = 10 ** Math.floor(Math.log10(raw));
+  return tidy(raw / decade >= 5 ? 5 * decade : decade);
+}
+
+/** The operation in words, for the readout beside the mouse. */
+export function described(operation: Operation): string {
+  const three = (v: Vec3, digits: number): string => v.map((x) => tidy(x, digits).toFixed(digits)).join("  ");
+  switch (operation.kind) {
+    case "translate":
+    case "move_corners":
+      return three(operation.by, 3);
+    case "rotate":
+      return `${operation.rotation_deg.map((x) => tidy(x, 1).toFixed(1)).join("°  ")}°`;
+    case "scale":
+      return `× ${three(operation.by, 2)}`;
+    case "shear":
+      return "shear";
+  }
+}
+
+/** The quaternion of intrinsic XYZ angles in degrees. */
+export function quaternion(rotation_deg: Vec3): Quaternion {
+  const [x, y, z] = rotation_deg.map((angle) => MathUtils.degToRad(angle));
+  return new Quaternion().setFromEuler(new Euler(x, y, z, "XYZ"));
+}
+
+/** Intrinsic XYZ angles in degrees. */
+export function degrees(q: Quaternion): Vec3 {
+  const { x, y, z } = new Euler().setFromQuaternion(q, "XYZ");
+  return [x, y, z].map((angle) => tidy(MathUtils.radToDeg(angle))) as Vec3;
+}
+
+/** x without the rounding of its last digits; no negative zero. */
+export function tidy(x: number, digits = 9): number {
+  const rounded = Number(x.toFixed(digits));
+  return rounded === 0 ? 0 : rounded;
+}
+
+function rotationMatrix(rotation_deg: Vec3, axes: Axes | undefined, corners: Corners): Matrix3 {
+  const turn = quaternion(rotation_deg);
+  if (axes === "cage") {
+    const own = orientation(corners);
+    turn.premultiply(own).multiply(own.clone().invert());
+  }
+  return new Matrix3().setFromMatrix4(new Matrix4().makeRotationFromQuaternion(turn));
+}
+
+/** A matrix that is given along the cage's own edges, in world axes. */
+function along(matrix: Matrix3, axes: Axes | undefined, corners: Corners): Matrix3 {
+  if (axes !== "cage") return matrix;
+  const own = axesOf(corners);
+  return own.clone().multiply(matrix).multiply(own.clone().invert());
+}
+
+function diagonal([x, y, z]: Vec3): Matrix3 {
+  return new Matrix3().set(x, 0, 0, 0, y, 0, 0, 0, z);
+}
+
+function linear(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
+  const centre = new Vector3(...pivot);
+  return corners.map((c) => new Vector3(...c).sub(centre).applyMatrix3(matrix).add(centre).toArray()) as Corners;
+}
+
+function moved(corners: Corners, which: readonly number[], by: Vec3): Corners {
+  return corners.map((corner, k) => (which.includes(k) ? sum(corner, by) : corner)) as Corners;
+}
+
+function sum(a: Vec3, b: Vec3): Vec3 {
+  return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+}
+
+function scaled(a: Vec3, t: number): Vec3 {
+  return [a[0] * t, a[1] * t, a[2] * t];
+}

@@ -1,0 +1,216 @@
+/** The canvas: three's scene and camera, orbiting, and frames drawn only when something is other than before. */
+import { MathUtils, Matrix4, PerspectiveCamera, Quaternion, Ray, Scene, Vector2, Vector3, WebGLRenderer } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { ScreenPoint } from "../editing/picking";
+import type { Vec3 } from "../net/protocol";
+
+const MOST_PIXELS_PER_POINT = 2;
+
+/** Milliseconds between frames that were not drawn one after the other, at least. */
+const SLOWEST_FRAME = 100;
+
+/** Whether pages are drawn by the processor: then only lines and dots are smooth, which see to it themselves. */
+function isSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const information = gl?.getExtension("WEBGL_debug_renderer_info");
+  if (!gl || !information) return false;
+  const name = String(gl.getParameter(information.UNMASKED_RENDERER_WEBGL));
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+/** A renderer whose canvas lets nothing through: the browser then need not blend it with what is behind. */
+function opaqueRenderer(antialias: boolean): WebGLRenderer {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("webgl2", {
+    alpha: false,
+    depth: true,
+    stencil: false,
+    antialias,
+    powerPreference: "high-performance",
+  });
+  return new WebGLRenderer({ canvas, context: context ?? undefined });
+}
+
+export class Viewport {
+  /** Whether the processor draws the page. */
+  readonly software = isSoftware();
+  readonly renderer = opaqueRenderer(!this.software);
+  readonly scene = new Scene();
+  readonly camera = new PerspectiveCamera(50, 1, 0.01, 1000);
+  orbit: OrbitControls | null = null;
+  /** Called before each frame is drawn, and with the time at which the next one could begin. */
+  beforeFrame: (() => void)[] = [];
+  afterFrame: ((time: number) => void)[] = [];
+  /** Milliseconds from one frame to the next, smoothed. */
+  frameTime = 16;
+  /** Called when the camera or the canvas is another. */
+  cameraChanged: (() => void)[] = [];
+  /** Called when the user turns the view, or goes to another one. */
+  taken: (() => void)[] = [];
+  /** Called when the orbit's centre was guessed: it lies beside the middle of what there is to see. */
+  guessed: (() => void)[] = [];
+  private around: Vec3 = [0, 0, 0];
+  private scheduled = false;
+  private size = new Vector2(1, 1);
+
+  constructor(private readonly host: HTMLElement) {
+    const { renderer } = this;
+    renderer.setClearColor(0x15171a, 1);
+    renderer.autoClear = false;
+    renderer.info.autoReset = true;
+    host.append(renderer.domElement);
+    new ResizeObserver(() => this.resize()).observe(host);
+    this.resize();
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.renderer.domElement;
+  }
+
+  /** Size of the canvas in device pixels. */
+  get pixels(): { width: number; height: number } {
+    const { width, height } = this.canvas;
+    return { width, height };
+  }
+
+  /** Size of the canvas in CSS pixels. */
+  get points(): { width: number; height: number } {
+    return { width: this.size.x, height: this.size.y };
+  }
+
+  /** Draws a frame as soon as the browser shows one. */
+  invalidate(): void {
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame((began) => {
+      this.scheduled = false;
+      for (const action of this.beforeFrame) action();
+      this.renderer.setRenderTarget(null);
+      this.renderer.clear();
+      this.renderer.render(this.scene, this.camera);
+      requestAnimationFrame((time) => {
+        this.frameTime += 0.2 * (Math.min(time - began, SLOWEST_FRAME) - this.frameTime);
+        for (const action of this.afterFrame) action(time);
+      });
+    });
+  }
+
+  /** Looks from a camera-to-world pose, row by row, and orbits around the point of its axis next to `around`. */
+  lookFrom(c2w: readonly number[], fov_y_deg: number, up: Vec3, around: Vec3): void {
+    this.take();
+    const { camera } = this;
+    if (this.orbit === null || camera.up.distanceTo(new Vector3(...up)) > 1e-6) {
+      camera.up.set(...up);
+      this.orbit?.dispose();
+      this.orbit = new OrbitControls(camera, this.canvas);
+      this.orbit.zoomToCursor = true;
+      this.orbit.addEventListener("start", () => this.take());
+      this.orbit.addEventListener("change", () => this.changed());
+    }
+    // Only now: a new orbit turns the camera to its centre.
+    this.place(c2w, fov_y_deg);
+    this.around = around;
+    this.settle();
+    this.orbit.update();
+  }
+
+  /** Looks from a pose as it is, however it leans, until the view is settled. */
+  pose(c2w: readonly number[], fov_y_deg: number): void {
+    this.place(c2w, fov_y_deg);
+    this.changed();
+  }
+
+  /** Orbits, once the view is turned, around the point of the camera's axis next to the middle of everything. */
+  settle(): void {
+    if (this.orbit === null) return;
+    const to = new Vector3(...this.around).sub(this.camera.position);
+    this.orbitAt(Math.max(to.dot(this.forward), 0.1));
+    this.changed();
+    for (const action of this.guessed) action();
+  }
+
+  /** Orbits around the point of the camera's axis at this distance. */
+  orbitAt(distance: number): void {
+    this.orbit?.target.copy(this.camera.position).addScaledVector(this.forward, distance);
+  }
+
+  /** Moves the camera along its axis, and turns its orbit, so that a ball fills much of the view. */
+  focus(centre: Vec3, radius: number): void {
+    if (this.orbit === null) return;
+    this.take();
+    const away = this.camera.position.clone().sub(this.orbit.target).normalize();
+    const narrow = Math.min(1, this.camera.aspect) * Math.tan(MathUtils.degToRad(this.camera.fov / 2));
+    this.orbit.target.set(...centre);
+    this.camera.position.copy(this.orbit.target).addScaledVector(away, (1.6 * radius) / narrow);
+    this.orbit.update();
+    this.changed();
+  }
+
+  /** Camera-to-world pose, row by row. */
+  get c2w(): number[] {
+    this.camera.updateMatrixWorld();
+    return this.camera.matrixWorld.clone().transpose().toArray();
+  }
+
+  /** World to clip coordinates of the camera as it is. */
+  get viewProjection(): Matrix4 {
+    this.camera.updateMatrixWorld();
+    return this.camera.projectionMatrix.clone().multiply(this.camera.matrixWorldInverse);
+  }
+
+  /** Where a point is on the canvas, in CSS pixels from the left and the top. */
+  readonly project = (point: Vec3): ScreenPoint => {
+    this.camera.updateMatrixWorld();
+    const seen = new Vector3(...point).applyMatrix4(this.camera.matrixWorldInverse);
+    const depth = -seen.z;
+    const clip = seen.applyMatrix4(this.camera.projectionMatrix);
+    return { x: (0.5 + 0.5 * clip.x) * this.size.x, y: (0.5 - 0.5 * clip.y) * this.size.y, depth };
+  };
+
+  /** A CSS pixel in normalised device coordinates. */
+  device(x: number, y: number): { x: number; y: number } {
+    return { x: (2 * x) / this.size.x - 1, y: 1 - (2 * y) / this.size.y };
+  }
+
+  /** The ray through a CSS pixel. */
+  ray(x: number, y: number): Ray {
+    this.camera.updateMatrixWorld();
+    const at = this.device(x, y);
+    const through = new Vector3(at.x, at.y, 0.5).unproject(this.camera);
+    return new Ray(this.camera.position.clone(), through.sub(this.camera.position).normalize());
+  }
+
+  /** The direction in which the camera looks. */
+  get forward(): Vector3 {
+    return new Vector3(0, 0, -1).applyQuaternion(this.camera.getWorldQuaternion(new Quaternion()));
+  }
+
+  private place(c2w: readonly number[], fov_y_deg: number): void {
+    const pose = new Matrix4().fromArray([...c2w]).transpose();
+    this.camera.fov = fov_y_deg;
+    this.camera.position.setFromMatrixPosition(pose);
+    this.camera.quaternion.setFromRotationMatrix(pose);
+  }
+
+  private take(): void {
+    for (const action of this.taken) action();
+  }
+
+  private changed(): void {
+    this.camera.updateProjectionMatrix();
+    this.camera.updateMatrixWorld();
+    for (const action of this.cameraChanged) action();
+    this.invalidate();
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.host;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.size.set(clientWidth, clientHeight);
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXELS_PER_POINT));
+    this.renderer.setSize(clientWidth, clientHeight);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.changed();
+  }
+}
