@@ -6,16 +6,22 @@ import { compile } from "json-schema-to-typescript";
 
 const target = fileURLToPath(new URL("src/net/protocol.ts", import.meta.url));
 const python = process.env.PYTHON ?? "python3";
-const schema = JSON.parse(execFileSync(python, ["-m", "cagefield.server.protocol.schema"], { encoding: "utf8" }));
+const schema = JSON.parse(
+  execFileSync(python, ["-m", "cagefield.server.protocol.schema"], { encoding: "utf8" }),
+);
 const compiled = await compile(schema, "Protocol", {
   additionalProperties: false,
-  bannerComment: "// Made by `npm run protocol` from what src/cagefield/server/protocol/schema.py collects; change that.",
+  bannerComment:
+    "// Made by `npm run protocol` from what src/cagefield/server/protocol/schema.py collects; change that.",
   unreachableDefinitions: true,
   strictIndexSignatures: true,
   style: { printWidth: 110 },
 });
 const types = compiled
-  .replace(/\n? \* This interface was referenced by `Protocol`'s JSON-Schema\n \* via the `definition` "\w+"\.\n/g, "")
+  .replace(
+    /\n? \* This interface was referenced by `Protocol`'s JSON-Schema\n \* via the `definition` "\w+"\.\n/g,
+    "",
+  )
   .replace(/\/\*\* *\*\/\n/g, "")
   .replace(/\n *\*\n? \*\//g, "\n */")
   .replace("export interface Protocol {}\n", "");

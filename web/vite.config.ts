@@ -17,6 +17,15 @@ export default defineConfig({
       },
     },
   },
-  server: { proxy: { "/socket": { target: "ws://localhost:8741", ws: true, headers: { origin: "http://localhost:8741" }, changeOrigin: true } } },
+  server: {
+    proxy: {
+      "/socket": {
+        target: "ws://localhost:8741",
+        ws: true,
+        headers: { origin: "http://localhost:8741" },
+        changeOrigin: true,
+      },
+    },
+  },
   test: { include: ["tests/**/*.test.ts"] },
 });

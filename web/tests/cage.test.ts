@@ -1,6 +1,17 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { EDGES, FACES, FACE_NAMES, axesOf, cornersOf, extent, faceNormal, middle, orientation, same } from "../src/editing/cage";
+import {
+  EDGES,
+  FACES,
+  FACE_NAMES,
+  axesOf,
+  cornersOf,
+  extent,
+  faceNormal,
+  middle,
+  orientation,
+  same,
+} from "../src/editing/cage";
 import { box, expectClose } from "./cages";
 
 const turn = new Quaternion().setFromAxisAngle(new Vector3(1, 2, 3).normalize(), 0.7);
@@ -30,10 +41,14 @@ describe("a cage's frame", () => {
   });
 
   it("of a sheared box is the nearest rotation: no other of many is nearer to the axes", () => {
-    const sheared = box([0, 0, 0], [1, 1, 1]).map(([x, y, z]) => [x + 0.6 * y, y, z]) as ReturnType<typeof box>;
+    const sheared = box([0, 0, 0], [1, 1, 1]).map(([x, y, z]) => [x + 0.6 * y, y, z]) as ReturnType<
+      typeof box
+    >;
     const axes = axesOf(sheared).elements;
     const distance = (q: Quaternion): number => {
-      const columns = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)].flatMap((v) => v.applyQuaternion(q).toArray());
+      const columns = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)].flatMap((v) =>
+        v.applyQuaternion(q).toArray(),
+      );
       return Math.hypot(...columns.map((x, i) => x - axes[i]));
     };
     const best = orientation(sheared);

@@ -6,7 +6,10 @@ import { FakeServer, edit } from "./fake_server";
 
 const by = (x: number): { kind: "translate"; by: Vec3 } => ({ kind: "translate", by: [x, 0, 0] });
 
-function begin(target: "field" | "inner" | "outer" | "both" = "field", change = {}): { server: FakeServer; drag: Drag } {
+function begin(
+  target: "field" | "inner" | "outer" | "both" = "field",
+  change = {},
+): { server: FakeServer; drag: Drag } {
   const server = new FakeServer();
   return { server, drag: new Drag(4, edit(change), target, server.take) };
 }

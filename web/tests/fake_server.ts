@@ -5,18 +5,49 @@ import { box } from "./cages";
 export function edit(change: Partial<EditState> = {}): EditState {
   const inner: Corners = box([0, 0, 0], [0.6, 0.6, 0.6]);
   return {
-    id: 1, name: "edit 1", colour: "#4cc2ff", enabled: true, locked: false, kind: "continuous", source: null,
-    shell: "flow", falloff: "smooth", width: 1, lattice: 0, lattice_error: null, fill: "surroundings", relight: "occlusion",
-    inner, deformed: inner, outer: box([0, 0, 0], [1.6, 1.6, 1.6]),
-    pivot: [0, 0, 0], inner_pivot: [0, 0, 0], outer_pivot: [0, 0, 0], operations: [], problem: null, ...change,
-  }; // prettier-ignore
+    id: 1,
+    name: "edit 1",
+    colour: "#4cc2ff",
+    enabled: true,
+    locked: false,
+    kind: "continuous",
+    source: null,
+    shell: "flow",
+    falloff: "smooth",
+    width: 1,
+    lattice: 0,
+    lattice_error: null,
+    fill: "surroundings",
+    relight: "occlusion",
+    inner,
+    deformed: inner,
+    outer: box([0, 0, 0], [1.6, 1.6, 1.6]),
+    pivot: [0, 0, 0],
+    inner_pivot: [0, 0, 0],
+    outer_pivot: [0, 0, 0],
+    operations: [],
+    problem: null,
+    ...change,
+  };
 }
 
 export function state(change: Partial<State> = {}): State {
   return {
-    type: "state", revision: 1, pictured: 1, edits: [edit()], selected: 1, history: ["Open"], entry: 0, saved: true, path: "scene", is_file: false,
-    preserve_opacity: false, keys: [], loop: false, ...change,
-  }; // prettier-ignore
+    type: "state",
+    revision: 1,
+    pictured: 1,
+    edits: [edit()],
+    selected: 1,
+    history: ["Open"],
+    entry: 0,
+    saved: true,
+    path: "scene",
+    is_file: false,
+    preserve_opacity: false,
+    keys: [],
+    loop: false,
+    ...change,
+  };
 }
 
 /** A server that lets translations go half-way, and keeps what it was sent. */

@@ -37,7 +37,17 @@ function level(): Level {
   }
   const count = density.length;
   return {
-    field: { bounds: [[0, 0, 0], [1, 1, 1]], contracted: false, step: 0.5, background: null, brick: 8, levels: [] },
+    field: {
+      bounds: [
+        [0, 0, 0],
+        [1, 1, 1],
+      ],
+      contracted: false,
+      step: 0.5,
+      background: null,
+      brick: 8,
+      levels: [],
+    },
     header: { resolution, vertices: count, unit: 1, steps: [1], dims: [3, 2, 2] },
     last: true,
     bricks: new Uint8Array(bricks[0] * bricks[1] * bricks[2]).fill(1),
@@ -46,7 +56,7 @@ function level(): Level {
     sh: Uint8Array.from({ length: 3 * count }, (_, n) => (n < count ? density[n] & 255 : 7)),
     occupancy: { origin: [0, 0, 0], dims: [3, 2, 2], codes: new Uint16Array(12).fill(255) },
   };
-} // prettier-ignore
+}
 
 describe("bricks in textures", () => {
   it("repeat the vertices of the bricks behind them", () => {
@@ -59,9 +69,17 @@ describe("bricks in textures", () => {
     for (let n = 0; n < 2; n++) {
       const [i, j, k] = layout.index.subarray(4 * layout.bricks[n]);
       const plane = layout.across[0] * layout.across[1];
-      const layer = filler.texels(layout.bricks.subarray(k * plane, (k + 1) * plane), layout.across[0], layout.across[1]);
+      const layer = filler.texels(
+        layout.bricks.subarray(k * plane, (k + 1) * plane),
+        layout.across[0],
+        layout.across[1],
+      );
       const at = (x: number, y: number, z: number): number => x * slice + (j * 9 + y) * width + i * 9 + z;
-      for (const [x, y, z] of [[0, 0, 0], [1, 8, 3], [1, 2, 8]] as Vec3[]) {
+      for (const [x, y, z] of [
+        [0, 0, 0],
+        [1, 8, 3],
+        [1, 2, 8],
+      ] as Vec3[]) {
         const value = 100 * (8 * n + x) + 10 * y + z;
         expect(layer.density[at(x, y, z)]).toBe(value);
         expect(layer.colours[0][4 * at(x, y, z)]).toBe(value & 255);
@@ -72,7 +90,7 @@ describe("bricks in textures", () => {
       else expect(layer.density[at(8, 1, 1)]).toBe(811);
     }
     expect(bytesOf(layout)).toBe(layout.across.reduce((a, b) => a * b) * 729 * 6 + 8);
-  }); // prettier-ignore
+  });
 
   it("are refused where textures are too small", () => {
     expect(() => layoutOf(level(), 9)).toThrow(TooLarge);
@@ -85,8 +103,17 @@ function layer(key: string, cells = [0, 1]): Layer {
   // Of brick 1, in which (9, 0, 0) and (9, 1, 0) are the places 64 and 72.
   masks[8] = 1;
   masks[9] = 1;
-  return { key, low: [0, 0, 0], dims: [2, 1, 1], cells: Uint8Array.from(cells), bricks: Uint8Array.from([0, 1]), masks, density: Uint16Array.from([7, 0]), sh: Uint8Array.from([1, 128, 2, 128, 3, 128]) };
-} // prettier-ignore
+  return {
+    key,
+    low: [0, 0, 0],
+    dims: [2, 1, 1],
+    cells: Uint8Array.from(cells),
+    bricks: Uint8Array.from([0, 1]),
+    masks,
+    density: Uint16Array.from([7, 0]),
+    sh: Uint8Array.from([1, 128, 2, 128, 3, 128]),
+  };
+}
 
 describe("layers of a field", () => {
   it("are unpacked from their arrays", async () => {
@@ -99,20 +126,42 @@ describe("layers of a field", () => {
       ["sh", "u1", Uint8Array.from([1, 1, 0, 255, 2, 0])],
     ];
     const deflated = async (data: Uint8Array<ArrayBuffer>): Promise<Uint8Array> =>
-      new Uint8Array(await new Response(new Blob([data]).stream().pipeThrough(new CompressionStream("deflate"))).arrayBuffer());
+      new Uint8Array(
+        await new Response(
+          new Blob([data]).stream().pipeThrough(new CompressionStream("deflate")),
+        ).arrayBuffer(),
+      );
     const blobs = await Promise.all(arrays.map(([, , data]) => deflated(data)));
-    const entries = arrays.map(([name, type], n) => ({ name: `layer.0.${name}`, type, shape: [], bytes: blobs[n].length }));
+    const entries = arrays.map(([name, type], n) => ({
+      name: `layer.0.${name}`,
+      type,
+      shape: [],
+      bytes: blobs[n].length,
+    }));
     const text = new TextEncoder().encode(JSON.stringify({ arrays: entries }));
     const start = new Uint8Array(16);
     start.set(new TextEncoder().encode("somefile"));
     new DataView(start.buffer).setUint32(8, 1, true);
     new DataView(start.buffer).setUint32(12, text.length, true);
     const whole = Uint8Array.from([...start, ...text, ...blobs.flatMap((blob) => [...blob])]);
-    const read = await readLayer(await PageFile.open(new ByteReader(whole.buffer), "somefile", 1), "layer.0", "a");
+    const read = await readLayer(
+      await PageFile.open(new ByteReader(whole.buffer), "somefile", 1),
+      "layer.0",
+      "a",
+    );
     expect([read.key, read.low, read.dims]).toEqual(["a", [1, 2, 3], [1, 1, 2]]);
-    expect([[...read.cells], [...read.density], [...read.sh]]).toEqual([[0, 2], [0x301, 0x402], [129, 130, 128, 127, 130, 130]]); // prettier-ignore
+    expect([[...read.cells], [...read.density], [...read.sh]]).toEqual([
+      [0, 2],
+      [0x301, 0x402],
+      [129, 130, 128, 127, 130, 130],
+    ]);
     const stored = new Stored(read, 8, read.low, read.dims);
-    expect([stored.slot(8, 16, 24), stored.slot(8, 16, 25), stored.slot(8, 16, 26), stored.slot(7, 16, 24)]).toEqual([0, 1, -1, -1]);
+    expect([
+      stored.slot(8, 16, 24),
+      stored.slot(8, 16, 25),
+      stored.slot(8, 16, 26),
+      stored.slot(7, 16, 24),
+    ]).toEqual([0, 1, -1, -1]);
   });
 
   it("have their own vertices, and the field's where they have none", () => {
@@ -128,14 +177,24 @@ describe("layers of a field", () => {
 
   it("are found behind the field, the bricks that are as the field's where these are", () => {
     const layout = layoutOf(level(), 256, 3);
-    const entry = (index: Uint8Array, brick: number): number[] => [...index.subarray(4 * brick, 4 * brick + 4)];
+    const entry = (index: Uint8Array, brick: number): number[] => [
+      ...index.subarray(4 * brick, 4 * brick + 4),
+    ];
     const [first, second] = [layer("a"), layer("b", [2, 0])];
     expect([...ownBricks(first, layout)]).toEqual([1]);
     expect([...ownBricks(second, layout)]).toEqual([]);
-    const layers = [{ layer: first, place: 2, first: 0, end: 2 }, { layer: second, place: 4, first: -1, end: 2 }]; // prettier-ignore
+    const layers = [
+      { layer: first, place: 2, first: 0, end: 2 },
+      { layer: second, place: 4, first: -1, end: 2 },
+    ];
     const { dims, index } = indexWith(layout, layers, (each) => (each === first ? [2] : []));
     expect(dims).toEqual([6, 1, 1]);
-    const place = (n: number): number[] => [n % layout.across[0], Math.floor(n / layout.across[0]) % layout.across[1], Math.floor(n / (layout.across[0] * layout.across[1])), 255]; // prettier-ignore
+    const place = (n: number): number[] => [
+      n % layout.across[0],
+      Math.floor(n / layout.across[0]) % layout.across[1],
+      Math.floor(n / (layout.across[0] * layout.across[1])),
+      255,
+    ];
     expect(entry(index, 0)).toEqual(place(0));
     expect(entry(index, 2)).toEqual(place(0));
     expect(entry(index, 3)).toEqual(place(2));
@@ -161,7 +220,18 @@ describe("layers of a field", () => {
 describe("files for pages", () => {
   it("are read however they are cut, and refused where they end early", async () => {
     const text = new TextEncoder().encode('{"arrays":[]}');
-    const bytes = new Uint8Array([...new TextEncoder().encode("somefile"), 1, 0, 0, 0, text.length, 0, 0, 0, ...text]);
+    const bytes = new Uint8Array([
+      ...new TextEncoder().encode("somefile"),
+      1,
+      0,
+      0,
+      0,
+      text.length,
+      0,
+      0,
+      0,
+      ...text,
+    ]);
     const cut = (end: number): ReadableStream<Uint8Array<ArrayBuffer>> =>
       new ReadableStream({
         start(controller): void {
@@ -172,8 +242,12 @@ describe("files for pages", () => {
     const open = (end: number): Promise<unknown> => PageFile.open(new ByteReader(cut(end)), "somefile", 1);
     await expect(open(bytes.length)).resolves.toMatchObject({ left: 0 });
     await expect(open(20)).rejects.toThrow("truncated");
-    await expect(PageFile.open(new ByteReader(cut(29)), "somefile", 2)).rejects.toThrow("of version 1, this page reads 2");
-    await expect(PageFile.open(new ByteReader(cut(29)), "otherone", 1)).rejects.toThrow("not a file of the kind");
+    await expect(PageFile.open(new ByteReader(cut(29)), "somefile", 2)).rejects.toThrow(
+      "of version 1, this page reads 2",
+    );
+    await expect(PageFile.open(new ByteReader(cut(29)), "otherone", 1)).rejects.toThrow(
+      "not a file of the kind",
+    );
   });
 
   it("have differences and split bytes", () => {
@@ -222,7 +296,9 @@ describe("who draws", () => {
     choice.served(10_000, 70, true);
     choice.served(10_000, 1, false);
     expect(choice.serverIsFaster).toBe(false);
-    expect(choice.words).toBe("this page 0.13 million pixels a second, the server 0.14 million pixels a second");
+    expect(choice.words).toBe(
+      "this page 0.13 million pixels a second, the server 0.14 million pixels a second",
+    );
   });
 
   it("draws whole pictures where they take little, and does not change its mind to and fro", () => {
@@ -246,9 +322,14 @@ describe("an occupancy", () => {
   it("changes in a part", () => {
     const before = { origin: [0, 0, 0] as Vec3, dims: [2, 3, 4] as Vec3, codes: new Uint16Array(24) };
     const after = patched(before, [1, 1, 2], [1, 2, 2], Uint16Array.from([1, 2, 3, 4]));
-    expect([...after].flatMap((code, n) => (code ? [[n, code]] : []))).toEqual([[18, 1], [19, 2], [22, 3], [23, 4]]);
+    expect([...after].flatMap((code, n) => (code ? [[n, code]] : []))).toEqual([
+      [18, 1],
+      [19, 2],
+      [22, 3],
+      [23, 4],
+    ]);
     expect(before.codes.some((code) => code > 0)).toBe(false);
-  }); // prettier-ignore
+  });
 });
 
 describe("the viewer's camera", () => {
@@ -277,17 +358,21 @@ describe("the viewer's camera", () => {
   it("goes along a path, round where it is a loop", () => {
     const other = [...start];
     other[3] = 2;
-    const stills = [{ c2w: start, fov_y_deg: 40 }, { c2w: other, fov_y_deg: 50 }];
+    const stills = [
+      { c2w: start, fov_y_deg: 40 },
+      { c2w: other, fov_y_deg: 50 },
+    ];
     const path = { stills, seconds: 4, loop: false };
     expect(viewAt(path, 2)).toMatchObject({ fov_y_deg: 45 });
     expect(viewAt(path, 2).c2w[3]).toBeCloseTo(1);
     expect(viewAt(path, 9).c2w[3]).toBeCloseTo(2);
     expect(viewAt({ ...path, loop: true }, 3).c2w[3]).toBeCloseTo(1);
-  }); // prettier-ignore
+  });
 });
 
 it("a lost context, which knows no limits, is no reason to give up", () => {
-  const gl = (said: number | null): WebGL2RenderingContext => ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
+  const gl = (said: number | null): WebGL2RenderingContext =>
+    ({ getParameter: () => said }) as unknown as WebGL2RenderingContext;
   expect(largest(gl(null), 0)).toBeGreaterThan(4096);
   expect(largest(gl(2048), 0)).toBe(2048);
 });

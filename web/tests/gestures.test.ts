@@ -5,16 +5,24 @@ import { apply, quaternion } from "../src/editing/operations";
 import { box, expectClose } from "./cages";
 
 const frame = new Quaternion().setFromAxisAngle(new Vector3(1, 2, -1).normalize(), 0.8);
-const around = (axis: Vector3, angle: number): Quaternion => new Quaternion().setFromAxisAngle(axis, (angle * Math.PI) / 180);
+const around = (axis: Vector3, angle: number): Quaternion =>
+  new Quaternion().setFromAxisAngle(axis, (angle * Math.PI) / 180);
 
 describe("what the gizmo did, as an operation", () => {
   it("is a translation between two places", () => {
-    expect(translation(new Vector3(1, 1, 1), new Vector3(1.5, 1, 0))).toEqual({ kind: "translate", by: [0.5, 0, -1] });
+    expect(translation(new Vector3(1, 1, 1), new Vector3(1.5, 1, 0))).toEqual({
+      kind: "translate",
+      by: [0.5, 0, -1],
+    });
   });
 
   it.each([30, 120, -150, 180])("is one angle where it was turned about one axis: %d", (angle) => {
     const turned = frame.clone().multiply(around(new Vector3(0, 1, 0), angle));
-    expect(rotation(frame, turned, "cage", "Y")).toEqual({ kind: "rotate", rotation_deg: [0, angle, 0], axes: "cage" });
+    expect(rotation(frame, turned, "cage", "Y")).toEqual({
+      kind: "rotate",
+      rotation_deg: [0, angle, 0],
+      axes: "cage",
+    });
   });
 
   it("is three angles that give the same turn where it was turned freely", () => {
@@ -32,11 +40,19 @@ describe("what the gizmo did, as an operation", () => {
   });
 
   it("keeps factors of a scaling above 0 and within reason", () => {
-    expect(scaling(new Vector3(2, -1, 1e9), "world")).toEqual({ kind: "scale", by: [2, 0.02, 50], axes: "world" });
+    expect(scaling(new Vector3(2, -1, 1e9), "world")).toEqual({
+      kind: "scale",
+      by: [2, 0.02, 50],
+      axes: "world",
+    });
   });
 
   it("moves corners in order", () => {
-    expect(cornersMove([5, 1], new Vector3(0, 0, 1))).toEqual({ kind: "move_corners", corners: [1, 5], by: [0, 0, 1] });
+    expect(cornersMove([5, 1], new Vector3(0, 0, 1))).toEqual({
+      kind: "move_corners",
+      corners: [1, 5],
+      by: [0, 0, 1],
+    });
   });
 });
 
@@ -53,7 +69,8 @@ describe("where the mouse's ray goes", () => {
     const direction = new Vector3(1, 0.5, 0.2);
     const found = onLine(ray, point, direction)!;
     const least = ray.distanceSqToPoint(found);
-    for (const t of [-0.01, 0.01]) expect(ray.distanceSqToPoint(found.clone().addScaledVector(direction, t))).toBeGreaterThan(least);
+    for (const t of [-0.01, 0.01])
+      expect(ray.distanceSqToPoint(found.clone().addScaledVector(direction, t))).toBeGreaterThan(least);
     expect(onLine(ray, point, new Vector3(0, 0, 1))).toBeNull();
   });
 });

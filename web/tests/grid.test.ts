@@ -8,10 +8,25 @@ import { edit } from "./fake_server";
 beforeEach(() => vi.useFakeTimers());
 afterEach(() => vi.useRealTimers());
 
-const LINE: Vec3[][] = [[[0, 0, 0], [1, 0, 0]]]; // prettier-ignore
+const LINE: Vec3[][] = [
+  [
+    [0, 0, 0],
+    [1, 0, 0],
+  ],
+];
 
 function answer(grid: Vec3[][]): Answer {
-  return { type: "answer", request: 1, point: null, normal: null, text: null, grid, stills: [], sources: [], failed: false };
+  return {
+    type: "answer",
+    request: 1,
+    point: null,
+    normal: null,
+    text: null,
+    grid,
+    stills: [],
+    sources: [],
+    failed: false,
+  };
 }
 
 function moved(by: number): ReturnType<typeof cagesOf> {

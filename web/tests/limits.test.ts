@@ -14,7 +14,10 @@ describe("whether a cage contains a point", () => {
     for (let n = 0; n < 200; n++) {
       const local = new Vector3(1.6 * Math.sin(n), 0.8 * Math.sin(2.3 * n), 0.4 * Math.cos(5.1 * n));
       const inside = Math.abs(local.x) <= 1 && Math.abs(local.y) <= 0.5 && Math.abs(local.z) <= 0.25;
-      const point = local.applyQuaternion(turn).add(new Vector3(1, 2, 3)).toArray();
+      const point = local
+        .applyQuaternion(turn)
+        .add(new Vector3(1, 2, 3))
+        .toArray();
       expect(contains(cage, point)).toBe(inside);
     }
   });
@@ -47,7 +50,10 @@ describe("how far a drag may go", () => {
   });
 
   it("is guessed from what the server let through", () => {
-    const last = { operation: { kind: "translate" as const, by: [1, 0, 0] as [number, number, number] }, part: 0.5 };
+    const last = {
+      operation: { kind: "translate" as const, by: [1, 0, 0] as [number, number, number] },
+      part: 0.5,
+    };
     expect(expectedPart({ kind: "translate", by: [2, 0, 0] }, last)).toBeCloseTo(0.25, 12);
     expect(expectedPart({ kind: "translate", by: [0.4, 0, 0] }, last)).toBe(1);
     expect(expectedPart({ kind: "rotate", rotation_deg: [0, 0, 9] }, last)).toBe(1);

@@ -1,6 +1,16 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { amount, apply, degrees, described, lengthStep, part, quaternion, snapped, type Operation } from "../src/editing/operations";
+import {
+  amount,
+  apply,
+  degrees,
+  described,
+  lengthStep,
+  part,
+  quaternion,
+  snapped,
+  type Operation,
+} from "../src/editing/operations";
 import { box, expectClose } from "./cages";
 
 const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), Math.PI / 6);
@@ -10,7 +20,12 @@ describe("operations on a cage", () => {
   it("translate it with its pivot", () => {
     const after = apply({ kind: "translate", by: [1, 2, 3] }, cage);
     expectClose(after.pivot, [2, 2, 3]);
-    after.corners.forEach((c, k) => expectClose(c, cage.corners[k].map((x, i) => x + i + 1)));
+    after.corners.forEach((c, k) =>
+      expectClose(
+        c,
+        cage.corners[k].map((x, i) => x + i + 1),
+      ),
+    );
   });
 
   it("turn it right-handed about its pivot, intrinsic XYZ", () => {
@@ -37,12 +52,16 @@ describe("operations on a cage", () => {
     const own = apply({ kind: "scale", by: [2, 1, 1], axes: "cage" }, cage);
     expectClose(own.corners[1], box([1, 0, 0], [4, 1, 1], turn)[1]);
     const world = apply({ kind: "scale", by: [2, 1, 1], axes: "world" }, cage);
-    world.corners.forEach((c, k) => expectClose(c, [1 + 2 * (cage.corners[k][0] - 1), cage.corners[k][1], cage.corners[k][2]]));
+    world.corners.forEach((c, k) =>
+      expectClose(c, [1 + 2 * (cage.corners[k][0] - 1), cage.corners[k][1], cage.corners[k][2]]),
+    );
   });
 
   it("shear it about its pivot", () => {
     const after = apply({ kind: "shear", xy: 0.5 }, cage);
-    after.corners.forEach((c, k) => expectClose(c, [cage.corners[k][0] + 0.5 * cage.corners[k][1], cage.corners[k][1], cage.corners[k][2]]));
+    after.corners.forEach((c, k) =>
+      expectClose(c, [cage.corners[k][0] + 0.5 * cage.corners[k][1], cage.corners[k][1], cage.corners[k][2]]),
+    );
   });
 
   it("move some corners and leave the pivot", () => {
@@ -63,23 +82,34 @@ describe("a share of an operation", () => {
   ];
   it.each(all)("$kind: nothing at 0, all of it at 1, half the amount at a half", (operation) => {
     expect(amount(part(operation, 0))).toBeCloseTo(0, 6);
-    apply(part(operation, 1), cage).corners.forEach((c, k) => expectClose(c, apply(operation, cage).corners[k]));
+    apply(part(operation, 1), cage).corners.forEach((c, k) =>
+      expectClose(c, apply(operation, cage).corners[k]),
+    );
     expect(amount(part(operation, 0.5))).toBeCloseTo(0.5 * amount(operation), 6);
   });
 
   it("of a rotation, done twice, is the rotation", () => {
     const half = part({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, 0.5);
     const twice = apply(half, apply(half, cage)).corners;
-    twice.forEach((c, k) => expectClose(c, apply({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, cage).corners[k]));
+    twice.forEach((c, k) =>
+      expectClose(c, apply({ kind: "rotate", rotation_deg: [20, 50, -70], axes: "world" }, cage).corners[k]),
+    );
   });
 });
 
 describe("numbers", () => {
   it("snap to whole steps", () => {
     const steps = { length: 0.1, angle: 15, factor: 0.25 };
-    expect(snapped({ kind: "translate", by: [0.26, -0.04, 1] }, steps)).toEqual({ kind: "translate", by: [0.3, 0, 1] });
-    expect(snapped({ kind: "rotate", rotation_deg: [0, 22, 0], axes: "world" }, steps)).toMatchObject({ rotation_deg: [0, 15, 0] });
-    expect(snapped({ kind: "scale", by: [0.01, 1.2, 1], axes: "cage" }, steps)).toMatchObject({ by: [0.25, 1.25, 1] });
+    expect(snapped({ kind: "translate", by: [0.26, -0.04, 1] }, steps)).toEqual({
+      kind: "translate",
+      by: [0.3, 0, 1],
+    });
+    expect(snapped({ kind: "rotate", rotation_deg: [0, 22, 0], axes: "world" }, steps)).toMatchObject({
+      rotation_deg: [0, 15, 0],
+    });
+    expect(snapped({ kind: "scale", by: [0.01, 1.2, 1], axes: "cage" }, steps)).toMatchObject({
+      by: [0.25, 1.25, 1],
+    });
   });
 
   it("has a step of round length for cages of every size", () => {

@@ -3,7 +3,18 @@ import { Connection, socketAddress, type Handlers, type Socket } from "../src/ne
 import { HELD, bindings, named } from "../src/editing/keys";
 import { Latency } from "../src/frames/latency";
 import { cageOverlay } from "../src/editing/cage_overlay";
-import { LOOKING, START, Store, awaited, fillable, maySay, obstacle, relightable, selected, target } from "../src/app/store";
+import {
+  LOOKING,
+  START,
+  Store,
+  awaited,
+  fillable,
+  maySay,
+  obstacle,
+  relightable,
+  selected,
+  target,
+} from "../src/app/store";
 import { Actions } from "../src/editing/actions";
 import type { App } from "../src/app/app";
 import type { Pointer } from "../src/editing/pointer";
@@ -17,10 +28,23 @@ describe("the connection", () => {
   it("opens again, ever more patiently, and at once after it had been open", () => {
     const sockets: (Socket & { sent: string[] })[] = [];
     const waits: number[] = [];
-    const handlers: Handlers = { opened: vi.fn(), lost: (wait) => waits.push(wait), message: vi.fn(), binary: vi.fn() };
+    const handlers: Handlers = {
+      opened: vi.fn(),
+      lost: (wait) => waits.push(wait),
+      message: vi.fn(),
+      binary: vi.fn(),
+    };
     const connection = new Connection(() => {
       const sent: string[] = [];
-      const socket = { binaryType: "blob" as BinaryType, readyState: 1, onopen: null, onclose: null, onmessage: null, sent, send: (text: string) => void sent.push(text) };
+      const socket = {
+        binaryType: "blob" as BinaryType,
+        readyState: 1,
+        onopen: null,
+        onclose: null,
+        onmessage: null,
+        sent,
+        send: (text: string) => void sent.push(text),
+      };
       sockets.push(socket);
       return socket;
     }, handlers);
@@ -64,7 +88,9 @@ describe("the store", () => {
     expect(selected(now)?.id).toBe(1);
     expect(target(now)).toBe("field");
     expect(target({ ...now, mode: "set", cage: "both" })).toBe("both");
-    expect(target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) })).toBe("inner");
+    expect(
+      target({ ...now, mode: "set", cage: "outer", state: state({ edits: [edit({ outer: null })] }) }),
+    ).toBe("inner");
   });
 
   it("says what whole pictures wait for", () => {
@@ -74,9 +100,15 @@ describe("the store", () => {
     const plain = state({ edits: [edit({ fill: "none", relight: "none" })] });
     expect(awaited({ ...START, preparing, state: filled })).toContain("Preparing the renderer 1/4");
     expect(awaited({ ...START, preparing, state: filled, figures: quick })).toContain("Working out");
-    expect(awaited({ ...START, preparing, state: plain, figures: quick })).toContain("Preparing the renderer 1/4");
-    expect(awaited({ ...START, preparing, state: filled, figures: { ...quick, final: true } })).toContain("Preparing");
-    expect(awaited({ ...START, preparing: { ...preparing, done: 4 }, state: filled, figures: quick })).toBeNull();
+    expect(awaited({ ...START, preparing, state: plain, figures: quick })).toContain(
+      "Preparing the renderer 1/4",
+    );
+    expect(awaited({ ...START, preparing, state: filled, figures: { ...quick, final: true } })).toContain(
+      "Preparing",
+    );
+    expect(
+      awaited({ ...START, preparing: { ...preparing, done: 4 }, state: filled, figures: quick }),
+    ).toBeNull();
     expect(awaited(START)).toBeNull();
   });
 
@@ -86,8 +118,17 @@ describe("the store", () => {
       const now = { ...START, hello, state: state({ edits: [edit({ kind })] }) };
       return [fillable(now), relightable(now)];
     });
-    expect(kinds).toEqual([[false, true], [true, true], [false, true], [true, true]]);
-    const splats = { ...START, hello: { splats: true } as Hello, state: state({ edits: [edit({ kind: "delete" })] }) };
+    expect(kinds).toEqual([
+      [false, true],
+      [true, true],
+      [false, true],
+      [true, true],
+    ]);
+    const splats = {
+      ...START,
+      hello: { splats: true } as Hello,
+      state: state({ edits: [edit({ kind: "delete" })] }),
+    };
     expect([fillable(splats), relightable(splats)]).toEqual([true, true]);
     expect([fillable(START), relightable(START)]).toEqual([false, false]);
   });
@@ -121,7 +162,9 @@ describe("what is drawn", () => {
 
   it("is where the inner cage was, too, once it has moved; and both cages' handles in Set mode", () => {
     const moved = edit({ deformed: edit().inner.map(([x, y, z]) => [x + 0.1, y, z]) as never });
-    expect(cageOverlay({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(36);
+    expect(cageOverlay({ ...START, state: state({ edits: [moved] }) }, null, [], eye).segments).toHaveLength(
+      36,
+    );
     expect(cageOverlay({ ...START, state: state(), mode: "set" }, null, [], eye).dots).toHaveLength(18);
   });
 
@@ -130,22 +173,49 @@ describe("what is drawn", () => {
     const { segments } = cageOverlay({ ...START, state: state({ edits }) }, null, [], eye);
     expect(segments).toHaveLength(48);
     expect(segments.filter(({ colour }) => colour.r > 0.99 && colour.g < 0.01)).toHaveLength(24);
-    expect(cageOverlay({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments).toHaveLength(0);
+    expect(
+      cageOverlay({ ...START, state: state({ edits }), cages: false }, null, [], eye).segments,
+    ).toHaveLength(0);
     const preview: Preview = { type: "preview", page: 1, play: 1, on: true };
-    expect(cageOverlay({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(0);
+    expect(cageOverlay({ ...START, state: state({ edits }), preview }, null, [], eye).segments).toHaveLength(
+      0,
+    );
   });
 
   it("has no handles where the edit is locked", () => {
-    expect(cageOverlay({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots).toHaveLength(0);
+    expect(
+      cageOverlay({ ...START, state: state({ edits: [edit({ locked: true })] }) }, null, [], eye).dots,
+    ).toHaveLength(0);
   });
 });
 
 describe("keys", () => {
   const nobody: unknown = {};
   it("each mean one thing, and all that the editor needs is there", () => {
-    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, { saveAs: vi.fn(), paste: vi.fn() }).flatMap((binding) => binding.keys);
+    const all = bindings(nobody as App, nobody as Actions, nobody as Pointer, {
+      saveAs: vi.fn(),
+      paste: vi.fn(),
+    }).flatMap((binding) => binding.keys);
     expect(new Set(all).size).toBe(all.length);
-    for (const key of ["1", "2", "3", "G", "R", "S", "F", "H", "D", "Tab", "Delete", "Escape", "Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+S", "Ctrl+C", "?"]) {
+    for (const key of [
+      "1",
+      "2",
+      "3",
+      "G",
+      "R",
+      "S",
+      "F",
+      "H",
+      "D",
+      "Tab",
+      "Delete",
+      "Escape",
+      "Ctrl+Z",
+      "Ctrl+Shift+Z",
+      "Ctrl+S",
+      "Ctrl+C",
+      "?",
+    ]) {
       expect(all).toContain(key);
     }
     for (const { keys } of HELD) for (const key of keys) expect(all).not.toContain(key);
@@ -154,7 +224,10 @@ describe("keys", () => {
   it("switch what is filled, and whether shadows go along, where there is such a thing", () => {
     const store = new Store();
     const app = { store, send: vi.fn(), say: vi.fn() };
-    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, { saveAs: vi.fn(), paste: vi.fn() });
+    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, {
+      saveAs: vi.fn(),
+      paste: vi.fn(),
+    });
     const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
     store.set({ state: state({ edits: [edit({ kind: "move" })] }) });
     press("U");
@@ -174,7 +247,12 @@ describe("keys", () => {
     const store = new Store({ state: state({ edits: [edit({ kind: "copy", source: "/root/chair" })] }) });
     const app = { store, send: vi.fn(), say: vi.fn() };
     const questions = { saveAs: vi.fn(), paste: vi.fn() };
-    const all = bindings(app as unknown as App, new Actions(app as unknown as App), nobody as Pointer, questions);
+    const all = bindings(
+      app as unknown as App,
+      new Actions(app as unknown as App),
+      nobody as Pointer,
+      questions,
+    );
     const press = (key: string): void => all.find(({ keys }) => keys.includes(key))!.run();
     press("Shift+V");
     expect(questions.paste).toHaveBeenCalledOnce();
@@ -184,7 +262,8 @@ describe("keys", () => {
   });
 
   it("are named as they are shown", () => {
-    const key = (name: string, control = false, shift = false): string => named({ key: name, ctrlKey: control, metaKey: false, shiftKey: shift });
+    const key = (name: string, control = false, shift = false): string =>
+      named({ key: name, ctrlKey: control, metaKey: false, shiftKey: shift });
     expect(key("z", true)).toBe("Ctrl+Z");
     expect(key("Z", true, true)).toBe("Ctrl+Shift+Z");
     expect(key("?", false, true)).toBe("?");
@@ -199,17 +278,38 @@ describe("latency", () => {
     latency.moved(1, 1, 100);
     latency.moved(1, 2, 110);
     latency.framed(116);
-    const picture = { time: 180, drag: 1, seq: 2, camera: 1, revision: 1, width: 100, fullWidth: 100, final: false };
+    const picture = {
+      time: 180,
+      drag: 1,
+      seq: 2,
+      camera: 1,
+      revision: 1,
+      width: 100,
+      fullWidth: 100,
+      final: false,
+    };
     latency.shown(picture, 150, 160, 20, 2);
     latency.shown({ ...picture, time: 999 }, 150, 160, 20, 2);
     expect(latency.moves[0]).toMatchObject({ lines: 116, presented: null });
-    expect(latency.moves[1]).toMatchObject({ lines: 116, received: 150, decoded: 160, presented: 180, renderMs: 20 });
+    expect(latency.moves[1]).toMatchObject({
+      lines: 116,
+      received: 150,
+      decoded: 160,
+      presented: 180,
+      renderMs: 20,
+    });
   });
 
   it("counts pictures a second", () => {
     const latency = new Latency();
     for (let time = 0; time <= 1000; time += 100) {
-      latency.shown({ time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, final: false }, 0, 0, 0, 0);
+      latency.shown(
+        { time, drag: 0, seq: 0, camera: 1, revision: 1, width: 1, fullWidth: 1, final: false },
+        0,
+        0,
+        0,
+        0,
+      );
     }
     expect(latency.perSecond(1000)).toBeCloseTo(10, 6);
     expect(latency.perSecond(5000)).toBe(0);

@@ -4,10 +4,31 @@ import type { PictureHeader } from "../src/net/protocol";
 import { headed, pack, unpack } from "../src/frames/picture_message";
 
 const HEADER: PictureHeader = {
-  type: "picture", picture: 7, camera: 3, drag: 0, seq: 0, revision: 1, view: "colour", before: false, split: null,
-  x: 0, y: 0, width: 4, height: 2, full_width: 4, full_height: 2, final: false,
-  format: "jpeg", picture_bytes: 3, depth_bytes: 16, depth_width: 4, depth_height: 2, depth_scale: 0.5, render_ms: 1, encode_ms: 1,
-}; // prettier-ignore
+  type: "picture",
+  picture: 7,
+  camera: 3,
+  drag: 0,
+  seq: 0,
+  revision: 1,
+  view: "colour",
+  before: false,
+  split: null,
+  x: 0,
+  y: 0,
+  width: 4,
+  height: 2,
+  full_width: 4,
+  full_height: 2,
+  final: false,
+  format: "jpeg",
+  picture_bytes: 3,
+  depth_bytes: 16,
+  depth_width: 4,
+  depth_height: 2,
+  depth_scale: 0.5,
+  render_ms: 1,
+  encode_ms: 1,
+};
 
 describe("a binary message", () => {
   it("comes apart into what it was made of", () => {
@@ -33,7 +54,17 @@ describe("the distances of a picture", () => {
   it("keep what was there where only a finer tile came", () => {
     const image = new DepthImage();
     image.put(HEADER, new Uint16Array([2, 2, 2, 2, 2, 2, 2, 2]));
-    const tile = { ...HEADER, x: 4, y: 2, width: 4, height: 2, full_width: 8, full_height: 4, depth_width: 4, depth_height: 2 };
+    const tile = {
+      ...HEADER,
+      x: 4,
+      y: 2,
+      width: 4,
+      height: 2,
+      full_width: 8,
+      full_height: 4,
+      depth_width: 4,
+      depth_height: 2,
+    };
     image.put(tile, new Uint16Array(8).fill(20));
     expect([image.width, image.height]).toEqual([8, 4]);
     expect(image.at(0.9, 0.9)).toBeCloseTo(10, 6);
@@ -43,7 +74,16 @@ describe("the distances of a picture", () => {
 
   it("take a part whose depth is coarser than its picture", () => {
     const image = new DepthImage();
-    const part = { ...HEADER, width: 8, height: 8, full_width: 16, full_height: 8, x: 8, depth_width: 2, depth_height: 2 };
+    const part = {
+      ...HEADER,
+      width: 8,
+      height: 8,
+      full_width: 16,
+      full_height: 8,
+      x: 8,
+      depth_width: 2,
+      depth_height: 2,
+    };
     image.put(part, new Uint16Array([2, 4, 6, 8]));
     expect([image.width, image.height]).toEqual([4, 2]);
     expect(image.at(0.99, 0.99)).toBeCloseTo(4, 6);

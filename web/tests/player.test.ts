@@ -41,7 +41,11 @@ describe("the camera path", () => {
 
 /** A page with a clock, whose server answers with STILLS. */
 class FakePage implements Playable {
-  readonly store = new Store({ hello: { page: 3 } as Hello, state: state({ keys: KEYS }), connection: "open" });
+  readonly store = new Store({
+    hello: { page: 3 } as Hello,
+    state: state({ keys: KEYS }),
+    connection: "open",
+  });
   readonly sent: PageMessage[] = [];
   readonly poses: number[][] = [];
   readonly changes: boolean[] = [];
@@ -130,7 +134,10 @@ describe("the player", () => {
   });
 
   it("stops when the user takes the view, and when the server is gone", async () => {
-    for (const leave of [(page: FakePage) => page.viewport.taken[0](), (page: FakePage) => page.store.set({ connection: "lost" })]) {
+    for (const leave of [
+      (page: FakePage) => page.viewport.taken[0](),
+      (page: FakePage) => page.store.set({ connection: "lost" }),
+    ]) {
       const page = new FakePage();
       await page.begin();
       page.frame(0);

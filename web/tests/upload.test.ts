@@ -8,16 +8,24 @@ import { state } from "./fake_server";
 /** A request that a test answers. */
 function fakeRequest(): Request & { sent: unknown[]; address: string } {
   const request = {
-    status: 0, responseText: "", onload: null, onerror: null, upload: { onprogress: null }, sent: [] as unknown[], address: "",
+    status: 0,
+    responseText: "",
+    onload: null,
+    onerror: null,
+    upload: { onprogress: null },
+    sent: [] as unknown[],
+    address: "",
     open: (method: string, address: string) => void (request.address = `${method} ${address}`),
     send: (body: unknown) => void request.sent.push(body),
-  }; // prettier-ignore
+  };
   return request;
 }
 
 describe("files of splats", () => {
   it("are known by their names", () => {
-    expect(["a.PLY", "b.compressed.ply", "c.spz", "d.sog", "e.splat", "f.ksplat", "g.glb"].every(isSplats)).toBe(true);
+    expect(
+      ["a.PLY", "b.compressed.ply", "c.spz", "d.sog", "e.splat", "f.ksplat", "g.glb"].every(isSplats),
+    ).toBe(true);
     expect(["edits.yaml", "ply", "a.plyx", "camera_path.json"].some(isSplats)).toBe(false);
   });
 
@@ -33,7 +41,10 @@ describe("files of splats", () => {
     const answer = send(request, file, "http://host/open?name=a.ply", (share) => shares.push(share));
     expect(request.address).toBe("POST http://host/open?name=a.ply");
     expect(request.sent).toEqual([file]);
-    const progress = request.upload.onprogress as unknown as (event: { loaded: number; total: number }) => void;
+    const progress = request.upload.onprogress as unknown as (event: {
+      loaded: number;
+      total: number;
+    }) => void;
     progress({ loaded: 1, total: 4 });
     progress({ loaded: 4, total: 4 });
     expect(shares).toEqual([0.25, 1]);
@@ -55,7 +66,10 @@ describe("saving", () => {
 
   it("asks for a folder where a file was opened, and does not where a scene was", () => {
     const sent: unknown[] = [];
-    const app = { store: new Store({ state: state({ is_file: true }) }), send: (message: unknown) => sent.push(message) };
+    const app = {
+      store: new Store({ state: state({ is_file: true }) }),
+      send: (message: unknown) => sent.push(message),
+    };
     const whereTo = vi.fn();
     const actions = new Actions(app as unknown as App, whereTo);
     actions.save();

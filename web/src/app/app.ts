@@ -18,10 +18,36 @@ import { Viewport } from "../frames/viewport";
 import { LOOKING, Store, maySay, obstacle, selected, showsCages, target } from "./store";
 import { headed } from "../frames/picture_message";
 import type { Operation } from "../editing/operations";
-import type { Answer, Ask, EditState, Hello, Job, PageMessage, Preview, ServerMessage, State, Vec3 } from "../net/protocol";
+import type {
+  Answer,
+  Ask,
+  EditState,
+  Hello,
+  Job,
+  PageMessage,
+  Preview,
+  ServerMessage,
+  State,
+  Vec3,
+} from "../net/protocol";
 
 /** What of the page's state shows in the canvas. */
-const DRAWN = ["state", "mode", "tool", "axes", "cage", "corners", "hover", "cages", "grid", "view", "before", "split", "connection", "preview"] as const;
+const DRAWN = [
+  "state",
+  "mode",
+  "tool",
+  "axes",
+  "cage",
+  "corners",
+  "hover",
+  "cages",
+  "grid",
+  "view",
+  "before",
+  "split",
+  "connection",
+  "preview",
+] as const;
 
 export class App {
   readonly store = new Store(recallTools());
@@ -48,7 +74,10 @@ export class App {
     this.handles = new Handles(this.viewport);
     this.gizmo = new Gizmo(this.viewport.scene, this.viewport.camera);
     this.camera = new CameraFeed(this.viewport, (message) => this.send(message));
-    this.grid = new Grid((edit) => this.ask({ what: "grid", edit }), () => this.viewport.invalidate());
+    this.grid = new Grid(
+      (edit) => this.ask({ what: "grid", edit }),
+      () => this.viewport.invalidate(),
+    );
     this.player = new Player(this);
     this.presenter = new Presenter(this);
     this.page = new PageRenderer(this);
@@ -56,7 +85,8 @@ export class App {
     this.viewport.beforeFrame.push(() => this.arrange());
     this.viewport.beforeFrame.push(() => this.presenter.askForMore());
     this.store.listen((now, before) => {
-      if (now.view !== before.view || now.before !== before.before || now.split !== before.split) this.sendLook();
+      if (now.view !== before.view || now.before !== before.before || now.split !== before.split)
+        this.sendLook();
       if (DRAWN.some((key) => now[key] !== before[key])) this.viewport.invalidate();
     });
     this.connection = new Connection(() => new WebSocket(socketAddress(location)), {
@@ -147,7 +177,12 @@ export class App {
     const { segments, dots } = cageOverlay(now, this.drag, grid, eye);
     this.lines.set(segments);
     this.handles.set(dots);
-    if (edit === null || !showsCages(now) || obstacle(now, edit) !== null || (now.tool === "select" && now.corners.length === 0)) {
+    if (
+      edit === null ||
+      !showsCages(now) ||
+      obstacle(now, edit) !== null ||
+      (now.tool === "select" && now.corners.length === 0)
+    ) {
       this.gizmo.hide();
       return;
     }

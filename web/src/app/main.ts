@@ -42,7 +42,14 @@ const controls = h(
 );
 const panel = h("aside", { class: "panel" }, controls);
 view.append(overlay(app, pointer));
-root.append(topbar(app, actions, questions), toolbar(app, actions), panel, status(app), help(app, keys), questions.element);
+root.append(
+  topbar(app, actions, questions),
+  toolbar(app, actions),
+  panel,
+  status(app),
+  help(app, keys),
+  questions.element,
+);
 app.store.watch(["hello"], (now) => {
   controls.disabled = looking(now);
   root.classList.toggle("looking", looking(now));

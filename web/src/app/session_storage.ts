@@ -7,7 +7,7 @@ const KEPT = ["mode", "tool", "axes", "cage", "view", "grid", "panel"] as const;
 
 /** The tools as they were; nothing at the first visit. */
 export function recallTools(): Partial<Editor> {
-  return (read(TOOLS) ?? {});
+  return read(TOOLS) ?? {};
 }
 
 /** The camera-to-world pose as it was, row by row; null at the first visit. */

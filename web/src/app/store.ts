@@ -1,7 +1,18 @@
 /** What the page knows and shows; views listen, one change at a time. */
 import type { Part } from "../editing/cage";
 import type { Axes } from "../editing/operations";
-import type { Drawing, EditState, Hello, Job, DisplayMessage, Notice, PageMessage, Preparing, Preview, State } from "../net/protocol";
+import type {
+  Drawing,
+  EditState,
+  Hello,
+  Job,
+  DisplayMessage,
+  Notice,
+  PageMessage,
+  Preparing,
+  Preview,
+  State,
+} from "../net/protocol";
 
 export type Tool = "select" | "translate" | "rotate" | "scale";
 export type View = NonNullable<DisplayMessage["view"]>;
@@ -167,7 +178,8 @@ export function obstacle(editor: Editor, edit: EditState): string | null {
   if (looking(editor)) return LOOKING;
   if (edit.locked) return `“${edit.name}” is locked`;
   if (!edit.enabled) return `“${edit.name}” is hidden; show it (H) to move it`;
-  if (mode === "edit" && edit.kind === "delete") return "a delete has nothing to move; choose another kind, or Set mode (Tab)";
+  if (mode === "edit" && edit.kind === "delete")
+    return "a delete has nothing to move; choose another kind, or Set mode (Tab)";
   return null;
 }
 
@@ -179,7 +191,8 @@ export function relightable(editor: Editor): boolean {
 /** What the renderer still does before whole pictures come as they will, in words; null once they do. */
 export function awaited({ preparing, figures, state }: Editor): string | null {
   if (preparing === null || preparing.done >= preparing.of) return null;
-  const patched = state?.edits.some((edit) => edit.enabled && (edit.fill !== "none" || edit.relight !== "none")) ?? false;
+  const patched =
+    state?.edits.some((edit) => edit.enabled && (edit.fill !== "none" || edit.relight !== "none")) ?? false;
   if (patched && figures.width > 0 && !figures.final) return "Working out what is filled, and the light";
   return `Preparing the renderer ${preparing.done + 1}/${preparing.of} – a machine's first run only`;
 }

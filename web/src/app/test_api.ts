@@ -26,13 +26,24 @@ export interface TestApi {
   };
   readonly camera: { c2w: number[]; seq: number };
   /** The drag that goes on: what the cages follow of it, and why not all. */
-  readonly drag: { id: number; seq: number; ended: boolean; why: string | null; followed: Operation | null } | null;
+  readonly drag: {
+    id: number;
+    seq: number;
+    ended: boolean;
+    why: string | null;
+    followed: Operation | null;
+  } | null;
   /** Whether the last picture is final and shows what is to be seen: the camera, the view, the edits, no drag, no preview. */
   readonly settled: boolean;
   /** Milliseconds since a picture or a state came. */
   readonly quiet: number;
   /** A part of a cage, as it is shown, in CSS pixels of the window. */
-  screen(edit: number, kind: Part["kind"], index: number, cage?: "inner" | "deformed" | "outer"): { x: number; y: number };
+  screen(
+    edit: number,
+    kind: Part["kind"],
+    index: number,
+    cage?: "inner" | "deformed" | "outer",
+  ): { x: number; y: number };
   /** Where to take hold of the gizmo's handle ("X", "XY", "XYZ", ...), in CSS pixels of the window. */
   grip(axis: string): { x: number; y: number } | null;
   /** A point of space in CSS pixels of the window. */
@@ -63,7 +74,15 @@ export function testApi(app: App): TestApi {
     latency: app.presenter.latency,
     get page() {
       const { drawn, why, draws, here, scene, drawer, choice } = app.page;
-      return { drawn, why, draws, here, loads: scene.loads, uploaded: { ...drawer.uploaded }, rates: choice.words };
+      return {
+        drawn,
+        why,
+        draws,
+        here,
+        loads: scene.loads,
+        uploaded: { ...drawer.uploaded },
+        rates: choice.words,
+      };
     },
     get camera() {
       return { c2w: viewport.c2w, seq: app.camera.seq };
@@ -76,9 +95,13 @@ export function testApi(app: App): TestApi {
     get settled() {
       const picture = app.presenter.last;
       const { state, view, before, split, preview } = app.store.now;
-      if (app.drag !== null || preview !== null || picture === null || state === null || !app.camera.resting) return false;
-      const seen = picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
-      return picture.final && seen && picture.view === view && picture.before === before && picture.split === split;
+      if (app.drag !== null || preview !== null || picture === null || state === null || !app.camera.resting)
+        return false;
+      const seen =
+        picture.camera === app.camera.seq && picture.revision >= state.pictured && picture.drag === 0;
+      return (
+        picture.final && seen && picture.view === view && picture.before === before && picture.split === split
+      );
     },
     get quiet() {
       return performance.now() - app.presenter.news;
@@ -93,7 +116,10 @@ export function testApi(app: App): TestApi {
     grip(axis) {
       app.arrange();
       const { width, height } = viewport.points;
-      const pixel = (at: { x: number; y: number }): [number, number] => [(0.5 + 0.5 * at.x) * width, (0.5 - 0.5 * at.y) * height];
+      const pixel = (at: { x: number; y: number }): [number, number] => [
+        (0.5 + 0.5 * at.x) * width,
+        (0.5 - 0.5 * at.y) * height,
+      ];
       const edit = selected(app.store.now);
       const cages = edit === null ? [] : draggable(app.store.now, app.shown(edit));
       const slack = { x: 4 / width, y: 4 / height };

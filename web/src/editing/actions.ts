@@ -4,7 +4,16 @@ import { leading } from "./drag";
 import type { App } from "../app/app";
 import type { Command, EditState, Mirror, Place, Vec3 } from "../net/protocol";
 import { isSplats, openAddress, send } from "../net/upload";
-import { fillable, relightable, selected, target, type CageName, type Editor, type Tool, type View } from "../app/store";
+import {
+  fillable,
+  relightable,
+  selected,
+  target,
+  type CageName,
+  type Editor,
+  type Tool,
+  type View,
+} from "../app/store";
 
 const VIEWS: View[] = ["colour", "depth", "opacity", "normals"];
 const CAGES: CageName[] = ["inner", "outer", "both"];
@@ -88,7 +97,8 @@ export class Actions {
   /** Continuous to move, and all discrete kinds back to continuous. */
   toggleKind(): void {
     this.withSelected((edit) => {
-      if (edit.source !== null) return this.app.say("what is pasted stays a copy; remove it to take it away", "warning");
+      if (edit.source !== null)
+        return this.app.say("what is pasted stays a copy; remove it to take it away", "warning");
       const kind = edit.kind === "continuous" ? "move" : "continuous";
       this.app.send({ type: "change", edit: edit.id, kind });
     });
@@ -97,16 +107,28 @@ export class Actions {
   /** Fills what a move or a delete uncovers, or leaves it. */
   toggleFill(): void {
     this.withSelected((edit) => {
-      if (!fillable(this.app.store.now)) this.app.say("only a move or a delete uncovers something to fill", "warning");
-      else this.app.send({ type: "change", edit: edit.id, fill: edit.fill === "none" ? "surroundings" : "none" });
+      if (!fillable(this.app.store.now))
+        this.app.say("only a move or a delete uncovers something to fill", "warning");
+      else
+        this.app.send({
+          type: "change",
+          edit: edit.id,
+          fill: edit.fill === "none" ? "surroundings" : "none",
+        });
     });
   }
 
   /** Lets shadows go along with an edit, or stay. */
   toggleShadows(): void {
     this.withSelected((edit) => {
-      if (!relightable(this.app.store.now)) this.app.say("choose an edit first: its shadows go along, or stay", "warning");
-      else this.app.send({ type: "change", edit: edit.id, relight: edit.relight === "none" ? "occlusion" : "none" });
+      if (!relightable(this.app.store.now))
+        this.app.say("choose an edit first: its shadows go along, or stay", "warning");
+      else
+        this.app.send({
+          type: "change",
+          edit: edit.id,
+          relight: edit.relight === "none" ? "occlusion" : "none",
+        });
     });
   }
 

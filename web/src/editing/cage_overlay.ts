@@ -62,7 +62,14 @@ export function cageOverlay(editor: Editor, drag: Drag | null, grid: Vec3[][], e
   return out;
 }
 
-function chosenEdit(out: CageOverlay, editor: Editor, edit: EditState, cages: Cages, grid: Vec3[][], eye: Vec3): void {
+function chosenEdit(
+  out: CageOverlay,
+  editor: Editor,
+  edit: EditState,
+  cages: Cages,
+  grid: Vec3[][],
+  eye: Vec3,
+): void {
   const tint = colour(edit.colour);
   const setting = editor.mode === "set";
   const dim = edit.enabled ? 1 : 0.4;
@@ -93,8 +100,13 @@ function polyline(out: CageOverlay, points: Vec3[], tint: Color, stroke: Stroke)
 
 function segment(out: CageOverlay, from: Vec3, to: Vec3, tint: Color, stroke: Stroke, dim = 1): void {
   out.segments.push({
-    from, to, colour: tint, width: stroke.width, alpha: stroke.alpha * dim, hidden: stroke.hidden * dim,
-  }); // prettier-ignore
+    from,
+    to,
+    colour: tint,
+    width: stroke.width,
+    alpha: stroke.alpha * dim,
+    hidden: stroke.hidden * dim,
+  });
 }
 
 function highlight(out: CageOverlay, corners: Corners, part: Part): void {
@@ -106,19 +118,35 @@ function highlight(out: CageOverlay, corners: Corners, part: Part): void {
 }
 
 function dots(
-  out: CageOverlay, corners: Corners, tint: Color, hover: Part | null, chosen: number[], main: boolean, eye: Vec3,
-): void { // prettier-ignore
+  out: CageOverlay,
+  corners: Corners,
+  tint: Color,
+  hover: Part | null,
+  chosen: number[],
+  main: boolean,
+  eye: Vec3,
+): void {
   const size = main ? 9 : 7;
   facesTowards(corners, eye).forEach((at, index) => {
     if (at === null) return;
     const over = hover?.kind === "face" && hover.index === index;
-    out.dots.push({ at, colour: over ? WHITE : tint, size: over ? 12 : size - 1, shape: "square", filled: over });
+    out.dots.push({
+      at,
+      colour: over ? WHITE : tint,
+      size: over ? 12 : size - 1,
+      shape: "square",
+      filled: over,
+    });
   });
   corners.forEach((at, index) => {
     const over = hover?.kind === "corner" && hover.index === index;
     const taken = chosen.includes(index);
     out.dots.push({
-      at, colour: over || taken ? WHITE : tint, size: over ? 14 : taken ? 12 : size, shape: "round", filled: !taken || over,
-    }); // prettier-ignore
+      at,
+      colour: over || taken ? WHITE : tint,
+      size: over ? 14 : taken ? 12 : size,
+      shape: "round",
+      filled: !taken || over,
+    });
   });
 }

@@ -153,6 +153,9 @@ export class Drag {
   /** The inner cage after a drag in Set mode; the deformed one with it, as long as nothing tells them apart. */
   private innerAfter(operation: Operation): { inner: Posed; deformed: Posed } {
     const inner = apply(operation, this.start.inner);
-    return { inner, deformed: this.edit.operations.length === 0 || this.edit.source !== null ? inner : this.start.deformed };
+    return {
+      inner,
+      deformed: this.edit.operations.length === 0 || this.edit.source !== null ? inner : this.start.deformed,
+    };
   }
 }

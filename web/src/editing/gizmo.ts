@@ -1,5 +1,14 @@
 /** The gizmo on the selected cage: three's TransformControls, told where to stand and asked what it was moved by. */
-import { Mesh, Object3D, PerspectiveCamera, Quaternion, Raycaster, Vector2, Vector3, type Scene } from "three";
+import {
+  Mesh,
+  Object3D,
+  PerspectiveCamera,
+  Quaternion,
+  Raycaster,
+  Vector2,
+  Vector3,
+  type Scene,
+} from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { orientation } from "./cage";
 import { cornersMove, rotation, scaling, translation } from "./gestures";
@@ -137,12 +146,16 @@ export class Gizmo {
     };
     for (const handle of handles.filter((child) => child.name === axis)) {
       const places = handle.geometry.getAttribute("position");
-      const points = Array.from({ length: places.count }, (_, i) => new Vector3().fromBufferAttribute(places, i));
+      const points = Array.from({ length: places.count }, (_, i) =>
+        new Vector3().fromBufferAttribute(places, i),
+      );
       const centre = points.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(points.length);
       for (const point of [centre, ...points]) {
         const at = point.applyMatrix4(handle.matrixWorld).project(this.camera);
         if (Math.abs(at.x) > 0.98 || Math.abs(at.y) > 0.98 || !free(at)) continue;
-        const around = [-1, 0, 1].flatMap((i) => [-1, 0, 1].map((j) => ({ x: at.x + i * slack.x, y: at.y + j * slack.y })));
+        const around = [-1, 0, 1].flatMap((i) =>
+          [-1, 0, 1].map((j) => ({ x: at.x + i * slack.x, y: at.y + j * slack.y })),
+        );
         if (around.every(holds)) return { x: at.x, y: at.y };
       }
     }

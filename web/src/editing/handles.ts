@@ -1,5 +1,13 @@
 /** Dots on corners, squares on faces: what can be grabbed, always on top. */
-import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, GLSL3, Points, ShaderMaterial } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DynamicDrawUsage,
+  GLSL3,
+  Points,
+  ShaderMaterial,
+} from "three";
 import type { Vec3 } from "../net/protocol";
 import type { Viewport } from "../frames/viewport";
 

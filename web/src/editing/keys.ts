@@ -17,7 +17,12 @@ export interface Binding {
 }
 
 /** All bindings. Letters that have another meaning during a drag are not among them. */
-export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: Pick<Dialogs, "saveAs" | "paste">): Binding[] {
+export function bindings(
+  app: App,
+  actions: Actions,
+  pointer: Pointer,
+  dialogs: Pick<Dialogs, "saveAs" | "paste">,
+): Binding[] {
   return [
     { group: "Tools", keys: ["1", "G"], what: "Move", run: () => actions.tool("translate") },
     { group: "Tools", keys: ["2", "R"], what: "Rotate", run: () => actions.tool("rotate") },
@@ -25,12 +30,37 @@ export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: 
     { group: "Tools", keys: ["4", "Q"], what: "Select: no gizmo", run: () => actions.tool("select") },
     { group: "Tools", keys: ["Tab"], what: "Set mode or Edit mode", run: () => actions.toggleMode() },
     { group: "Tools", keys: ["W"], what: "World axes or cage axes", run: () => actions.toggleAxes() },
-    { group: "Tools", keys: ["Escape"], what: "Cancel the drag; clear the selection", run: () => actions.escape(() => pointer.cancel()) },
-    { group: "Cages", keys: ["C"], what: "Set mode: inner cage, outer cage, both", run: () => actions.nextCage() },
-    { group: "Cages", keys: ["I"], what: "Fit the inner cage to what is dense inside it", run: () => actions.fitInner() },
+    {
+      group: "Tools",
+      keys: ["Escape"],
+      what: "Cancel the drag; clear the selection",
+      run: () => actions.escape(() => pointer.cancel()),
+    },
+    {
+      group: "Cages",
+      keys: ["C"],
+      what: "Set mode: inner cage, outer cage, both",
+      run: () => actions.nextCage(),
+    },
+    {
+      group: "Cages",
+      keys: ["I"],
+      what: "Fit the inner cage to what is dense inside it",
+      run: () => actions.fitInner(),
+    },
     { group: "Edits", keys: ["D"], what: "Discrete or continuous", run: () => actions.toggleKind() },
-    { group: "Edits", keys: ["U"], what: "Fill what is uncovered, or leave it", run: () => actions.toggleFill() },
-    { group: "Edits", keys: ["Shift+U"], what: "Shadows go along, or stay", run: () => actions.toggleShadows() },
+    {
+      group: "Edits",
+      keys: ["U"],
+      what: "Fill what is uncovered, or leave it",
+      run: () => actions.toggleFill(),
+    },
+    {
+      group: "Edits",
+      keys: ["Shift+U"],
+      what: "Shadows go along, or stay",
+      run: () => actions.toggleShadows(),
+    },
     { group: "Edits", keys: ["H"], what: "Hide or show", run: () => actions.hide() },
     { group: "Edits", keys: ["Delete", "Backspace"], what: "Remove", run: () => actions.remove() },
     { group: "Edits", keys: ["Ctrl+D"], what: "Duplicate", run: () => actions.duplicate() },
@@ -38,7 +68,12 @@ export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: 
     { group: "Edits", keys: ["Shift+V"], what: "Paste from another scene", run: () => dialogs.paste() },
     { group: "Edits", keys: ["Ctrl+Z"], what: "Undo", run: () => actions.command("undo") },
     { group: "Edits", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], what: "Redo", run: () => actions.command("redo") },
-    { group: "View", keys: ["F"], what: "Focus on the cage, or on the surface under the mouse", run: () => actions.focus(pointer.at.x, pointer.at.y) },
+    {
+      group: "View",
+      keys: ["F"],
+      what: "Focus on the cage, or on the surface under the mouse",
+      run: () => actions.focus(pointer.at.x, pointer.at.y),
+    },
     { group: "View", keys: ["V"], what: "Colour, depth, opacity, normals", run: () => actions.nextView() },
     { group: "View", keys: ["L"], what: "Deformed lattice", run: () => actions.toggle("grid") },
     { group: "View", keys: ["O"], what: "Show or hide the cages", run: () => actions.toggle("cages") },
@@ -50,8 +85,13 @@ export function bindings(app: App, actions: Actions, pointer: Pointer, dialogs: 
     { group: "Scene", keys: ["Ctrl+S"], what: "Save", run: () => actions.save() },
     { group: "Scene", keys: ["Ctrl+Shift+S"], what: "Save as", run: () => dialogs.saveAs() },
     { group: "Scene", keys: ["K"], what: "Keyframe of the camera path", run: () => actions.addKey() },
-    { group: "Scene", keys: ["?"], what: "All keys", run: () => app.store.set({ help: !app.store.now.help }) },
-  ]; // prettier-ignore
+    {
+      group: "Scene",
+      keys: ["?"],
+      what: "All keys",
+      run: () => app.store.set({ help: !app.store.now.help }),
+    },
+  ];
 }
 
 /** What the mouse does with a key held; shown with the others. */
@@ -89,7 +129,8 @@ export function listenForKeys(app: App, actions: Actions, pointer: Pointer, all:
     const binding = byKey.get(name);
     if (!binding) return;
     event.preventDefault();
-    if (looking(app.store.now) && binding.group !== "View" && !OF_LOOKERS.includes(name)) return app.say(LOOKING, "warning");
+    if (looking(app.store.now) && binding.group !== "View" && !OF_LOOKERS.includes(name))
+      return app.say(LOOKING, "warning");
     if (!event.repeat || name.endsWith("Z")) binding.run();
   });
   addEventListener("keyup", (event) => {
@@ -114,6 +155,11 @@ function leave(field: EventTarget | null): void {
 
 function isTyping(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
-  if (target instanceof HTMLInputElement) return !["checkbox", "range", "button", "radio"].includes(target.type);
-  return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || target.closest("dialog") !== null;
+  if (target instanceof HTMLInputElement)
+    return !["checkbox", "range", "button", "radio"].includes(target.type);
+  return (
+    target instanceof HTMLTextAreaElement ||
+    target instanceof HTMLSelectElement ||
+    target.closest("dialog") !== null
+  );
 }

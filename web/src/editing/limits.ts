@@ -46,7 +46,10 @@ export function containedPart(operation: Operation, cage: Posed, outer: Corners 
 }
 
 /** The share of an operation that the server will let through, judged from what it let through of another. */
-export function expectedPart(operation: Operation, last: { operation: Operation; part: number } | null): number {
+export function expectedPart(
+  operation: Operation,
+  last: { operation: Operation; part: number } | null,
+): number {
   if (last === null || last.part >= 1 || last.operation.kind !== operation.kind) return 1;
   const size = amount(operation);
   return size > 0 ? Math.min(1, (last.part * amount(last.operation)) / size) : 1;

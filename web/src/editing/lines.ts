@@ -34,7 +34,6 @@ export interface Segment {
   hidden: number;
 }
 
-
 const VERTEX = `
 uniform vec2 viewport;
 in vec3 from;
@@ -116,7 +115,12 @@ export class Lines {
   /** Four vertices a segment; instances would be a draw each where the processor draws. */
   private readonly geometry = new BufferGeometry();
   private readonly mesh: Mesh;
-  private buffers: { from: BufferAttribute; to: BufferAttribute; paint: BufferAttribute; stroke: BufferAttribute };
+  private buffers: {
+    from: BufferAttribute;
+    to: BufferAttribute;
+    paint: BufferAttribute;
+    stroke: BufferAttribute;
+  };
   private capacity = 0;
   private readonly shared: Record<string, IUniform>;
 
@@ -185,7 +189,9 @@ export class Lines {
     const corners = [0, -1, 0, 0, 1, 0, 1, -1, 0, 1, 1, 0];
     const position = Float32Array.from({ length: 12 * capacity }, (_, i) => corners[i % 12]);
     this.geometry.setAttribute("position", new BufferAttribute(position, 3));
-    this.geometry.setIndex(Array.from({ length: 6 * capacity }, (_, i) => 4 * Math.floor(i / 6) + [0, 2, 1, 1, 2, 3][i % 6]));
+    this.geometry.setIndex(
+      Array.from({ length: 6 * capacity }, (_, i) => 4 * Math.floor(i / 6) + [0, 2, 1, 1, 2, 3][i % 6]),
+    );
     return { from: make("from", 3), to: make("to", 3), paint: make("paint", 4), stroke: make("stroke", 2) };
   }
 
@@ -204,4 +210,3 @@ export class Lines {
 export function colour(text: string): Color {
   return new Color(text).convertLinearToSRGB();
 }
-

@@ -18,13 +18,22 @@ export interface Posed {
 export function apply(operation: Operation, { corners, pivot }: Posed): Posed {
   switch (operation.kind) {
     case "translate":
-      return { corners: moved(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by), pivot: sum(pivot, operation.by) };
+      return {
+        corners: moved(corners, [0, 1, 2, 3, 4, 5, 6, 7], operation.by),
+        pivot: sum(pivot, operation.by),
+      };
     case "move_corners":
       return { corners: moved(corners, operation.corners, operation.by), pivot };
     case "rotate":
-      return { corners: linear(corners, pivot, rotationMatrix(operation.rotation_deg, operation.axes, corners)), pivot };
+      return {
+        corners: linear(corners, pivot, rotationMatrix(operation.rotation_deg, operation.axes, corners)),
+        pivot,
+      };
     case "scale":
-      return { corners: linear(corners, pivot, along(diagonal(operation.by), operation.axes, corners)), pivot };
+      return {
+        corners: linear(corners, pivot, along(diagonal(operation.by), operation.axes, corners)),
+        pivot,
+      };
     case "shear": {
       const { xy = 0, xz = 0, yx = 0, yz = 0, zx = 0, zy = 0 } = operation;
       const shear = new Matrix3().set(1, xy, xz, yx, 1, yz, zx, zy, 1);
@@ -87,7 +96,10 @@ export function snapped(operation: Operation, steps: Steps): Operation {
     case "rotate":
       return { ...operation, rotation_deg: to(operation.rotation_deg, steps.angle) };
     case "scale":
-      return { ...operation, by: to(operation.by, steps.factor).map((s) => Math.max(s, steps.factor)) as Vec3 };
+      return {
+        ...operation,
+        by: to(operation.by, steps.factor).map((s) => Math.max(s, steps.factor)) as Vec3,
+      };
     case "shear":
       return operation;
   }
@@ -156,7 +168,9 @@ function diagonal([x, y, z]: Vec3): Matrix3 {
 
 function linear(corners: Corners, pivot: Vec3, matrix: Matrix3): Corners {
   const centre = new Vector3(...pivot);
-  return corners.map((c) => new Vector3(...c).sub(centre).applyMatrix3(matrix).add(centre).toArray()) as Corners;
+  return corners.map((c) =>
+    new Vector3(...c).sub(centre).applyMatrix3(matrix).add(centre).toArray(),
+  ) as Corners;
 }
 
 function moved(corners: Corners, which: readonly number[], by: Vec3): Corners {

@@ -27,14 +27,23 @@ export function pick(x: number, y: number, { corners, eye }: Candidate, project:
   const points = corners.map(project);
   return (
     pickCorner(x, y, corners, project) ??
-    nearest("face", facesTowards(corners, eye).map((p) => p && near(project(p), x, y, REACH.face))) ??
-    nearest("edge", EDGES.map(([i, j]) => nearSegment(points[i], points[j], x, y)))
+    nearest(
+      "face",
+      facesTowards(corners, eye).map((p) => p && near(project(p), x, y, REACH.face)),
+    ) ??
+    nearest(
+      "edge",
+      EDGES.map(([i, j]) => nearSegment(points[i], points[j], x, y)),
+    )
   );
 }
 
 /** The corner of a cage at pixel (x, y), or null. */
 export function pickCorner(x: number, y: number, corners: Corners, project: Project): Part | null {
-  return nearest("corner", corners.map((corner) => near(project(corner), x, y, REACH.corner)));
+  return nearest(
+    "corner",
+    corners.map((corner) => near(project(corner), x, y, REACH.corner)),
+  );
 }
 
 /** The middle of each face that looks towards the eye, null for the others. */
@@ -74,7 +83,12 @@ function nearSegment(a: ScreenPoint, b: ScreenPoint, x: number, y: number): numb
   return found !== null && found.distance <= REACH.edge ? found.depth : null;
 }
 
-function segment(a: ScreenPoint, b: ScreenPoint, x: number, y: number): { distance: number; depth: number } | null {
+function segment(
+  a: ScreenPoint,
+  b: ScreenPoint,
+  x: number,
+  y: number,
+): { distance: number; depth: number } | null {
   if (a.depth <= 0 || b.depth <= 0) return null;
   const dx = b.x - a.x;
   const dy = b.y - a.y;

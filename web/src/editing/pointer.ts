@@ -150,7 +150,11 @@ export class Pointer {
     const hover = this.under();
     if (this.app.gizmo.axis !== axis) this.app.viewport.invalidate();
     const before = this.app.store.now.hover;
-    if (!(hover?.cage === before?.cage && hover?.part.kind === before?.part.kind && hover?.part.index === before?.part.index)) {
+    if (!(
+      hover?.cage === before?.cage &&
+      hover?.part.kind === before?.part.kind &&
+      hover?.part.index === before?.part.index
+    )) {
       this.app.store.set({ hover });
     }
     this.app.viewport.canvas.style.cursor = hover || this.app.gizmo.axis !== null ? "pointer" : "";
@@ -201,7 +205,8 @@ export class Pointer {
     if (!together && now.corners.length > 0) this.app.store.set({ corners: [] });
     const cage = leading(drag.start, drag.target).corners;
     const at = new Vector3(...middle(cage, own));
-    const line = hover.part.kind === "face" && !together ? new Vector3(...faceNormal(cage, hover.part.index)) : null;
+    const line =
+      hover.part.kind === "face" && !together ? new Vector3(...faceNormal(cage, hover.part.index)) : null;
     const plane = new Plane().setFromNormalAndCoplanarPoint(this.app.viewport.forward, at);
     this.hold = { kind: "part", corners, at, grabbed: at, plane, line };
     this.hold.grabbed = this.reached(this.hold) ?? at;
@@ -248,7 +253,10 @@ export class Pointer {
       .map((edit) => {
         const cages = shownCages(edit, this.app.drag);
         const corners = leading(cages, target(now)).corners;
-        return { id: edit.id, distance: distanceToEdges(this.at.x, this.at.y, corners, this.app.viewport.project) };
+        return {
+          id: edit.id,
+          distance: distanceToEdges(this.at.x, this.at.y, corners, this.app.viewport.project),
+        };
       })
       .filter(({ distance }) => distance < LINE_REACH)
       .sort((a, b) => a.distance - b.distance);

@@ -23,7 +23,10 @@ export class Pacing {
   scale(width: number, height: number): number {
     const { cost } = this;
     if (cost === null) return 0.25;
-    return SCALES.find((scale) => cost * width * height * scale * scale <= this.moving) ?? SCALES[SCALES.length - 1];
+    return (
+      SCALES.find((scale) => cost * width * height * scale * scale <= this.moving) ??
+      SCALES[SCALES.length - 1]
+    );
   }
 
   /** How many rows of a still picture to draw at a time. */
@@ -39,7 +42,8 @@ export async function finished(gl: WebGL2RenderingContext): Promise<number> {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();
   if (fence === null) return 0;
-  while (!gl.isContextLost() && gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED) await new Promise((done) => setTimeout(done, 1));
+  while (!gl.isContextLost() && gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED)
+    await new Promise((done) => setTimeout(done, 1));
   gl.deleteSync(fence);
   return performance.now() - began;
 }

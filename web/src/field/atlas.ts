@@ -65,7 +65,8 @@ function occupiedBricks(level: Level, dims: Vec3): Int32Array {
     for (let y = 0; y < fine[1]; y++)
       for (let z = 0; z < fine[2]; z++, n++)
         if (codes[n] < 256)
-          held[(Math.floor(x / share) * dims[1] + Math.floor(y / share)) * dims[2] + Math.floor(z / share)] = 1;
+          held[(Math.floor(x / share) * dims[1] + Math.floor(y / share)) * dims[2] + Math.floor(z / share)] =
+            1;
   return Int32Array.from(held.keys()).filter((number) => held[number] === 1);
 }
 
@@ -94,12 +95,22 @@ export class Filler {
     const plane = width * second * edge;
     for (let n = 0; n < numbers.length; n++) {
       const number = numbers[n];
-      const at = [Math.floor(number / (dims[1] * dims[2])), Math.floor(number / dims[2]) % dims[1], number % dims[2]];
+      const at = [
+        Math.floor(number / (dims[1] * dims[2])),
+        Math.floor(number / dims[2]) % dims[1],
+        number % dims[2],
+      ];
       const corner = (n % first) * edge + Math.floor(n / first) * edge * width;
       for (let x = 0; x < edge; x++)
         for (let y = 0; y < edge; y++)
           for (let z = 0; z < edge; z++)
-            this.put(out, corner + x * plane + y * width + z, at[0] * brick + x, at[1] * brick + y, at[2] * brick + z);
+            this.put(
+              out,
+              corner + x * plane + y * width + z,
+              at[0] * brick + x,
+              at[1] * brick + y,
+              at[2] * brick + z,
+            );
     }
     return out;
   }
@@ -111,7 +122,8 @@ export class Filler {
       const { density, sh } = source.vertices;
       const rows = sh.length / density.length;
       out.density[texel] = density[slot];
-      for (let row = 0; row < rows; row++) out.colours[row >> 2][4 * texel + (row & 3)] = sh[row * density.length + slot];
+      for (let row = 0; row < rows; row++)
+        out.colours[row >> 2][4 * texel + (row & 3)] = sh[row * density.length + slot];
       return;
     }
   }

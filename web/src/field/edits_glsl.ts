@@ -192,11 +192,18 @@ export function unrolled(edits: number): number | null {
 
 /** The source for so many edits; see `unrolled`. */
 export function editsSource(count: number | null): string {
-  const one = (e: string): string => `if (place == 0 && inBox(p, rows[${e}].xyz, rows[${e} + 1].xyz)) place = mapEdit(${e}, p, v);`;
+  const one = (e: string): string =>
+    `if (place == 0 && inBox(p, rows[${e}].xyz, rows[${e} + 1].xyz)) place = mapEdit(${e}, p, v);`;
   const all =
     count === null
       ? [`for (int n = editCount - 1; n >= 0; n--) { ${one("n * ROW")} }`]
       : Array.from({ length: count }, (_, n) => one(`${count - 1 - n} * ROW`));
-  const body = ["int mapSample(inout vec3 p, inout vec3 v) {", "  int place = 0;", ...all.map((line) => `  ${line}`), "  return place;", "}"];
+  const body = [
+    "int mapSample(inout vec3 p, inout vec3 v) {",
+    "  int place = 0;",
+    ...all.map((line) => `  ${line}`),
+    "  return place;",
+    "}",
+  ];
   return SOURCE.replace("MAP_SAMPLE", `${body.join("\n")}\n`);
 }

@@ -91,7 +91,8 @@ export class EditsOnGpu {
       1,
       heights.reduce((sum, height) => sum + height, 0),
     );
-    if (rows > largest(gl, gl.MAX_TEXTURE_SIZE)) throw new Error("the edits' lattices do not fit into a texture of the GPU");
+    if (rows > largest(gl, gl.MAX_TEXTURE_SIZE))
+      throw new Error("the edits' lattices do not fit into a texture of the GPU");
     if (this.lattices === null || rows > this.lattices.rows) {
       gl.deleteTexture(this.lattices?.texture ?? null);
       this.lattices = { texture: this.latticeTexture(rows), rows, placed: [] };
@@ -135,7 +136,19 @@ export class EditsOnGpu {
     const part = fits && changed?.of === before.key ? changed : { low: [0, 0, 0], dims, codes };
     gl.bindTexture(gl.TEXTURE_3D, texture);
     const [x, y, z] = part.low;
-    gl.texSubImage3D(gl.TEXTURE_3D, 0, z, y, x, part.dims[2], part.dims[1], part.dims[0], gl.RED_INTEGER, gl.UNSIGNED_SHORT, part.codes);
+    gl.texSubImage3D(
+      gl.TEXTURE_3D,
+      0,
+      z,
+      y,
+      x,
+      part.dims[2],
+      part.dims[1],
+      part.dims[0],
+      gl.RED_INTEGER,
+      gl.UNSIGNED_SHORT,
+      part.codes,
+    );
     gl.bindTexture(gl.TEXTURE_3D, null);
     this.occupancy = { texture, key, dims };
     this.uploaded.last += part.codes.byteLength;

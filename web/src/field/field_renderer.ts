@@ -180,7 +180,11 @@ export class FieldRenderer implements SceneDrawer {
     };
     bind("densityAtlas", gl.TEXTURE_3D, textures.density);
     bind("brickIndex", gl.TEXTURE_3D, textures.index);
-    bind("bricks", gl.TEXTURE_3D, active ? (level.last ? this.onGpu.bricks : shown.withoutLeaps) : shown.occupancy);
+    bind(
+      "bricks",
+      gl.TEXTURE_3D,
+      active ? (level.last ? this.onGpu.bricks : shown.withoutLeaps) : shown.occupancy,
+    );
     textures.colours.forEach((texture, n) => bind(`colourAtlas${n}`, gl.TEXTURE_3D, texture));
     if (active) {
       bind("lattice", gl.TEXTURE_2D, this.onGpu.bind(program));
@@ -200,7 +204,12 @@ export class FieldRenderer implements SceneDrawer {
   }
 
   /** Puts a view of what was drawn on the canvas, or in a framebuffer, of this size. */
-  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null, view: View = "colour"): void {
+  show(
+    width: number,
+    height: number,
+    framebuffer: WebGLFramebuffer | null = null,
+    view: View = "colour",
+  ): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.bindVertexArray(this.vertices);

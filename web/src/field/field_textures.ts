@@ -28,16 +28,27 @@ const LEAST_SPARE = 64;
  * The layout of a level with room for the bricks of its layers, and for more where the memory has it. Throws `TooLarge`
  * where it takes more than `limit` bytes.
  */
-export function layoutWithin(gl: GL, level: Level, limit: number, placesFor: (layout: Layout) => number): Layout {
+export function layoutWithin(
+  gl: GL,
+  level: Level,
+  limit: number,
+  placesFor: (layout: Layout) => number,
+): Layout {
   const side = largest(gl, gl.MAX_3D_TEXTURE_SIZE);
   const needed = placesFor(layoutOf(level, side));
   const least = layoutOf(level, side, needed);
   const bytes = bytesOf(least);
   if (bytes > limit)
-    throw new TooLarge(`the field takes ${Math.ceil(bytes / 2 ** 20)} MiB of the GPU, more than the ${Math.floor(limit / 2 ** 20)} allowed`);
+    throw new TooLarge(
+      `the field takes ${Math.ceil(bytes / 2 ** 20)} MiB of the GPU, more than the ${Math.floor(limit / 2 ** 20)} allowed`,
+    );
   if (!level.last) return least;
   try {
-    const roomy = layoutOf(level, side, needed + Math.max(LEAST_SPARE, Math.ceil(SPARE * (least.count + needed))));
+    const roomy = layoutOf(
+      level,
+      side,
+      needed + Math.max(LEAST_SPARE, Math.ceil(SPARE * (least.count + needed))),
+    );
     return bytesOf(roomy) > limit ? least : roomy;
   } catch (error) {
     if (error instanceof TooLarge) return least;
@@ -46,10 +57,19 @@ export function layoutWithin(gl: GL, level: Level, limit: number, placesFor: (la
 }
 
 /** Uploads a level, some bricks at a time, and lets the page breathe in between; null once it is not wanted any more. */
-export async function uploadLevel(gl: GL, level: Level, layout: Layout, wanted: () => boolean): Promise<FieldTextures | null> {
+export async function uploadLevel(
+  gl: GL,
+  level: Level,
+  layout: Layout,
+  wanted: () => boolean,
+): Promise<FieldTextures | null> {
   const steps = uploading(gl, level, layout);
   try {
-    for (let step = steps.next(); ; step = wanted() ? steps.next() : steps.throw(new Error("not wanted any more"))) {
+    for (
+      let step = steps.next();
+      ;
+      step = wanted() ? steps.next() : steps.throw(new Error("not wanted any more"))
+    ) {
       if (step.done) return step.value;
       await new Promise((done) => setTimeout(done));
     }
@@ -86,13 +106,31 @@ function* uploading(gl: GL, level: Level, layout: Layout): Generator<void, Field
     for (let z = 0; z < across[2]; z++) {
       plainUnpacking(gl);
       const numbers = layout.bricks.subarray(z * plane, (z + 1) * plane);
-      putTexels(gl, { layout, density, colours }, filler.texels(numbers, across[0], across[1]), [0, 0, z], [across[0], across[1]]);
+      putTexels(
+        gl,
+        { layout, density, colours },
+        filler.texels(numbers, across[0], across[1]),
+        [0, 0, z],
+        [across[0], across[1]],
+      );
       yield;
     }
     plainUnpacking(gl);
     const index = texture3D(gl, gl.RGBA8UI, [dims[2], dims[1], dims[0]], gl.NEAREST);
     made.push(index);
-    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, dims[2], dims[1], dims[0], gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, layout.index);
+    gl.texSubImage3D(
+      gl.TEXTURE_3D,
+      0,
+      0,
+      0,
+      0,
+      dims[2],
+      dims[1],
+      dims[0],
+      gl.RGBA_INTEGER,
+      gl.UNSIGNED_BYTE,
+      layout.index,
+    );
     gl.bindTexture(gl.TEXTURE_3D, null);
     checkMemory(gl);
     whole = true;
@@ -124,7 +162,19 @@ export function putTexels(
 export function uploadOccupancy(gl: GL, { dims, codes }: Occupancy): WebGLTexture {
   plainUnpacking(gl);
   const texture = texture3D(gl, gl.R16UI, [dims[2], dims[1], dims[0]], gl.NEAREST);
-  gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, dims[2], dims[1], dims[0], gl.RED_INTEGER, gl.UNSIGNED_SHORT, codes);
+  gl.texSubImage3D(
+    gl.TEXTURE_3D,
+    0,
+    0,
+    0,
+    0,
+    dims[2],
+    dims[1],
+    dims[0],
+    gl.RED_INTEGER,
+    gl.UNSIGNED_SHORT,
+    codes,
+  );
   gl.bindTexture(gl.TEXTURE_3D, null);
   return texture;
 }

@@ -49,7 +49,11 @@ export class OutOfMemory extends Error {
 
 /** Throws where the GPU had no memory for what it was told since the last look. */
 export function checkMemory(gl: GL): void {
-  for (let error = gl.getError(); error !== gl.NO_ERROR && error !== gl.CONTEXT_LOST_WEBGL; error = gl.getError())
+  for (
+    let error = gl.getError();
+    error !== gl.NO_ERROR && error !== gl.CONTEXT_LOST_WEBGL;
+    error = gl.getError()
+  )
     if (error === gl.OUT_OF_MEMORY) throw new OutOfMemory();
 }
 
@@ -72,7 +76,9 @@ export function texture3D(gl: GL, format: number, size: readonly number[], filte
 export function setFilter(gl: GL, target: number, filter: number): void {
   gl.texParameteri(target, gl.TEXTURE_MIN_FILTER, filter);
   gl.texParameteri(target, gl.TEXTURE_MAG_FILTER, filter);
-  for (const axis of target === gl.TEXTURE_3D ? [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R] : [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
+  for (const axis of target === gl.TEXTURE_3D
+    ? [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T, gl.TEXTURE_WRAP_R]
+    : [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
     gl.texParameteri(target, axis, gl.CLAMP_TO_EDGE);
 }
 
@@ -83,7 +89,13 @@ export function plainUnpacking(gl: GL): void {
   gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
   gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
   gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
-  for (const name of [gl.UNPACK_ROW_LENGTH, gl.UNPACK_IMAGE_HEIGHT, gl.UNPACK_SKIP_PIXELS, gl.UNPACK_SKIP_ROWS, gl.UNPACK_SKIP_IMAGES])
+  for (const name of [
+    gl.UNPACK_ROW_LENGTH,
+    gl.UNPACK_IMAGE_HEIGHT,
+    gl.UNPACK_SKIP_PIXELS,
+    gl.UNPACK_SKIP_ROWS,
+    gl.UNPACK_SKIP_IMAGES,
+  ])
     gl.pixelStorei(name, 0);
 }
 

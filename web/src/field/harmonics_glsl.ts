@@ -37,7 +37,10 @@ export function harmonics(K: number): { source: string; colours: number } {
     ...Array.from({ length: colours }, (_, n) => `uniform sampler3D colourAtlas${n};`),
     "vec3 colourAt(vec3 at, vec3 d) {",
     "  vec3 rgb = vec3(0.5);",
-    ...Array.from({ length: colours }, (_, n) => `  vec4 s${n} = 255.0 * textureLod(colourAtlas${n}, at, 0.0) - 128.0;`),
+    ...Array.from(
+      { length: colours },
+      (_, n) => `  vec4 s${n} = 255.0 * textureLod(colourAtlas${n}, at, 0.0) - 128.0;`,
+    ),
   ];
   for (let k = 0; k < K; k++) {
     const channels = [0, 1, 2].map((c) => `s${(3 * k + c) >> 2}.${"xyzw"[(3 * k + c) & 3]}`);

@@ -76,7 +76,19 @@ export class LayersOnGpu {
       textures.slices = dims[0];
     }
     gl.bindTexture(gl.TEXTURE_3D, textures.index);
-    gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, dims[2], dims[1], dims[0], gl.RGBA_INTEGER, gl.UNSIGNED_BYTE, index);
+    gl.texSubImage3D(
+      gl.TEXTURE_3D,
+      0,
+      0,
+      0,
+      0,
+      dims[2],
+      dims[1],
+      dims[0],
+      gl.RGBA_INTEGER,
+      gl.UNSIGNED_BYTE,
+      index,
+    );
     gl.bindTexture(gl.TEXTURE_3D, null);
     return index.length;
   }

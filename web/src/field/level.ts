@@ -81,7 +81,10 @@ export async function* readLevels(
 }
 
 /** Densities and colours of vertices. */
-export async function readValues(file: PageFile<unknown>, name: string): Promise<{ density: Uint16Array; sh: Uint8Array }> {
+export async function readValues(
+  file: PageFile<unknown>,
+  name: string,
+): Promise<{ density: Uint16Array; sh: Uint8Array }> {
   const density = joined((await file.read(`${name}.density`)) as Uint8Array);
   return { density, sh: summed((await file.read(`${name}.sh`)) as Uint8Array, density.length) };
 }

@@ -270,7 +270,11 @@ void main() {
 /** The fragment shader of a variant, for bricks of so many cells. */
 export function fragment(variant: Variant, brick: number): string {
   const { source, colours } = harmonics(variant.K);
-  const defines = [`#define BRICK ${brick}`, `#define COLOURS ${colours}`, "#define MOVED_POINT ((eye + t * d - lower) * scale)"];
+  const defines = [
+    `#define BRICK ${brick}`,
+    `#define COLOURS ${colours}`,
+    "#define MOVED_POINT ((eye + t * d - lower) * scale)",
+  ];
   if (variant.contracted) defines.push("#define CONTRACTED");
   if (variant.edited) defines.push("#define EDITED");
   if (variant.normals) defines.push("#define NORMALS");

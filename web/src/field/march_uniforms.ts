@@ -17,7 +17,14 @@ export interface PinholeCamera {
 }
 
 /** Places a level in the world; `step` is the distance between samples in voxels. */
-export function setField(gl: GL, uniform: Program["uniform"], level: Level, layout: Layout, occupancy: Occupancy, step: number): void {
+export function setField(
+  gl: GL,
+  uniform: Program["uniform"],
+  level: Level,
+  layout: Layout,
+  occupancy: Occupancy,
+  step: number,
+): void {
   const { bounds, contracted } = level.field;
   const { resolution, unit, steps } = level.header;
   const { across, edge, dims } = layout;
@@ -31,19 +38,37 @@ export function setField(gl: GL, uniform: Program["uniform"], level: Level, layo
   gl.uniform3i(uniform("resolution"), ...resolution);
   gl.uniform3fv(uniform("lower"), lower);
   gl.uniform3fv(uniform("scale"), scale);
-  gl.uniform3fv(uniform("halfGrid"), resolution.map((n) => (n - 1) / 4)); // prettier-ignore
+  gl.uniform3fv(
+    uniform("halfGrid"),
+    resolution.map((n) => (n - 1) / 4),
+  );
   gl.uniform1f(uniform("unit"), unit);
   gl.uniform1f(uniform("marchStep"), contracted ? step : step / Math.max(...scale));
   gl.uniform1fv(uniform("coefficientSteps"), steps);
 }
 
 /** Sees it from a camera, in a picture of a size. */
-export function setView(gl: GL, uniform: Program["uniform"], camera: PinholeCamera, { width, height }: { width: number; height: number }): void {
+export function setView(
+  gl: GL,
+  uniform: Program["uniform"],
+  camera: PinholeCamera,
+  { width, height }: { width: number; height: number },
+): void {
   const { c2w } = camera;
   const across = width / camera.width;
   const down = height / camera.height;
   gl.uniform3f(uniform("eye"), c2w[3], c2w[7], c2w[11]);
-  gl.uniformMatrix3fv(uniform("rotation"), true, [c2w[0], c2w[1], c2w[2], c2w[4], c2w[5], c2w[6], c2w[8], c2w[9], c2w[10]]);
+  gl.uniformMatrix3fv(uniform("rotation"), true, [
+    c2w[0],
+    c2w[1],
+    c2w[2],
+    c2w[4],
+    c2w[5],
+    c2w[6],
+    c2w[8],
+    c2w[9],
+    c2w[10],
+  ]);
   gl.uniform4f(uniform("lens"), camera.fx * across, camera.fy * down, camera.cx * across, camera.cy * down);
   gl.uniform1f(uniform("height"), height);
 }

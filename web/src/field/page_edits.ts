@@ -61,10 +61,25 @@ export async function readEdits(source: ArrayBuffer, before: PageEdits | null = 
   else {
     const codes = (await file.read("occupancy")) as Uint16Array;
     if (part === null) occupancy = { key, origin, dims, codes, changed: null };
-    else if (old?.key === part.of) occupancy = { key, origin, dims, codes: patched(old, part.low, part.dims, codes), changed: { ...part, codes } };
+    else if (old?.key === part.of)
+      occupancy = {
+        key,
+        origin,
+        dims,
+        codes: patched(old, part.low, part.dims, codes),
+        changed: { ...part, codes },
+      };
     else throw new Error("the edits are the change of ones that this page has not");
   }
-  return { edits: header.edits, boxes: header.boxes, preserveOpacity: header.preserve_opacity, rows, lattices, layers, occupancy };
+  return {
+    edits: header.edits,
+    boxes: header.boxes,
+    preserveOpacity: header.preserve_opacity,
+    rows,
+    lattices,
+    layers,
+    occupancy,
+  };
 }
 
 /** The codes of an occupancy with others in the part that begins at `low`. */
@@ -72,6 +87,7 @@ export function patched({ dims, codes }: Occupancy, low: Vec3, size: Vec3, part:
   const out = codes.slice();
   let n = 0;
   for (let x = low[0]; x < low[0] + size[0]; x++)
-    for (let y = low[1]; y < low[1] + size[1]; y++, n += size[2]) out.set(part.subarray(n, n + size[2]), (x * dims[1] + y) * dims[2] + low[2]);
+    for (let y = low[1]; y < low[1] + size[1]; y++, n += size[2])
+      out.set(part.subarray(n, n + size[2]), (x * dims[1] + y) * dims[2] + low[2]);
   return out;
 }

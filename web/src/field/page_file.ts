@@ -76,9 +76,11 @@ export class PageFile<Header> {
   static async open<Header>(reader: ByteReader, magic: string, version: number): Promise<PageFile<Header>> {
     const start = await reader.take(16);
     const view = new DataView(start.buffer);
-    if (String.fromCharCode(...start.subarray(0, 8)) !== magic) throw new Error(`not a file of the kind "${magic}"`);
+    if (String.fromCharCode(...start.subarray(0, 8)) !== magic)
+      throw new Error(`not a file of the kind "${magic}"`);
     const found = view.getUint32(8, true);
-    if (found !== version) throw new Error(`"${magic}" of version ${found}, this page reads ${version}; reload it`);
+    if (found !== version)
+      throw new Error(`"${magic}" of version ${found}, this page reads ${version}; reload it`);
     const text = new TextDecoder().decode(await reader.take(view.getUint32(12, true)));
     const header = JSON.parse(text) as Header & { arrays: ArrayEntry[] };
     return new PageFile(header, header.arrays, reader);

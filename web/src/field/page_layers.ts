@@ -34,7 +34,15 @@ export async function readLayer(file: PageFile<unknown>, name: string, key: stri
   const cells = (await file.read(`${name}.cells`)) as Uint8Array;
   const bricks = (await file.read(`${name}.bricks`)) as Uint8Array;
   const masks = (await file.read(`${name}.masks`)) as Uint8Array;
-  return { key, low: box.slice(0, 3) as Vec3, dims: box.slice(3) as Vec3, cells, bricks, masks, ...(await readValues(file, name)) };
+  return {
+    key,
+    low: box.slice(0, 3) as Vec3,
+    dims: box.slice(3) as Vec3,
+    cells,
+    bricks,
+    masks,
+    ...(await readValues(file, name)),
+  };
 }
 
 /** Linear numbers, in a layout's grid, of a layer's bricks that are other than the field's: each takes a place. */
@@ -55,7 +63,9 @@ export function indexWith(
   index.set(layout.index);
   for (const { layer, place, ...slices } of layers) {
     const at = place * plane;
-    const [from, to] = [Math.max(0, slices.first), Math.min(slices.end, dims[0])].map((slice) => slice * plane);
+    const [from, to] = [Math.max(0, slices.first), Math.min(slices.end, dims[0])].map(
+      (slice) => slice * plane,
+    );
     index.set(layout.index.subarray(from, to), at + from);
     const own = places(layer);
     let n = 0;
@@ -69,5 +79,6 @@ function* numbered({ low, dims, cells }: Layer, grid: Vec3, what: number): Gener
   let n = 0;
   for (let x = low[0]; x < low[0] + dims[0]; x++)
     for (let y = low[1]; y < low[1] + dims[1]; y++)
-      for (let z = low[2]; z < low[2] + dims[2]; z++, n++) if (cells[n] === what) yield (x * grid[1] + y) * grid[2] + z;
+      for (let z = low[2]; z < low[2] + dims[2]; z++, n++)
+        if (cells[n] === what) yield (x * grid[1] + y) * grid[2] + z;
 }

@@ -7,7 +7,8 @@ void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2
 
 /** Nothing is blended, tested or left out. */
 export function plainState(gl: GL): void {
-  for (const what of [gl.BLEND, gl.DEPTH_TEST, gl.CULL_FACE, gl.STENCIL_TEST, gl.SCISSOR_TEST, gl.DITHER]) gl.disable(what);
+  for (const what of [gl.BLEND, gl.DEPTH_TEST, gl.CULL_FACE, gl.STENCIL_TEST, gl.SCISSOR_TEST, gl.DITHER])
+    gl.disable(what);
   gl.colorMask(true, true, true, true);
   gl.depthMask(false);
 }

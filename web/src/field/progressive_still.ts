@@ -24,7 +24,12 @@ export class Still {
   }
 
   /** The rows to draw now, at most so many; null where none are, or nothing has changed for less than `settles` ms. */
-  next(now: number, height: number, most: number, settles = SETTLES): { first: number; count: number } | null {
+  next(
+    now: number,
+    height: number,
+    most: number,
+    settles = SETTLES,
+  ): { first: number; count: number } | null {
     if (this.done || now - this.changed < settles) return null;
     return { first: this.row, count: Math.min(most, height - this.row) };
   }

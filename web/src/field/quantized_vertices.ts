@@ -27,7 +27,12 @@ export class Stored {
 
   static ofLevel(level: Level): Stored {
     const { brick } = level.field;
-    return new Stored(level, brick, [0, 0, 0], level.header.resolution.map((n) => Math.ceil(n / brick)) as Vec3);
+    return new Stored(
+      level,
+      brick,
+      [0, 0, 0],
+      level.header.resolution.map((n) => Math.ceil(n / brick)) as Vec3,
+    );
   }
 
   /** The vertex at grid coordinates; -1 where none is stored. */
@@ -38,6 +43,8 @@ export class Stored {
     const bz = Math.floor(z / brick) - low[2];
     if (bx < 0 || by < 0 || bz < 0 || bx >= dims[0] || by >= dims[1] || bz >= dims[2]) return -1;
     const number = this.numbers[(bx * dims[1] + by) * dims[2] + bz];
-    return number < 0 ? -1 : this.slots[((number * brick + (x % brick)) * brick + (y % brick)) * brick + (z % brick)];
+    return number < 0
+      ? -1
+      : this.slots[((number * brick + (x % brick)) * brick + (y % brick)) * brick + (z % brick)];
   }
 }

@@ -26,13 +26,21 @@ export class Choice {
   /** The server has; pictures of what moves, which are quicker, say more than those at rest. */
   served(pixels: number, milliseconds: number, moving: boolean): void {
     if (this.wasMoving && !moving) return;
-    this.server = smoothed(moving && !this.wasMoving ? null : this.server, milliseconds / Math.max(1, pixels));
+    this.server = smoothed(
+      moving && !this.wasMoving ? null : this.server,
+      milliseconds / Math.max(1, pixels),
+    );
     this.wasMoving = moving;
   }
 
   /** Whether the server draws what moves sooner, as far as both are known. */
   get serverIsFaster(): boolean {
-    return this.page !== null && this.server !== null && this.pictures >= MEASURED && this.page > LENIENCE * this.server;
+    return (
+      this.page !== null &&
+      this.server !== null &&
+      this.pictures >= MEASURED &&
+      this.page > LENIENCE * this.server
+    );
   }
 
   /** Whether the page draws pictures at rest of so many pixels, too: they come soon, or sooner than the server's. */
@@ -40,13 +48,17 @@ export class Choice {
     if (this.page === null) return false;
     // Not to and fro where it is close.
     const slack = this.isWhole ? 1.5 : 1;
-    this.isWhole = this.page * pixels <= slack * WHOLE || (this.server !== null && this.page <= slack * this.server);
+    this.isWhole =
+      this.page * pixels <= slack * WHOLE || (this.server !== null && this.page <= slack * this.server);
     return this.isWhole;
   }
 
   /** Both rates in words, for whoever wants to know why. */
   get words(): string {
-    const rate = (cost: number | null): string => (cost === null ? "not measured" : `${(1e-3 / Math.max(cost, 1e-9)).toPrecision(2)} million pixels a second`);
+    const rate = (cost: number | null): string =>
+      cost === null
+        ? "not measured"
+        : `${(1e-3 / Math.max(cost, 1e-9)).toPrecision(2)} million pixels a second`;
     return `this page ${rate(this.page)}, the server ${rate(this.server)}`;
   }
 }

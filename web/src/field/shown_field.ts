@@ -24,7 +24,13 @@ export class ShownField {
   }
 
   /** Uploads a level, with room for layers; null once it is not wanted. Throws `TooLarge` beyond `memory` bytes. */
-  static async upload(gl: GL, memory: number, level: Level, layers: readonly PlacedLayer[], wanted: () => boolean): Promise<ShownField | null> {
+  static async upload(
+    gl: GL,
+    memory: number,
+    level: Level,
+    layers: readonly PlacedLayer[],
+    wanted: () => boolean,
+  ): Promise<ShownField | null> {
     const textures = await uploadLevel(gl, level, layoutFor(gl, memory, level, layers), wanted);
     return textures && new ShownField(gl, memory, level, textures);
   }
@@ -50,7 +56,10 @@ export class ShownField {
   /** An occupancy without anything to leap over, for a coarse level under edits: theirs is that of the full one. */
   get withoutLeaps(): WebGLTexture {
     const { occupancy } = this.level;
-    this.solid ??= uploadOccupancy(this.gl, { ...occupancy, codes: new Uint16Array(occupancy.codes.length).fill(255) });
+    this.solid ??= uploadOccupancy(this.gl, {
+      ...occupancy,
+      codes: new Uint16Array(occupancy.codes.length).fill(255),
+    });
     return this.solid;
   }
 

@@ -58,7 +58,8 @@ export class Targets {
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
       const { colour, depth, normals: third } = this.textures;
       for (const [n, texture] of [colour, depth, third].entries())
-        if (texture) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
+        if (texture)
+          gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1, ...(normals ? [gl.COLOR_ATTACHMENT2] : [])]);
@@ -80,7 +81,13 @@ export class Targets {
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     const depth = flipped(this.readDepth(), width);
-    return { width, height, rgba: flipped(rgba, 4 * width), depth, normals: third && flipped(third, 4 * width) };
+    return {
+      width,
+      height,
+      rgba: flipped(rgba, 4 * width),
+      depth,
+      normals: third && flipped(third, 4 * width),
+    };
   }
 
   /** [h, w]: floats of the integer framebuffer that is bound, of its size, bottom row first. */
@@ -116,7 +123,8 @@ export class Targets {
 
   dispose(): void {
     const { gl, textures } = this;
-    if (textures) for (const texture of Object.values<WebGLTexture | null>(textures)) gl.deleteTexture(texture);
+    if (textures)
+      for (const texture of Object.values<WebGLTexture | null>(textures)) gl.deleteTexture(texture);
     gl.deleteFramebuffer(this.framebuffer);
     this.forget();
   }

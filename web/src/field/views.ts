@@ -57,7 +57,12 @@ void main() {
 
 export class Views {
   private programs: { show: Program; distances: Program } | null = null;
-  private small: { texture: WebGLTexture; framebuffer: WebGLFramebuffer; width: number; height: number } | null = null;
+  private small: {
+    texture: WebGLTexture;
+    framebuffer: WebGLFramebuffer;
+    width: number;
+    height: number;
+  } | null = null;
 
   constructor(
     private readonly gl: GL,
@@ -111,7 +116,10 @@ export class Views {
   }
 
   private get cached(): { show: Program; distances: Program } {
-    this.programs ??= { show: programOf(this.gl, WHOLE, SHOW), distances: programOf(this.gl, WHOLE, DISTANCES) };
+    this.programs ??= {
+      show: programOf(this.gl, WHOLE, SHOW),
+      distances: programOf(this.gl, WHOLE, DISTANCES),
+    };
     return this.programs;
   }
 

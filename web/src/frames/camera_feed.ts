@@ -60,7 +60,10 @@ export class CameraFeed {
     this.changed = false;
     const { viewport } = this;
     const seq = ++this.seq;
-    this.viewpoints.set(seq, { viewProjection: viewport.viewProjection, eye: viewport.camera.position.clone() });
+    this.viewpoints.set(seq, {
+      viewProjection: viewport.viewProjection,
+      eye: viewport.camera.position.clone(),
+    });
     this.viewpoints.delete(seq - REMEMBERED);
     const { width, height } = viewport.pixels;
     this.send({

@@ -96,10 +96,13 @@ export class Presenter {
     const numbers = [...pictures, ...this.taken];
     if (numbers.length > 0) {
       const waits = this.app.drag !== null && this.taken.length === 0;
-      setTimeout(() => {
-        for (const action of this.beforeAsking) action();
-        for (const picture of numbers) this.app.send({ type: "presented", picture });
-      }, waits ? ASKED_AFTER * this.app.viewport.frameTime : 0);
+      setTimeout(
+        () => {
+          for (const action of this.beforeAsking) action();
+          for (const picture of numbers) this.app.send({ type: "presented", picture });
+        },
+        waits ? ASKED_AFTER * this.app.viewport.frameTime : 0,
+      );
     }
     this.drawn.push(...this.undrawn);
     this.undrawn = [];
@@ -138,8 +141,11 @@ export class Presenter {
     const { drag, seq, camera, revision, width, full_width, final, render_ms, encode_ms } = header;
     this.latency.shown(
       { time, drag, seq, camera, revision, width, fullWidth: full_width, final },
-      received, decoded, render_ms, encode_ms,
-    ); // prettier-ignore
+      received,
+      decoded,
+      render_ms,
+      encode_ms,
+    );
     const figures: Figures = {
       perSecond: this.latency.perSecond(time),
       renderMs: render_ms,

@@ -13,7 +13,11 @@ export interface Sight {
 export const NOTHING: Sight = { parts: [], edits: null };
 
 /** What is to be seen now. */
-export function sightOf({ viewport, store }: App, level: SceneDrawer["level"], edits: TakenEdits | null): Sight {
+export function sightOf(
+  { viewport, store }: App,
+  level: SceneDrawer["level"],
+  edits: TakenEdits | null,
+): Sight {
   const { view, before, split } = store.now;
   const { width, height } = viewport.pixels;
   return { parts: [...viewport.viewProjection.elements, width, height, view, before, split, level], edits };
@@ -25,15 +29,22 @@ export function sameView(one: Sight, other: Sight): boolean {
 
 /** Whether one shows what the other does with other lattices: a drag has ended. */
 export function isFiner(now: Sight, before: Sight): boolean {
-  return before.edits !== null && now.edits !== null && before.edits.header.revision === now.edits.header.revision && sameView(now, before);
+  return (
+    before.edits !== null &&
+    now.edits !== null &&
+    before.edits.header.revision === now.edits.header.revision &&
+    sameView(now, before)
+  );
 }
 
 /** Whether the server's picture is there and shows what is to be seen; only a final one counts where the page draws `all`. */
 export function isServed({ presenter, camera, store }: App, edits: TakenEdits | null, all: boolean): boolean {
   const { last } = presenter;
   const { view, before, split } = store.now;
-  if (last === null || last.picture === 0 || edits === null || !camera.resting || last.camera !== camera.seq) return false;
-  const same = last.view === view && last.before === before && last.split === split && last.drag === edits.header.drag;
+  if (last === null || last.picture === 0 || edits === null || !camera.resting || last.camera !== camera.seq)
+    return false;
+  const same =
+    last.view === view && last.before === before && last.split === split && last.drag === edits.header.drag;
   return same && last.revision >= edits.header.revision && (last.final || !all);
 }
 
@@ -41,14 +52,41 @@ export function isServed({ presenter, camera, store }: App, edits: TakenEdits | 
  * What one of the page's pictures shows, in the words for the server's; those are numbered from 1. A `whole` one is
  * final unless better edits come: those of a drag, and the first ones after a reconnection, are of coarse lattices.
  */
-export function ownHeader({ camera, store }: App, edits: TakenEdits | null, size: [number, number], whole: boolean, renderMs: number): PictureHeader {
+export function ownHeader(
+  { camera, store }: App,
+  edits: TakenEdits | null,
+  size: [number, number],
+  whole: boolean,
+  renderMs: number,
+): PictureHeader {
   const final = whole && edits?.header.final === true;
   const { view, before, split } = store.now;
   const { drag, seq, revision } = edits?.header ?? { drag: 0, seq: 0, revision: 0 };
   const [width, height] = size;
   return {
-    type: "picture", picture: 0, camera: camera.seq, drag, seq, revision, view, before, split,
-    x: 0, y: 0, width, height, full_width: width, full_height: height, final,
-    format: "rgb", picture_bytes: 0, depth_bytes: 0, depth_width: 0, depth_height: 0, depth_scale: 1, render_ms: renderMs, encode_ms: 0,
-  }; // prettier-ignore
+    type: "picture",
+    picture: 0,
+    camera: camera.seq,
+    drag,
+    seq,
+    revision,
+    view,
+    before,
+    split,
+    x: 0,
+    y: 0,
+    width,
+    height,
+    full_width: width,
+    full_height: height,
+    final,
+    format: "rgb",
+    picture_bytes: 0,
+    depth_bytes: 0,
+    depth_width: 0,
+    depth_height: 0,
+    depth_scale: 1,
+    render_ms: renderMs,
+    encode_ms: 0,
+  };
 }

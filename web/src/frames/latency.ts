@@ -35,14 +35,24 @@ export class Latency {
   /** The mouse has moved and the drag with it. */
   moved(drag: number, seq: number, time: number): void {
     this.moves.push({
-      drag, seq, moved: time, lines: null, received: null, decoded: null, presented: null, renderMs: 0, encodeMs: 0, width: 0,
-    }); // prettier-ignore
+      drag,
+      seq,
+      moved: time,
+      lines: null,
+      received: null,
+      decoded: null,
+      presented: null,
+      renderMs: 0,
+      encodeMs: 0,
+      width: 0,
+    });
     if (this.moves.length > REMEMBERED) this.moves.shift();
   }
 
   /** A frame is on the screen: it shows the lines of all moves so far. */
   framed(time: number): void {
-    for (let i = this.moves.length - 1; i >= 0 && this.moves[i].lines === null; i--) this.moves[i].lines = time;
+    for (let i = this.moves.length - 1; i >= 0 && this.moves[i].lines === null; i--)
+      this.moves[i].lines = time;
   }
 
   /** A picture is on the screen; the moves up to the one that it shows are done with. */
@@ -52,7 +62,14 @@ export class Latency {
     if (picture.drag === 0) return;
     const move = this.moves.find((m) => m.drag === picture.drag && m.seq === picture.seq);
     if (move?.presented !== null) return;
-    Object.assign(move, { received, decoded, presented: picture.time, renderMs, encodeMs, width: picture.fullWidth });
+    Object.assign(move, {
+      received,
+      decoded,
+      presented: picture.time,
+      renderMs,
+      encodeMs,
+      width: picture.fullWidth,
+    });
   }
 
   /** Pictures a second, over the last two seconds. */

@@ -98,7 +98,10 @@ export class PageRenderer {
   /** Takes a message's edits. */
   take(header: EditsHeader, file: ArrayBuffer): void {
     if (header.why !== null) this.refuse(header.why, header.picture);
-    else this.scene.take(header, file, (why) => (why === null ? this.tookEdits(header) : this.refuse(why, header.picture)));
+    else
+      this.scene.take(header, file, (why) =>
+        why === null ? this.tookEdits(header) : this.refuse(why, header.picture),
+      );
   }
 
   private tookEdits(header: EditsHeader): void {
@@ -211,13 +214,15 @@ export class PageRenderer {
     const { width, height } = app.viewport.pixels;
     if (still.whole) {
       const last = app.presenter.last;
-      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq) app.presenter.drew(this.header(width, height), 0, 0);
+      if (app.camera.resting && last?.picture === 0 && last.camera !== app.camera.seq)
+        app.presenter.drew(this.header(width, height), 0, 0);
       return;
     }
     const most = this.drawer.inBands ? this.pacing.rows(width, height) : height;
     const settles = this.told.here === "all" || this.drawer.inBands ? SETTLES : RESTS;
     const rows = still.next(performance.now(), height, most, settles);
-    if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height)) this.present(width, height);
+    if (rows !== null && this.paint(width, height, rows, true) && still.drew(rows, height))
+      this.present(width, height);
   }
 
   /** Whether a whole picture of the page's own stays until the server's is there. */
@@ -226,20 +231,36 @@ export class PageRenderer {
   }
 
   /** Draws rows of the view, splats `sorted` for it or as they were; false where there is nothing to draw. */
-  private paint(width: number, height: number, rows: { first: number; count: number }, sorted: boolean): boolean {
+  private paint(
+    width: number,
+    height: number,
+    rows: { first: number; count: number },
+    sorted: boolean,
+  ): boolean {
     const { drawer, app } = this;
     const { view, before, split } = app.store.now;
     const { viewport } = app;
     const focal = (0.5 * height) / Math.tan((viewport.camera.fov * Math.PI) / 360);
     drawer.setSize(width, height);
-    drawer.setCamera({ c2w: viewport.c2w, width, height, fx: focal, fy: focal, cx: 0.5 * width, cy: 0.5 * height });
+    drawer.setCamera({
+      c2w: viewport.c2w,
+      width,
+      height,
+      fx: focal,
+      fy: focal,
+      cx: 0.5 * width,
+      cy: 0.5 * height,
+    });
     const { compiled } = drawer;
     const began = performance.now();
     const left = before || split === null ? 0 : Math.round(split * width);
     const normals = view === "normals";
     let drew = true;
     this.inOrder = true;
-    for (const [edited, first, end] of [[false, 0, left], [!before, left, width]] as const) {
+    for (const [edited, first, end] of [
+      [false, 0, left],
+      [!before, left, width],
+    ] as const) {
       if (first === end) continue;
       drawer.edited = edited;
       drew = drawer.render({ normals, sorted, rows, columns: { first, count: end - first } }) && drew;
@@ -250,7 +271,8 @@ export class PageRenderer {
     if (!drew) return false;
     this.took = performance.now() - began;
     // What had to wait for a shader says nothing of pictures to come.
-    if (drawer.compiled === compiled) this.measured(width * rows.count, this.took, height === viewport.pixels.height);
+    if (drawer.compiled === compiled)
+      this.measured(width * rows.count, this.took, height === viewport.pixels.height);
     return true;
   }
 
@@ -259,7 +281,9 @@ export class PageRenderer {
     const { app, drawer } = this;
     const { view } = app.store.now;
     const distances = drawer.distances(MOST_DISTANCES);
-    app.pictures.showOwn(distances, (framebuffer, across, down) => drawer.show(across, down, framebuffer, view));
+    app.pictures.showOwn(distances, (framebuffer, across, down) =>
+      drawer.show(across, down, framebuffer, view),
+    );
     this.drawn += 1;
     const { edits } = this.scene;
     app.presenter.drew(this.header(width, height), edits?.received ?? 0, edits?.taken ?? 0);

@@ -11,7 +11,8 @@ export interface Parcel {
 /** The header of a binary message, and where what it heads begins. */
 export function headed(message: ArrayBuffer): { header: PictureHeader | EditsHeader; start: number } {
   const length = new DataView(message).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as PictureHeader | EditsHeader;
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as
+    PictureHeader | EditsHeader;
   return { header, start: 4 + length };
 }
 
@@ -44,6 +45,9 @@ export function pack(header: PictureHeader, picture: Uint8Array, depth: Uint16Ar
   new DataView(bytes.buffer).setUint32(0, json.length, true);
   bytes.set(json, 4);
   bytes.set(picture, 4 + json.length);
-  bytes.set(new Uint8Array(depth.buffer, depth.byteOffset, depth.byteLength), 4 + json.length + picture.length);
+  bytes.set(
+    new Uint8Array(depth.buffer, depth.byteOffset, depth.byteLength),
+    4 + json.length + picture.length,
+  );
   return bytes.buffer;
 }

@@ -129,7 +129,12 @@ export class Pictures {
   }
 
   /** Shows a part of a picture: all of it, or a tile. */
-  show(header: PictureHeader, image: ImageBitmap | ImageData, depth: Uint16Array, viewpoint: Viewpoint | null): void {
+  show(
+    header: PictureHeader,
+    image: ImageBitmap | ImageData,
+    depth: Uint16Array,
+    viewpoint: Viewpoint | null,
+  ): void {
     this.fit();
     const texture = new Texture(image);
     texture.flipY = false;
@@ -161,7 +166,10 @@ export class Pictures {
     renderer.setRenderTarget(null);
     this.depth.take(width, height, values);
     this.uploadDepth();
-    this.viewpoint = { viewProjection: this.viewport.viewProjection, eye: this.viewport.camera.position.clone() };
+    this.viewpoint = {
+      viewProjection: this.viewport.viewProjection,
+      eye: this.viewport.camera.position.clone(),
+    };
     this.surface.visible = true;
     this.follow();
   }

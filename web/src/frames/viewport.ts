@@ -1,5 +1,15 @@
 /** The canvas: three's scene and camera, orbiting, and frames drawn only when something is other than before. */
-import { MathUtils, Matrix4, PerspectiveCamera, Quaternion, Ray, Scene, Vector2, Vector3, WebGLRenderer } from "three";
+import {
+  MathUtils,
+  Matrix4,
+  PerspectiveCamera,
+  Quaternion,
+  Ray,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { ScreenPoint } from "../editing/picking";
 import type { Vec3 } from "../net/protocol";

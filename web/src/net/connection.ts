@@ -5,7 +5,10 @@ const FIRST_WAIT = 250;
 const LONGEST_WAIT = 4000;
 
 /** What of a WebSocket is used, so that tests can stand in for it. */
-export type Socket = Pick<WebSocket, "binaryType" | "readyState" | "onopen" | "onclose" | "onmessage" | "send">;
+export type Socket = Pick<
+  WebSocket,
+  "binaryType" | "readyState" | "onopen" | "onclose" | "onmessage" | "send"
+>;
 
 export interface Handlers {
   opened(): void;

@@ -18,15 +18,28 @@ export function openAddress(page: Location, name: string): string {
 }
 
 /** What of an XMLHttpRequest is used, so that tests can stand in for it: fetch tells nothing of what it has sent. */
-export type Request = Pick<XMLHttpRequest, "open" | "send" | "status" | "responseText" | "onload" | "onerror"> & {
+export type Request = Pick<
+  XMLHttpRequest,
+  "open" | "send" | "status" | "responseText" | "onload" | "onerror"
+> & {
   upload: Pick<XMLHttpRequestUpload, "onprogress">;
 };
 
 /** Sends a file; null once it is opened, else why it is not. `progress` is told what share has been sent. */
-export function send(request: Request, file: File, address: string, progress: (share: number) => void): Promise<string | null> {
+export function send(
+  request: Request,
+  file: File,
+  address: string,
+  progress: (share: number) => void,
+): Promise<string | null> {
   return new Promise((resolve) => {
     request.upload.onprogress = ({ loaded, total }) => progress(total > 0 ? loaded / total : 0);
-    request.onload = () => resolve(request.status === 200 ? null : request.responseText.trim() || `the server refused it (${request.status})`);
+    request.onload = () =>
+      resolve(
+        request.status === 200
+          ? null
+          : request.responseText.trim() || `the server refused it (${request.status})`,
+      );
     request.onerror = () => resolve(`${file.name} could not be sent: the server is gone`);
     request.open("POST", address);
     request.send(file);

@@ -108,7 +108,8 @@ export class AnyRenderer implements SceneDrawer<AnyEdits> {
   /** Edits of what is loaded; null for none. */
   setEdits(edits: AnyEdits | null): void {
     if (this.inner instanceof SplatRenderer) {
-      if (edits !== null && !isOfSplats(edits)) throw new Error("edits of voxels, the page shows splats; reload it");
+      if (edits !== null && !isOfSplats(edits))
+        throw new Error("edits of voxels, the page shows splats; reload it");
       this.inner.setEdits(edits);
     } else {
       if (isOfSplats(edits)) throw new Error("edits of splats, the page shows voxels; reload it");
@@ -120,7 +121,12 @@ export class AnyRenderer implements SceneDrawer<AnyEdits> {
     return this.inner.render(picture);
   }
 
-  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null, view: View = "colour"): void {
+  show(
+    width: number,
+    height: number,
+    framebuffer: WebGLFramebuffer | null = null,
+    view: View = "colour",
+  ): void {
     this.inner.show(width, height, framebuffer, view);
   }
 
@@ -154,7 +160,9 @@ export function magicOf(bytes: Bytes): string {
 }
 
 /** The first 8 letters of a file, and the whole of it. */
-async function begun(source: ReadableStream<Bytes> | ArrayBuffer): Promise<{ start: string; whole: ReadableStream<Bytes> | ArrayBuffer }> {
+async function begun(
+  source: ReadableStream<Bytes> | ArrayBuffer,
+): Promise<{ start: string; whole: ReadableStream<Bytes> | ArrayBuffer }> {
   if (source instanceof ArrayBuffer) return { start: magicOf(new Uint8Array(source)), whole: source };
   const reader = source.getReader();
   const held: Bytes[] = [];

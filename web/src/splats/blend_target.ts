@@ -13,8 +13,10 @@ export interface Formats {
 
 export function formatsOf(gl: GL): Formats {
   const floats = gl.getExtension("EXT_color_buffer_float");
-  if (floats && gl.getExtension("EXT_float_blend")) return { colour: gl.RGBA16F, distance: gl.R32F, isByte: false };
-  if (floats ?? gl.getExtension("EXT_color_buffer_half_float")) return { colour: gl.RGBA16F, distance: gl.RGBA16F, isByte: false };
+  if (floats && gl.getExtension("EXT_float_blend"))
+    return { colour: gl.RGBA16F, distance: gl.R32F, isByte: false };
+  if (floats ?? gl.getExtension("EXT_color_buffer_half_float"))
+    return { colour: gl.RGBA16F, distance: gl.RGBA16F, isByte: false };
   return { colour: gl.RGBA8, distance: gl.RGBA8, isByte: true };
 }
 
@@ -32,7 +34,11 @@ export class Gathering {
   /** Empties the targets, made where they are not there or of another size, and draws into them from now on. */
   begin(width: number, height: number, normals: boolean): void {
     const { gl, formats } = this;
-    if (this.textures && (width !== this.width || height !== this.height || (normals && !this.textures.normal))) this.dispose();
+    if (
+      this.textures &&
+      (width !== this.width || height !== this.height || (normals && !this.textures.normal))
+    )
+      this.dispose();
     if (!this.textures) {
       this.width = width;
       this.height = height;
@@ -45,7 +51,8 @@ export class Gathering {
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
       const { colour, distance, normal } = this.textures;
       for (const [n, texture] of [colour, distance, normal].entries())
-        if (texture) gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
+        if (texture)
+          gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.framebuffer);
     gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1, ...(normals ? [gl.COLOR_ATTACHMENT2] : [])]);
@@ -60,7 +67,8 @@ export class Gathering {
 
   dispose(): void {
     const { gl, textures } = this;
-    if (textures) for (const texture of Object.values<WebGLTexture | null>(textures)) gl.deleteTexture(texture);
+    if (textures)
+      for (const texture of Object.values<WebGLTexture | null>(textures)) gl.deleteTexture(texture);
     gl.deleteFramebuffer(this.framebuffer);
     this.forget();
   }

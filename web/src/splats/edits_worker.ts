@@ -14,7 +14,11 @@ self.onmessage = async ({ data }: MessageEvent<ToReader>): Promise<void> => {
   const { file, answer } = data;
   try {
     const edits = await readSplatEdits(file);
-    answer.postMessage({ edits } satisfies FromReader, [edits.hidden.buffer, edits.means.buffer, edits.records.buffer]);
+    answer.postMessage({ edits } satisfies FromReader, [
+      edits.hidden.buffer,
+      edits.means.buffer,
+      edits.records.buffer,
+    ]);
   } catch (error) {
     answer.postMessage({ why: error instanceof Error ? error.message : String(error) } satisfies FromReader);
   }

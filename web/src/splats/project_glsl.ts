@@ -162,7 +162,10 @@ function colours(degree: number): string {
     "  uvec2 last = texel(records, 2u * splat + 1u).zw;",
     "  uint both = texel(records, 2u * splat).w;",
     `  vec3 rgb = 0.5 + ${BASIS[0]} * colourStep * (vec3(both & 65535u, both >> 16, last.y >> 16) - 32768.0);`,
-    ...Array.from({ length: texels }, (_, n) => `  uvec4 t${n} = texel(harmonics, ${texels}u * splat + ${n}u);`),
+    ...Array.from(
+      { length: texels },
+      (_, n) => `  uvec4 t${n} = texel(harmonics, ${texels}u * splat + ${n}u);`,
+    ),
   ];
   for (let k = 1; k < terms; k++) {
     const bytes = [0, 1, 2].map((channel) => {

@@ -39,7 +39,19 @@ export class Projection {
     plainUnpacking(gl);
     gl.bindTexture(gl.TEXTURE_2D, this.order);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, whole, gl.RED_INTEGER, gl.UNSIGNED_INT, numbers);
-    if (rest > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, gl.RED_INTEGER, gl.UNSIGNED_INT, numbers, whole * WIDTH);
+    if (rest > 0)
+      gl.texSubImage2D(
+        gl.TEXTURE_2D,
+        0,
+        0,
+        whole,
+        rest,
+        1,
+        gl.RED_INTEGER,
+        gl.UNSIGNED_INT,
+        numbers,
+        whole * WIDTH,
+      );
     gl.bindTexture(gl.TEXTURE_2D, null);
   }
 

@@ -7,14 +7,24 @@ export function rotationOf(a: number, b: number, c: number): number[] {
   const most = Math.sqrt(Math.max(0, 1 - three[0] ** 2 - three[1] ** 2 - three[2] ** 2));
   const [w, x, y, z] = [...three.slice(0, left), most, ...three.slice(left)];
   return [
-    1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-  ]; // prettier-ignore
+    1 - 2 * (y * y + z * z),
+    2 * (x * y - w * z),
+    2 * (x * z + w * y),
+    2 * (x * y + w * z),
+    1 - 2 * (x * x + z * z),
+    2 * (y * z - w * x),
+    2 * (x * z - w * y),
+    2 * (y * z + w * x),
+    1 - 2 * (x * x + y * y),
+  ];
 }
 
 /** Axes [M, 9], row by row, each column as long as the standard deviation along it: A of a covariance A A^T. */
-export function axesOf(rotations: Uint16Array, scales: Uint16Array, [low, high]: [number, number]): Float32Array<ArrayBuffer> {
+export function axesOf(
+  rotations: Uint16Array,
+  scales: Uint16Array,
+  [low, high]: [number, number],
+): Float32Array<ArrayBuffer> {
   const count = rotations.length / 3;
   const out = new Float32Array(9 * count);
   for (let n = 0; n < count; n++) {

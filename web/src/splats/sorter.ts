@@ -132,5 +132,9 @@ export class Sorter {
 }
 
 export function same(one: Depths, other: Depths): boolean {
-  return one.offset === other.offset && one.near === other.near && one.axis.every((value, n) => value === other.axis[n]);
+  return (
+    one.offset === other.offset &&
+    one.near === other.near &&
+    one.axis.every((value, n) => value === other.axis[n])
+  );
 }

@@ -36,17 +36,26 @@ export async function readSplatEdits(source: ArrayBuffer): Promise<SplatEdits> {
   const file = await PageFile.open<EditsHeader>(new ByteReader(source), EDITS_MAGIC, VERSION);
   const { count, changed, packed, log_scales: logs } = file.header;
   const bytes = async (name: string): Promise<Uint8Array> => (await file.read(name)) as Uint8Array;
-  const floats = async (name: string): Promise<Float32Array<ArrayBuffer>> => (await file.read(name)) as Float32Array<ArrayBuffer>;
+  const floats = async (name: string): Promise<Float32Array<ArrayBuffer>> =>
+    (await file.read(name)) as Float32Array<ArrayBuffer>;
   const hidden = unpackedBits(await bytes("hidden"), count);
   const sources = (await file.read("sources")) as Int32Array;
-  const means = packed ? meansOf(await floats("chunks"), await bytes("means"), changed) : await floats("means");
+  const means = packed
+    ? meansOf(await floats("chunks"), await bytes("means"), changed)
+    : await floats("means");
   const covariances = packed
     ? covariancesOf(axesOf(wholes(await bytes("rotations")), wholes(await bytes("scales")), logs))
     : await floats("covariances");
   const opacities = wholes(await bytes("opacities"));
   const turns = wholes(await bytes("turns"));
   const gains = (await file.read("gains")) as Int32Array;
-  return { count, hidden, changed, means, records: changedRecords(sources, means, covariances, opacities, turns, gains) };
+  return {
+    count,
+    hidden,
+    changed,
+    means,
+    records: changedRecords(sources, means, covariances, opacities, turns, gains),
+  };
 }
 
 /** The first `count` bits, 0 or 1, the lowest of a byte first. */

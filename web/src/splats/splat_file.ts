@@ -63,7 +63,8 @@ export async function* readSplatLevels(
     let first = 0;
     for (const [number, end] of header.levels.entries()) {
       const count = end - first;
-      const bytes = async (name: string): Promise<Uint8Array> => (await file.read(`${number}.${name}`)) as Uint8Array;
+      const bytes = async (name: string): Promise<Uint8Array> =>
+        (await file.read(`${number}.${name}`)) as Uint8Array;
       const chunks = (await file.read(`${number}.chunks`)) as Float32Array;
       const means = meansOf(chunks, await bytes("means"), count);
       const rotations = await bytes("rotations");

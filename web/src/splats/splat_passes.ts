@@ -160,7 +160,12 @@ export class SplatPasses {
     gl.uniform1i(uniform(name), unit);
   }
 
-  private setView(uniform: Program["uniform"], { header }: SplatStore, camera: PinholeCamera, near: number): void {
+  private setView(
+    uniform: Program["uniform"],
+    { header }: SplatStore,
+    camera: PinholeCamera,
+    near: number,
+  ): void {
     const { gl } = this;
     const { width, height } = this.targets;
     const { c2w } = camera;
@@ -174,7 +179,13 @@ export class SplatPasses {
     gl.uniform2f(uniform("focal"), fx, fy);
     gl.uniform2f(uniform("centre"), cx, cy);
     gl.uniform2f(uniform("size"), width, height);
-    gl.uniform4f(uniform("limits"), -cx / fx - beyondX, (width - cx) / fx + beyondX, -cy / fy - beyondY, (height - cy) / fy + beyondY);
+    gl.uniform4f(
+      uniform("limits"),
+      -cx / fx - beyondX,
+      (width - cx) / fx + beyondX,
+      -cy / fy - beyondY,
+      (height - cy) / fy + beyondY,
+    );
     gl.uniform1f(uniform("near"), nearestOf(header, near));
   }
 

@@ -155,7 +155,14 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
   /** Has the splats of edits sorted, and is done when `setEdits` with the same edits need not wait for that. */
   async prepare(edits: SplatEdits): Promise<void> {
     const { store, camera } = this;
-    if (store === null || camera === null || !this.edited || edits.changed === 0 || edits.count !== store.header.count) return;
+    if (
+      store === null ||
+      camera === null ||
+      !this.edited ||
+      edits.changed === 0 ||
+      edits.count !== store.header.count
+    )
+      return;
     const set = changedSet(edits, store);
     this.prepared = { edits, set, own: store.set };
     await this.sorters.after.prepare(set, depthsOf(store.header, camera, this.near));
@@ -172,9 +179,12 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
       throw new Error(`edits of ${edits.count} splats, the page has ${this.store.header.count}; reload it`);
     const bytes = this.bytes + (4 * CHANGED + PROJECTED) * edits.changed;
     if (bytes > this.memory)
-      throw new TooLarge(`the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`);
+      throw new TooLarge(
+        `the edited splats take ${mebibytes(bytes)} MiB of the GPU, more than the ${mebibytes(this.memory)} allowed`,
+      );
     const texture = new WordTexture(this.gl, edits.records.length);
-    if (edits.changed > 0) texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
+    if (edits.changed > 0)
+      texture.putRows(edits.records, 0, Math.ceil(edits.records.length / texture.stride));
     const { set, own } = prepared?.edits === edits ? prepared : { set: null, own: null };
     this.changed = { edits, texture, set, own };
     this.uploaded.last = edits.changed > 0 ? edits.records.byteLength : 0;
@@ -195,13 +205,28 @@ export class SplatRenderer implements SceneDrawer<SplatEdits> {
     const rows = picture.rows ?? { first: 0, count: height };
     const columns = picture.columns ?? { first: 0, count: width };
     const changed = this.changed?.texture ?? null;
-    this.passes.draw({ store, changed, camera, near, order, normals: picture.normals ?? false, background, rows, columns });
+    this.passes.draw({
+      store,
+      changed,
+      camera,
+      near,
+      order,
+      normals: picture.normals ?? false,
+      background,
+      rows,
+      columns,
+    });
     unbind(gl);
     return true;
   }
 
   /** Puts a view of what was drawn on the canvas, or in a framebuffer, of this size. */
-  show(width: number, height: number, framebuffer: WebGLFramebuffer | null = null, view: View = "colour"): void {
+  show(
+    width: number,
+    height: number,
+    framebuffer: WebGLFramebuffer | null = null,
+    view: View = "colour",
+  ): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     this.passes.bindVertices();

@@ -32,7 +32,9 @@ export class SplatStore {
     const coefficients = harmonicWords(degree);
     this.bytes = (4 * (RECORD + coefficients) + PROJECTED) * count;
     if (this.bytes > limit)
-      throw new TooLarge(`the splats take ${Math.ceil(this.bytes / 2 ** 20)} MiB of the GPU, more than the ${Math.floor(limit / 2 ** 20)} allowed`);
+      throw new TooLarge(
+        `the splats take ${Math.ceil(this.bytes / 2 ** 20)} MiB of the GPU, more than the ${Math.floor(limit / 2 ** 20)} allowed`,
+      );
     this.means = new Float32Array(3 * count);
     this.words = new Uint32Array(RECORD * count);
     this.harmonicWords = new Uint32Array(coefficients * count);
@@ -75,7 +77,8 @@ export class SplatStore {
   private async upload(first: number, end: number, wanted: () => boolean): Promise<void> {
     const coefficients = harmonicWords(this.header.degree);
     await this.records.put(this.words, RECORD * first, RECORD * end, wanted);
-    if (wanted()) await this.harmonics.put(this.harmonicWords, coefficients * first, coefficients * end, wanted);
+    if (wanted())
+      await this.harmonics.put(this.harmonicWords, coefficients * first, coefficients * end, wanted);
     if (wanted()) this.set = { means: this.means.subarray(0, 3 * end), hidden: null, changed: null };
   }
 }

@@ -19,7 +19,10 @@ export class WordTexture {
   ) {
     this.rows = Math.max(1, Math.ceil(words / (4 * WIDTH)));
     const most = largest(gl, gl.MAX_TEXTURE_SIZE);
-    if (this.rows > most) throw new TooLarge(`the splats take ${this.rows} rows of a texture, more than the ${most} that the GPU has`);
+    if (this.rows > most)
+      throw new TooLarge(
+        `the splats take ${this.rows} rows of a texture, more than the ${most} that the GPU has`,
+      );
     while (gl.getError() !== gl.NO_ERROR);
     this.texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
@@ -36,7 +39,12 @@ export class WordTexture {
   readonly stride = 4 * WIDTH;
 
   /** Uploads the rows that hold words from `first` to `end` of all words. */
-  async put(words: Uint32Array<ArrayBuffer>, first: number, end: number, wanted: () => boolean): Promise<void> {
+  async put(
+    words: Uint32Array<ArrayBuffer>,
+    first: number,
+    end: number,
+    wanted: () => boolean,
+  ): Promise<void> {
     const { stride } = this;
     for (let row = Math.floor(first / stride); row * stride < end; row += ROWS) {
       if (row * stride > first) await new Promise((done) => setTimeout(done));

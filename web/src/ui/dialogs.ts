@@ -22,15 +22,23 @@ export interface Dialogs {
 
 export function dialogs(app: App): Dialogs {
   const host = h("div");
-  const field = (label: string, input: HTMLInputElement): HTMLElement => h("label", { class: "field" }, h("span", {}, label), input);
-  const text = (value: string): HTMLInputElement => h("input", { type: "text", value, required: true, maxLength: 1000, spellcheck: false });
+  const field = (label: string, input: HTMLInputElement): HTMLElement =>
+    h("label", { class: "field" }, h("span", {}, label), input);
+  const text = (value: string): HTMLInputElement =>
+    h("input", { type: "text", value, required: true, maxLength: 1000, spellcheck: false });
   const number = (value: number, min: number, max: number): HTMLInputElement =>
     h("input", { type: "number", value: String(value), min: String(min), max: String(max), required: true });
   const check = (): HTMLInputElement => h("input", { type: "checkbox" });
 
   function ask(title: string, action: string, fields: HTMLElement[], done: () => void): void {
     const cancel = h("button", { type: "button", class: "text", onclick: () => dialog.close() }, "Cancel");
-    const form = h("form", { method: "dialog" }, h("h2", {}, title), ...fields, h("div", { class: "bar end" }, cancel, h("button", { class: "text primary" }, action)));
+    const form = h(
+      "form",
+      { method: "dialog" },
+      h("h2", {}, title),
+      ...fields,
+      h("div", { class: "bar end" }, cancel, h("button", { class: "text primary" }, action)),
+    );
     const dialog = h("dialog", { onclose: () => dialog.remove() }, form);
     form.onsubmit = done;
     host.append(dialog);
@@ -42,9 +50,14 @@ export function dialogs(app: App): Dialogs {
     saveAs() {
       const path = text(app.store.now.state?.path ?? "");
       const overwrite = check();
-      ask("Save the scene as", "Save", [field("Folder", path), field("Replace what is there", overwrite)], () => {
-        app.send({ type: "save_as", path: path.value, overwrite: overwrite.checked });
-      });
+      ask(
+        "Save the scene as",
+        "Save",
+        [field("Folder", path), field("Replace what is there", overwrite)],
+        () => {
+          app.send({ type: "save_as", path: path.value, overwrite: overwrite.checked });
+        },
+      );
       path.select();
     },
     paste() {
@@ -53,21 +66,38 @@ export function dialogs(app: App): Dialogs {
         const splats = app.store.now.hello?.splats === true;
         if (answer.sources.length === 0) {
           const what = splats ? "no other scene of splats and no splat file" : "no other scene of voxels";
-          app.say(`${what} lies beside this scene; put one there, or start the editor with --root`, "warning");
+          app.say(
+            `${what} lies beside this scene; put one there, or start the editor with --root`,
+            "warning",
+          );
           return;
         }
-        const source = h("select", { name: "source" }, ...answer.sources.map((path) => h("option", { value: path }, path)));
-        ask("Paste from another scene", "Paste", [h("label", { class: "field" }, h("span", {}, splats ? "Scene or file" : "Scene"), source)], () => {
-          app.expectEdit();
-          app.send({ type: "paste_scene", source: source.value });
-        });
+        const source = h(
+          "select",
+          { name: "source" },
+          ...answer.sources.map((path) => h("option", { value: path }, path)),
+        );
+        ask(
+          "Paste from another scene",
+          "Paste",
+          [h("label", { class: "field" }, h("span", {}, splats ? "Scene or file" : "Scene"), source)],
+          () => {
+            app.expectEdit();
+            app.send({ type: "paste_scene", source: source.value });
+          },
+        );
       });
     },
     download() {
       const form = h("select", {}, ...FORMS.map(([value, label]) => h("option", { value }, label)));
-      ask("Download the edited splats", "Download", [h("label", { class: "field" }, h("span", {}, "File"), form)], () => {
-        app.send({ type: "export", form: form.value as ExportSplats["form"] });
-      });
+      ask(
+        "Download the edited splats",
+        "Download",
+        [h("label", { class: "field" }, h("span", {}, "File"), form)],
+        () => {
+          app.send({ type: "export", form: form.value as ExportSplats["form"] });
+        },
+      );
     },
     render(what) {
       const film = what === "camera_path";
@@ -78,13 +108,19 @@ export function dialogs(app: App): Dialogs {
       const fps = number(24, 1, 120);
       const overwrite = check();
       const fields = [field(film ? "File" : "Folder", out)];
-      if (film) fields.push(field("Width", sizes[0]), field("Height", sizes[1]), field("Pictures per second", fps));
+      if (film)
+        fields.push(field("Width", sizes[0]), field("Height", sizes[1]), field("Pictures per second", fps));
       fields.push(field("Replace what is there", overwrite));
       ask(film ? "Render the camera path" : "Render the test views", "Render", fields, () => {
         app.send({
-          type: "render", what, out: out.value, overwrite: overwrite.checked, fps: Number(fps.value),
-          width: Number(sizes[0].value), height: Number(sizes[1].value),
-        }); // prettier-ignore
+          type: "render",
+          what,
+          out: out.value,
+          overwrite: overwrite.checked,
+          fps: Number(fps.value),
+          width: Number(sizes[0].value),
+          height: Number(sizes[1].value),
+        });
       });
     },
   };

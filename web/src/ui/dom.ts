@@ -1,7 +1,9 @@
 /** Elements in one expression, and the icons. */
 import { createElement, type IconNode } from "lucide";
 
-type Properties<T extends keyof HTMLElementTagNameMap> = Partial<Omit<HTMLElementTagNameMap[T], "style" | "dataset">> & {
+type Properties<T extends keyof HTMLElementTagNameMap> = Partial<
+  Omit<HTMLElementTagNameMap[T], "style" | "dataset">
+> & {
   class?: string;
   data?: Record<string, string>;
 };

@@ -1,5 +1,18 @@
 /** The list of edits: name, colour, shown or not, locked or not, order; and what can be done to the selected one. */
-import { ChevronDown, ChevronUp, ClipboardPaste, Copy, Eye, EyeOff, FlipHorizontal, Lock, LockOpen, Plus, Trash2, TriangleAlert } from "lucide";
+import {
+  ChevronDown,
+  ChevronUp,
+  ClipboardPaste,
+  Copy,
+  Eye,
+  EyeOff,
+  FlipHorizontal,
+  Lock,
+  LockOpen,
+  Plus,
+  Trash2,
+  TriangleAlert,
+} from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import type { EditState } from "../net/protocol";
@@ -7,7 +20,12 @@ import { looking, selected } from "../app/store";
 import type { Dialogs } from "./dialogs";
 import { h, icon, iconButton, section } from "./dom";
 
-const KIND: Record<EditState["kind"], string> = { continuous: "continuous", move: "move", copy: "copy", delete: "delete" };
+const KIND: Record<EditState["kind"], string> = {
+  continuous: "continuous",
+  move: "move",
+  copy: "copy",
+  delete: "delete",
+};
 
 const HINT = "Double-click the picture to put a pair of cages around what is there.";
 
@@ -27,7 +45,11 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
     });
   const mirrors = h("span", { class: "mirror" });
   for (const axis of ["x", "y", "z"] as const) {
-    const made = h("button", { type: "button", title: `Mirrored copy across ${axis}`, onclick: () => actions.mirror(axis) }, axis);
+    const made = h(
+      "button",
+      { type: "button", title: `Mirrored copy across ${axis}`, onclick: () => actions.mirror(axis) },
+      axis,
+    );
     needSelected.push(made);
     mirrors.append(made);
   }
@@ -35,7 +57,12 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
   const bar = h(
     "div",
     { class: "bar" },
-    iconButton(Plus, "New edit in the middle of the view; or double-click the picture", () => actions.place(), "add"),
+    iconButton(
+      Plus,
+      "New edit in the middle of the view; or double-click the picture",
+      () => actions.place(),
+      "add",
+    ),
     iconButton(ClipboardPaste, "Paste from another scene… (Shift+V)", () => dialogs.paste(), "paste-scene"),
     button(Copy, "Duplicate (Ctrl+D)", () => actions.duplicate(), "duplicate"),
     mirrors,
@@ -74,7 +101,17 @@ export function editsList(app: App, actions: Actions, dialogs: Pick<Dialogs, "pa
 
 /** All that a row shows, but for whether it is the selected one's. */
 function shown(edit: EditState, index: number): string {
-  return JSON.stringify([index, edit.id, edit.name, edit.colour, edit.kind, edit.enabled, edit.locked, edit.problem, edit.source]);
+  return JSON.stringify([
+    index,
+    edit.id,
+    edit.name,
+    edit.colour,
+    edit.kind,
+    edit.enabled,
+    edit.locked,
+    edit.problem,
+    edit.source,
+  ]);
 }
 
 function row(app: App, edit: EditState, index: number): HTMLElement {
@@ -83,18 +120,40 @@ function row(app: App, edit: EditState, index: number): HTMLElement {
   };
   const swatch = h("span", { class: "swatch" });
   swatch.style.background = edit.colour;
-  const name = h("span", { class: "name", title: "Double-click to rename" }, edit.name || `edit ${index + 1}`);
-  name.ondblclick = () => !looking(app.store.now) && rename(name, edit.name, (text) => change({ name: text }));
-  const problem = edit.problem === null ? null : h("span", { class: "problem", title: edit.problem }, icon(TriangleAlert, 15));
+  const name = h(
+    "span",
+    { class: "name", title: "Double-click to rename" },
+    edit.name || `edit ${index + 1}`,
+  );
+  name.ondblclick = () =>
+    !looking(app.store.now) && rename(name, edit.name, (text) => change({ name: text }));
+  const problem =
+    edit.problem === null
+      ? null
+      : h("span", { class: "problem", title: edit.problem }, icon(TriangleAlert, 15));
   const item = h(
     "li",
     { class: `edit${edit.enabled ? "" : " off"}`, draggable: true, data: { edit: String(edit.id) } },
     swatch,
     name,
     problem,
-    h("span", { class: "kind", title: edit.source === null ? "" : `from ${edit.source}` }, edit.source === null ? KIND[edit.kind] : "paste"),
-    iconButton(edit.enabled ? Eye : EyeOff, edit.enabled ? "Hide (H)" : "Show (H)", () => change({ enabled: !edit.enabled }), "eye"),
-    iconButton(edit.locked ? Lock : LockOpen, edit.locked ? "Unlock" : "Lock", () => change({ locked: !edit.locked }), "lock"),
+    h(
+      "span",
+      { class: "kind", title: edit.source === null ? "" : `from ${edit.source}` },
+      edit.source === null ? KIND[edit.kind] : "paste",
+    ),
+    iconButton(
+      edit.enabled ? Eye : EyeOff,
+      edit.enabled ? "Hide (H)" : "Show (H)",
+      () => change({ enabled: !edit.enabled }),
+      "eye",
+    ),
+    iconButton(
+      edit.locked ? Lock : LockOpen,
+      edit.locked ? "Unlock" : "Lock",
+      () => change({ locked: !edit.locked }),
+      "lock",
+    ),
   );
   item.onclick = (event) => {
     if (event.target instanceof Element && event.target.closest("button, input") === null) {

@@ -7,7 +7,12 @@ const GROUPS: Binding["group"][] = ["Tools", "Cages", "Edits", "View", "Scene"];
 
 export function help(app: App, bindings: Binding[]): HTMLElement {
   const line = ({ keys, what }: { keys: string[]; what: string }): HTMLElement =>
-    h("div", { class: "binding" }, h("span", {}, ...keys.map((key) => h("kbd", {}, key))), h("span", {}, what));
+    h(
+      "div",
+      { class: "binding" },
+      h("span", {}, ...keys.map((key) => h("kbd", {}, key))),
+      h("span", {}, what),
+    );
   const groups = GROUPS.map((group) =>
     h("div", {}, h("h2", {}, group), ...bindings.filter((binding) => binding.group === group).map(line)),
   );

@@ -4,7 +4,11 @@ import type { App } from "../app/app";
 import type { Job } from "../net/protocol";
 import { h, iconButton } from "./dom";
 
-const WHAT: Record<Job["what"], string> = { test_views: "Test views", camera_path: "Video", splats: "Splats" };
+const WHAT: Record<Job["what"], string> = {
+  test_views: "Test views",
+  camera_path: "Video",
+  splats: "Splats",
+};
 const GONE_AFTER = 8000;
 
 export function jobs(app: App): HTMLElement {
@@ -31,11 +35,20 @@ function shown(app: App, job: Job): HTMLElement {
   const bar = h("progress", { max: Math.max(1, job.total) });
   // Without a value it shows that something goes on, and not how far.
   if (job.what !== "splats" || job.state !== "running") bar.value = job.done;
-  const stop = job.state === "running" ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel") : null;
+  const stop =
+    job.state === "running"
+      ? iconButton(X, "Cancel", () => app.send({ type: "cancel_job", job: job.job }), "cancel")
+      : null;
   return h(
     "div",
     { class: `job ${job.state}` },
-    h("div", { class: "row" }, h("strong", {}, WHAT[job.what]), h("span", { class: "quiet", title: job.out }, described(job)), stop),
+    h(
+      "div",
+      { class: "row" },
+      h("strong", {}, WHAT[job.what]),
+      h("span", { class: "quiet", title: job.out }, described(job)),
+      stop,
+    ),
     bar,
   );
 }

@@ -26,10 +26,21 @@ export function options(app: App, actions: Actions): HTMLElement {
   const operations = h("ol", { class: "operations" });
   const pane = new Pane({ container: host });
   const model = {
-    kind: "continuous", from: "", shell: "flow", falloff: "smooth", width: 1, lattice: 0, error: "", fills: true, relight: "occlusion",
-    margin: 0.2, preserve: false,
-    position: point(0, 0, 0), turn: point(0, 0, 0), scale: point(1, 1, 1),
-  }; // prettier-ignore
+    kind: "continuous",
+    from: "",
+    shell: "flow",
+    falloff: "smooth",
+    width: 1,
+    lattice: 0,
+    error: "",
+    fills: true,
+    relight: "occlusion",
+    margin: 0.2,
+    preserve: false,
+    position: point(0, 0, 0),
+    turn: point(0, 0, 0),
+    scale: point(1, 1, 1),
+  };
   let filling = false;
   const change = (what: Omit<Change, "type" | "edit">): void => {
     const edit = selected(app.store.now);
@@ -76,12 +87,20 @@ export function options(app: App, actions: Actions): HTMLElement {
   kinds.on("change", ({ value }) => change({ kind: value as EditState["kind"] }));
   const from = kind.addBinding(model, "from", { label: "Pasted from", readonly: true });
   const continuous = [
-    kind.addBinding(model, "shell", { label: "Shell", options: SHELLS }).on("change", ({ value }) => change({ shell: value as EditState["shell"] })),
-    kind.addBinding(model, "falloff", { label: "Falloff", options: FALLOFFS }).on("change", ({ value }) => change({ falloff: value as EditState["falloff"] })),
-    kind.addBinding(model, "width", { label: "Width", min: 0.05, max: 1, step: 0.05 }).on("change", ({ value, last }) => {
-      if (last) change({ width: value });
-    }),
-    kind.addBinding(model, "lattice", { label: "Lattice", options: LATTICES }).on("change", ({ value }) => change({ lattice: value })),
+    kind
+      .addBinding(model, "shell", { label: "Shell", options: SHELLS })
+      .on("change", ({ value }) => change({ shell: value as EditState["shell"] })),
+    kind
+      .addBinding(model, "falloff", { label: "Falloff", options: FALLOFFS })
+      .on("change", ({ value }) => change({ falloff: value as EditState["falloff"] })),
+    kind
+      .addBinding(model, "width", { label: "Width", min: 0.05, max: 1, step: 0.05 })
+      .on("change", ({ value, last }) => {
+        if (last) change({ width: value });
+      }),
+    kind
+      .addBinding(model, "lattice", { label: "Lattice", options: LATTICES })
+      .on("change", ({ value }) => change({ lattice: value })),
     kind.addBinding(model, "error", { label: "Its error", readonly: true }),
   ] as const;
   const fills = kind.addBinding(model, "fills", { label: "Fill what is uncovered" });
@@ -89,7 +108,10 @@ export function options(app: App, actions: Actions): HTMLElement {
   explained(fills, "The ground or wall that the thing stood on goes on where it was; off, a hole stays (U).");
   const relight = kind.addBinding(model, "relight", { label: "Shadows go along", options: SHADOWS });
   relight.on("change", ({ value }) => change({ relight: value as EditState["relight"] }));
-  explained(relight, "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).");
+  explained(
+    relight,
+    "Soft shadows where things touch leave with the thing and appear at its new place, those of a dominant light too, where one is found, or all stay (Shift+U).",
+  );
   kind.addBinding(model, "preserve", { label: "Keep opacity" }).on("change", ({ value }) => {
     if (!filling) app.send({ type: "scene_change", preserve_opacity: value });
   });
@@ -99,9 +121,31 @@ export function options(app: App, actions: Actions): HTMLElement {
   cages.addBinding(model, "margin", { label: "Margin", min: 0.001, format: short });
   cages.addButton({ title: "Outer cage by margin" }).on("click", () => actions.outerMargin(model.margin));
 
-  const removeLast = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("remove_last_operation", edit.id)) }, "Take the last one back");
-  const reset = h("button", { type: "button", class: "text", onclick: () => actions.withSelected((edit) => actions.command("reset_operations", edit.id)) }, "Reset");
-  const whole = section("Selected edit", host, h("div", { class: "subtitle" }, "Operations"), operations, h("div", { class: "bar" }, removeLast, reset));
+  const removeLast = h(
+    "button",
+    {
+      type: "button",
+      class: "text",
+      onclick: () => actions.withSelected((edit) => actions.command("remove_last_operation", edit.id)),
+    },
+    "Take the last one back",
+  );
+  const reset = h(
+    "button",
+    {
+      type: "button",
+      class: "text",
+      onclick: () => actions.withSelected((edit) => actions.command("reset_operations", edit.id)),
+    },
+    "Reset",
+  );
+  const whole = section(
+    "Selected edit",
+    host,
+    h("div", { class: "subtitle" }, "Operations"),
+    operations,
+    h("div", { class: "bar" }, removeLast, reset),
+  );
 
   let marginOf: number | null = null;
   app.store.watch(["state", "mode", "cage"], (now) => {
@@ -110,9 +154,18 @@ export function options(app: App, actions: Actions): HTMLElement {
     if (edit === null) return;
     const { pivot } = leading(app.shown(edit), target(now));
     Object.assign(model, {
-      kind: edit.kind, from: edit.source?.split(/[\\/]/).at(-1) ?? "", shell: edit.shell, falloff: edit.falloff, width: edit.width, lattice: edit.lattice,
-      error: latticeError(edit), fills: edit.fill !== "none", relight: edit.relight, preserve: now.state?.preserve_opacity ?? false, position: point(...pivot),
-    }); // prettier-ignore
+      kind: edit.kind,
+      from: edit.source?.split(/[\\/]/).at(-1) ?? "",
+      shell: edit.shell,
+      falloff: edit.falloff,
+      width: edit.width,
+      lattice: edit.lattice,
+      error: latticeError(edit),
+      fills: edit.fill !== "none",
+      relight: edit.relight,
+      preserve: now.state?.preserve_opacity ?? false,
+      position: point(...pivot),
+    });
     if (marginOf !== edit.id) {
       marginOf = edit.id;
       model.margin = tidy(0.5 * extent(edit.inner), 3);
@@ -133,7 +186,7 @@ export function options(app: App, actions: Actions): HTMLElement {
     removeLast.disabled = reset.disabled = edit.operations.length === 0;
   });
   return whole;
-} // prettier-ignore
+}
 
 /** Gives a switch a tooltip, and its name and the tooltip to screen readers: its label is only beside it. */
 function explained(binding: BladeApi, what: string): void {

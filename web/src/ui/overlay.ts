@@ -18,7 +18,13 @@ export function overlay(app: App, pointer: Pointer): HTMLElement {
 
 /** A bar to drag: the field before its edits on the left of it, after them on the right. */
 function splitter(app: App): HTMLElement {
-  const bar = h("div", { class: "splitter" }, h("span", { class: "before" }, "before"), h("span", { class: "grip" }), h("span", { class: "after" }, "after"));
+  const bar = h(
+    "div",
+    { class: "splitter" },
+    h("span", { class: "before" }, "before"),
+    h("span", { class: "grip" }),
+    h("span", { class: "after" }, "after"),
+  );
   bar.onpointerdown = (event) => bar.setPointerCapture(event.pointerId);
   bar.onpointermove = (event) => {
     if (!bar.hasPointerCapture(event.pointerId)) return;
@@ -30,7 +36,7 @@ function splitter(app: App): HTMLElement {
     bar.style.left = `${100 * (split ?? 0)}%`;
   });
   return bar;
-} // prettier-ignore
+}
 
 /** What the drag amounts to, beside the mouse. */
 function readout(app: App, pointer: Pointer): HTMLElement {
@@ -66,7 +72,11 @@ function toasts(app: App): HTMLElement {
   const list = h("div", { class: "toasts" });
   app.store.watch(["notice"], ({ notice }) => {
     if (notice === null || notice.level === "info") return;
-    const toast = h("div", { class: `toast ${notice.level}`, role: "alert", onclick: () => toast.remove() }, notice.text);
+    const toast = h(
+      "div",
+      { class: `toast ${notice.level}`, role: "alert", onclick: () => toast.remove() },
+      notice.text,
+    );
     list.append(toast);
     while (list.children.length > 3) list.firstElementChild?.remove();
     setTimeout(() => toast.remove(), TOAST_STAYS);
@@ -98,7 +108,11 @@ function opening(app: App): HTMLElement {
 }
 
 function hint(app: App): HTMLElement {
-  const line = h("div", { class: "hint" }, "Double-click the picture to put a pair of cages around what is there");
+  const line = h(
+    "div",
+    { class: "hint" },
+    "Double-click the picture to put a pair of cages around what is there",
+  );
   app.store.watch(["state", "hello"], (now) => {
     line.hidden = looking(now) || now.state === null || now.state.edits.length > 0;
   });

@@ -6,26 +6,68 @@ import { duration } from "../app/camera_path";
 import type { EditState, Key, Vec3 } from "../net/protocol";
 import { h, icon, iconButton, iconLink, section } from "./dom";
 
-export function pathList(app: App, actions: Actions, dialogs: { render: (what: "test_views" | "camera_path") => void }): HTMLElement {
+export function pathList(
+  app: App,
+  actions: Actions,
+  dialogs: { render: (what: "test_views" | "camera_path") => void },
+): HTMLElement {
   const list = h("ol", { class: "keys" });
   const length = h("span", { class: "quiet" });
   const send = (keys: Key[], loop = app.store.now.state?.loop ?? false): void => {
     app.send({ type: "set_path", keys, loop });
   };
   const keys = (): Key[] => app.store.now.state?.keys ?? [];
-  const replaced = (index: number, key: Partial<Key>): Key[] => keys().map((old, i) => (i === index ? { ...old, ...key } : old));
-  const play = iconButton(Play, "Play the path in this page, as its video will be", () => app.player.toggle(), "play");
-  const loop = iconButton(Repeat, "Back to the first keyframe: a loop", () => send(keys(), !app.store.now.state?.loop), "loop");
-  const film = h("button", { type: "button", class: "text", onclick: () => dialogs.render("camera_path") }, "Render video…");
-  const file = iconLink(Download, "Download the camera path, as nerfstudio has it", `camera_path.json${location.search}`, "camera_path.json");
-  const views = h("button", { type: "button", class: "text", onclick: () => dialogs.render("test_views") }, "Render test views…");
+  const replaced = (index: number, key: Partial<Key>): Key[] =>
+    keys().map((old, i) => (i === index ? { ...old, ...key } : old));
+  const play = iconButton(
+    Play,
+    "Play the path in this page, as its video will be",
+    () => app.player.toggle(),
+    "play",
+  );
+  const loop = iconButton(
+    Repeat,
+    "Back to the first keyframe: a loop",
+    () => send(keys(), !app.store.now.state?.loop),
+    "loop",
+  );
+  const film = h(
+    "button",
+    { type: "button", class: "text", onclick: () => dialogs.render("camera_path") },
+    "Render video…",
+  );
+  const file = iconLink(
+    Download,
+    "Download the camera path, as nerfstudio has it",
+    `camera_path.json${location.search}`,
+    "camera_path.json",
+  );
+  const views = h(
+    "button",
+    { type: "button", class: "text", onclick: () => dialogs.render("test_views") },
+    "Render test views…",
+  );
 
   const row = (key: Key, index: number, edits: EditState[]): HTMLElement => {
-    const seconds = h("input", { type: "number", min: "0.1", max: "3600", step: "0.5", value: String(key.seconds), title: "Seconds to the next keyframe" });
+    const seconds = h("input", {
+      type: "number",
+      min: "0.1",
+      max: "3600",
+      step: "0.5",
+      value: String(key.seconds),
+      title: "Seconds to the next keyframe",
+    });
     seconds.onchange = () => send(replaced(index, { seconds: Math.max(0.1, Number(seconds.value) || 2) }));
     const parts = edits.map((edit) => {
       const at = key.parts[String(edit.id)] ?? 1;
-      const slider = h("input", { type: "range", min: "0", max: "1", step: "0.05", value: String(at), title: `How far “${edit.name}” has gone here` });
+      const slider = h("input", {
+        type: "range",
+        min: "0",
+        max: "1",
+        step: "0.05",
+        value: String(at),
+        title: `How far “${edit.name}” has gone here`,
+      });
       slider.style.accentColor = edit.colour;
       slider.onchange = () => {
         slider.blur();
@@ -36,11 +78,20 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
     return h(
       "li",
       { class: "key" },
-      h("div", { class: "row" },
+      h(
+        "div",
+        { class: "row" },
         h("span", { class: "number" }, String(index + 1)),
-        seconds, h("span", { class: "quiet" }, "s"), h("span", { class: "space" }),
+        seconds,
+        h("span", { class: "quiet" }, "s"),
+        h("span", { class: "space" }),
         iconButton(Crosshair, "Look from here", () => lookFrom(app, key.c2w, key.fov_y_deg), "go"),
-        iconButton(RefreshCw, "Take the view as it is now", () => send(replaced(index, { c2w: app.viewport.c2w })), "update"),
+        iconButton(
+          RefreshCw,
+          "Take the view as it is now",
+          () => send(replaced(index, { c2w: app.viewport.c2w })),
+          "update",
+        ),
         iconButton(Trash2, "Remove this keyframe", () => send(keys().filter((_, i) => i !== index)), "drop"),
       ),
       ...parts,
@@ -50,7 +101,13 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   // Rows that show the same stay where they are: what is being typed into one that was made anew is lost.
   let rows = new Map<string, HTMLElement>();
   app.store.watch(["state"], ({ state }) => {
-    if (state === null || (document.activeElement instanceof HTMLInputElement && list.contains(document.activeElement) && document.activeElement.type === "range")) return;
+    if (
+      state === null ||
+      (document.activeElement instanceof HTMLInputElement &&
+        list.contains(document.activeElement) &&
+        document.activeElement.type === "range")
+    )
+      return;
     const named = state.edits.map(({ id, name, colour }) => [id, name, colour]);
     const kept = rows;
     rows = new Map(
@@ -73,11 +130,20 @@ export function pathList(app: App, actions: Actions, dialogs: { render: (what: "
   app.player.changed = (on) => play.replaceChildren(icon(on ? Square : Play));
   return section(
     "Camera path",
-    h("div", { class: "bar" }, iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"), play, loop, file, h("span", { class: "space" }), length),
+    h(
+      "div",
+      { class: "bar" },
+      iconButton(Plus, "Keyframe from this view (K)", () => actions.addKey(), "add-key"),
+      play,
+      loop,
+      file,
+      h("span", { class: "space" }),
+      length,
+    ),
     list,
     h("div", { class: "bar" }, film, views),
   );
-} // prettier-ignore
+}
 
 function lookFrom(app: App, c2w: number[], fov_y_deg: number): void {
   const { hello } = app.store.now;

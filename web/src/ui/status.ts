@@ -34,7 +34,8 @@ export function status(app: App): HTMLElement {
     if (now.notice?.level === "info") until = setTimeout(() => app.store.set({ notice: null }), NOTICE_STAYS);
   });
   let late: ReturnType<typeof setTimeout> | undefined;
-  preparing.title = "Kernels are compiled once for a machine; what edits uncover, and their shadows, are worked out when a scene is opened";
+  preparing.title =
+    "Kernels are compiled once for a machine; what edits uncover, and their shadows, are worked out when a scene is opened";
   app.store.watch(["preparing", "figures", "state"], (now) => {
     const words = awaited(now);
     if (preparing.textContent !== (words ?? "")) preparing.textContent = words;
@@ -46,12 +47,25 @@ export function status(app: App): HTMLElement {
   });
   app.store.watch(["figures", "state", "connection"], ({ figures: f, state, connection: c }) => {
     const speed = f.perSecond >= 0.5 && !f.final ? `${f.perSecond.toFixed(0)} pictures/s · ` : "";
-    figures.textContent = f.width > 0 ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}` : "";
+    figures.textContent =
+      f.width > 0
+        ? `${speed}${f.width}×${f.height} · ${f.renderMs.toFixed(0)} ms · ${f.page ? "drawn here" : "by the server"}`
+        : "";
     figures.title = [app.page.why ?? "", app.page.choice.words].filter((text) => text !== "").join(" · ");
     saved.textContent = state === null ? "" : state.saved ? "saved" : "not saved";
     saved.classList.toggle("due", state?.saved === false);
     connection.className = `connection ${c}`;
     connection.title = { open: "Connected", connecting: "Connecting…", lost: "The server is gone" }[c];
   });
-  return h("footer", { class: "status" }, message, h("span", { class: "space" }), preparing, loading, figures, saved, connection);
+  return h(
+    "footer",
+    { class: "status" },
+    message,
+    h("span", { class: "space" }),
+    preparing,
+    loading,
+    figures,
+    saved,
+    connection,
+  );
 }

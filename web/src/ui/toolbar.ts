@@ -1,5 +1,19 @@
 /** The column on the left: tools, Set and Edit mode, axes, which cage, snapping. */
-import { Axis3d, Box, Boxes, Globe, Magnet, MousePointer2, Move3d, PencilRuler, Rotate3d, Scale3d, Spline, Square, SquareDashed } from "lucide";
+import {
+  Axis3d,
+  Box,
+  Boxes,
+  Globe,
+  Magnet,
+  MousePointer2,
+  Move3d,
+  PencilRuler,
+  Rotate3d,
+  Scale3d,
+  Spline,
+  Square,
+  SquareDashed,
+} from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import { looking, type Editor } from "../app/store";
@@ -20,33 +34,82 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     editing.push(made);
     return made;
   };
-  const snap = add(iconButton(Magnet, "Snap; Ctrl does the opposite while held", () => actions.toggle("snap"), "snap"), (e) => e.snap);
+  const snap = add(
+    iconButton(Magnet, "Snap; Ctrl does the opposite while held", () => actions.toggle("snap"), "snap"),
+    (e) => e.snap,
+  );
   editing.push(snap);
   const cages = group(
-    add(iconButton(Square, "Move the inner cage (C)", () => actions.cage("inner"), "cage-inner"), (e) => e.cage === "inner"),
-    add(iconButton(SquareDashed, "Move the outer cage (C)", () => actions.cage("outer"), "cage-outer"), (e) => e.cage === "outer"),
-    add(iconButton(Boxes, "Move both cages (C)", () => actions.cage("both"), "cage-both"), (e) => e.cage === "both"),
+    add(
+      iconButton(Square, "Move the inner cage (C)", () => actions.cage("inner"), "cage-inner"),
+      (e) => e.cage === "inner",
+    ),
+    add(
+      iconButton(SquareDashed, "Move the outer cage (C)", () => actions.cage("outer"), "cage-outer"),
+      (e) => e.cage === "outer",
+    ),
+    add(
+      iconButton(Boxes, "Move both cages (C)", () => actions.cage("both"), "cage-both"),
+      (e) => e.cage === "both",
+    ),
   );
   setOnly.push(cages);
   bar.append(
     tools(
-      add(iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.tool("select"), "tool-select"), (e) => e.tool === "select"),
-      add(iconButton(Move3d, "Move (1, G)", () => actions.tool("translate"), "tool-translate"), (e) => e.tool === "translate"),
-      add(iconButton(Rotate3d, "Rotate (2, R)", () => actions.tool("rotate"), "tool-rotate"), (e) => e.tool === "rotate"),
-      add(iconButton(Scale3d, "Scale (3, S)", () => actions.tool("scale"), "tool-scale"), (e) => e.tool === "scale"),
+      add(
+        iconButton(MousePointer2, "Select: no gizmo (4, Q)", () => actions.tool("select"), "tool-select"),
+        (e) => e.tool === "select",
+      ),
+      add(
+        iconButton(Move3d, "Move (1, G)", () => actions.tool("translate"), "tool-translate"),
+        (e) => e.tool === "translate",
+      ),
+      add(
+        iconButton(Rotate3d, "Rotate (2, R)", () => actions.tool("rotate"), "tool-rotate"),
+        (e) => e.tool === "rotate",
+      ),
+      add(
+        iconButton(Scale3d, "Scale (3, S)", () => actions.tool("scale"), "tool-scale"),
+        (e) => e.tool === "scale",
+      ),
     ),
     tools(
-      add(iconButton(PencilRuler, "Set mode: move cages, never the field (Tab)", () => actions.mode("set"), "mode-set"), (e) => e.mode === "set"),
-      add(iconButton(Spline, "Edit mode: the field follows the inner cage (Tab)", () => actions.mode("edit"), "mode-edit"), (e) => e.mode === "edit"),
+      add(
+        iconButton(
+          PencilRuler,
+          "Set mode: move cages, never the field (Tab)",
+          () => actions.mode("set"),
+          "mode-set",
+        ),
+        (e) => e.mode === "set",
+      ),
+      add(
+        iconButton(
+          Spline,
+          "Edit mode: the field follows the inner cage (Tab)",
+          () => actions.mode("edit"),
+          "mode-edit",
+        ),
+        (e) => e.mode === "edit",
+      ),
     ),
     cages,
     tools(
-      add(iconButton(Globe, "Along the world's axes (W)", () => app.store.set({ axes: "world" }), "axes-world"), (e) => e.axes === "world"),
-      add(iconButton(Box, "Along the cage's own axes (W)", () => app.store.set({ axes: "cage" }), "axes-cage"), (e) => e.axes === "cage"),
+      add(
+        iconButton(Globe, "Along the world's axes (W)", () => app.store.set({ axes: "world" }), "axes-world"),
+        (e) => e.axes === "world",
+      ),
+      add(
+        iconButton(Box, "Along the cage's own axes (W)", () => app.store.set({ axes: "cage" }), "axes-cage"),
+        (e) => e.axes === "cage",
+      ),
     ),
     group(
       snap,
-      add(iconButton(Axis3d, "Show or hide the cages (O)", () => actions.toggle("cages"), "cages"), (e) => e.cages),
+      add(
+        iconButton(Axis3d, "Show or hide the cages (O)", () => actions.toggle("cages"), "cages"),
+        (e) => e.cages,
+      ),
     ),
   );
   app.store.watch(["hello", "tool", "mode", "cage", "axes", "snap", "cages"], (now) => {
@@ -55,4 +118,4 @@ export function toolbar(app: App, actions: Actions): HTMLElement {
     for (const element of setOnly) element.classList.toggle("away", now.mode !== "set" || looking(now));
   });
   return bar;
-} // prettier-ignore
+}

@@ -1,5 +1,18 @@
 /** The row on top: the scene, undo and redo, what is shown, saving. */
-import { Camera, CircleQuestionMark, Columns2, Download, FileDown, FolderOpen, Grid3x3, PanelRight, Redo2, Save, SaveAll, Undo2 } from "lucide";
+import {
+  Camera,
+  CircleQuestionMark,
+  Columns2,
+  Download,
+  FileDown,
+  FolderOpen,
+  Grid3x3,
+  PanelRight,
+  Redo2,
+  Save,
+  SaveAll,
+  Undo2,
+} from "lucide";
 import type { Actions } from "../editing/actions";
 import type { App } from "../app/app";
 import { LOOKING, looking, type View } from "../app/store";
@@ -14,18 +27,35 @@ const VIEWS: [View, string][] = [
   ["normals", "Normals"],
 ];
 
-export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveAs" | "download">): HTMLElement {
+export function topbar(
+  app: App,
+  actions: Actions,
+  dialogs: Pick<Dialogs, "saveAs" | "download">,
+): HTMLElement {
   const name = h("span", { class: "scene-name" });
   const unsaved = h("span", { class: "unsaved", title: "There are unsaved changes" });
   const mode = h("span", { class: "mode-badge" });
   const undo = iconButton(Undo2, "Undo (Ctrl+Z)", () => actions.command("undo"), "undo");
   const redo = iconButton(Redo2, "Redo (Ctrl+Shift+Z)", () => actions.command("redo"), "redo");
   const views = VIEWS.map(([view, label]) =>
-    h("button", { type: "button", title: `${label} (V)`, onclick: () => actions.view(view), data: { view } }, label),
+    h(
+      "button",
+      { type: "button", title: `${label} (V)`, onclick: () => actions.view(view), data: { view } },
+      label,
+    ),
   );
-  const split = iconButton(Columns2, "Before and after, side by side (P); hold B for before", () => actions.toggleSplit(), "split");
+  const split = iconButton(
+    Columns2,
+    "Before and after, side by side (P); hold B for before",
+    () => actions.toggleSplit(),
+    "split",
+  );
   const grid = iconButton(Grid3x3, "Deformed lattice (L)", () => actions.toggle("grid"), "grid");
-  const file = h("input", { type: "file", accept: [".yaml", ".yml", ".json", ...SPLATS].join(), hidden: true });
+  const file = h("input", {
+    type: "file",
+    accept: [".yaml", ".yml", ".json", ...SPLATS].join(),
+    hidden: true,
+  });
   file.onchange = () => {
     const chosen = file.files?.[0];
     if (chosen) void actions.load(chosen);
@@ -81,7 +111,12 @@ export function topbar(app: App, actions: Actions, dialogs: Pick<Dialogs, "saveA
       splats,
       screenshot,
     ),
-    h("div", { class: "group" }, iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"), panel),
+    h(
+      "div",
+      { class: "group" },
+      iconButton(CircleQuestionMark, "All keys (?)", () => actions.toggle("help"), "keys-button"),
+      panel,
+    ),
     file,
   );
 }

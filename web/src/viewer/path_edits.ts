@@ -52,12 +52,24 @@ export class PathEdits {
     const rows: Float32Array[] = [];
     const stored: Lattice[] = [];
     for (const n of header.edits.keys()) rows.push((await file.read(`rows.${n}`)) as Float32Array);
-    for (let k = 0; k < header.stored; k++) stored.push({ key: `${k}`, halves: joined((await file.read(`lattice.${k}`)) as Uint8Array) });
+    for (let k = 0; k < header.stored; k++)
+      stored.push({ key: `${k}`, halves: joined((await file.read(`lattice.${k}`)) as Uint8Array) });
     const layers: Layer[] = [];
     for (const [k, key] of header.layer_keys.entries()) layers.push(await readLayer(file, `layer.${k}`, key));
     const states = header.edits.map((edits, n) => {
-      const placed = header.layers[n].map(([k, place, first, end]) => ({ layer: layers[k], place, first, end }));
-      return { edits, boxes: header.boxes[n], rows: rows[n], lattices: header.lattices[n].map((k) => stored[k]), layers: placed };
+      const placed = header.layers[n].map(([k, place, first, end]) => ({
+        layer: layers[k],
+        place,
+        first,
+        end,
+      }));
+      return {
+        edits,
+        boxes: header.boxes[n],
+        rows: rows[n],
+        lattices: header.lattices[n].map((k) => stored[k]),
+        layers: placed,
+      };
     });
     const occupancy = { key: "path", origin: header.origin, dims: header.dims, codes, changed: null };
     return new PathEdits(header, times, order, occupancy, states);
@@ -80,7 +92,15 @@ export class PathEdits {
   }
 
   private edits({ edits, boxes, layers }: State, rows: Float32Array, lattices: Lattice[]): PageEdits {
-    return { edits, boxes, preserveOpacity: this.header.preserve_opacity, rows, lattices, layers, occupancy: this.occupancy };
+    return {
+      edits,
+      boxes,
+      preserveOpacity: this.header.preserve_opacity,
+      rows,
+      lattices,
+      layers,
+      occupancy: this.occupancy,
+    };
   }
 }
 

@@ -54,7 +54,8 @@ export async function open(name: FileName, { url }: FileEntry): Promise<Readable
       "A page may not read files beside it from a disk: open it by a web server (python -m http.server), or export one .html file.",
     );
   const answer = await fetch(url);
-  if (!answer.ok || answer.body === null) throw new Error(`${url} cannot be loaded (${answer.status}); reload the page.`);
+  if (!answer.ok || answer.body === null)
+    throw new Error(`${url} cannot be loaded (${answer.status}); reload the page.`);
   return answer.body;
 }
 

@@ -88,7 +88,8 @@ export class SplatPath {
         if (!lists.has(key)) lists.set(key, (await file.read(key)) as Uint8Array | Int32Array);
       }
       const key = `${header.rotations[n]} ${header.scales[n]}`;
-      if (!shapes.has(key)) shapes.set(key, new Shapes(pairs("rotations", n), pairs("scales", n), header.log_scales));
+      if (!shapes.has(key))
+        shapes.set(key, new Shapes(pairs("rotations", n), pairs("scales", n), header.log_scales));
       const before = header.after[n] < 0 ? null : states[header.after[n]].moves;
       states.push({
         hidden: list("hidden", n) as Uint8Array,
@@ -120,8 +121,21 @@ export class SplatPath {
       covariances = mixed(covariances, others.covariances, partners, 6, away);
     }
     const count = state.sources.length;
-    const records = changedRecords(state.sources, means, covariances, state.opacities, state.moves.subarray(3 * count, 6 * count), state.gains);
-    return { count: header.count, hidden: unpackedBits(state.hidden, header.count), changed: count, means, records };
+    const records = changedRecords(
+      state.sources,
+      means,
+      covariances,
+      state.opacities,
+      state.moves.subarray(3 * count, 6 * count),
+      state.gains,
+    );
+    return {
+      count: header.count,
+      hidden: unpackedBits(state.hidden, header.count),
+      changed: count,
+      means,
+      records,
+    };
   }
 
   private numbers(state: State): Unpacked {
@@ -147,18 +161,26 @@ export function partnersOf(own: Int32Array, others: Int32Array): Int32Array {
 }
 
 /** Rows of so many numbers, a share of the way to those of their partners. */
-function mixed(rows: Float32Array, others: Float32Array, partners: Int32Array, width: number, share: number): Float32Array<ArrayBuffer> {
+function mixed(
+  rows: Float32Array,
+  others: Float32Array,
+  partners: Int32Array,
+  width: number,
+  share: number,
+): Float32Array<ArrayBuffer> {
   const out = Float32Array.from(rows);
   for (let n = 0; n < partners.length; n++) {
     if (partners[n] < 0) continue;
-    for (let k = 0; k < width; k++) out[width * n + k] += share * (others[width * partners[n] + k] - out[width * n + k]);
+    for (let k = 0; k < width; k++)
+      out[width * n + k] += share * (others[width * partners[n] + k] - out[width * n + k]);
   }
   return out;
 }
 
 /** Numbers of 16 bits from their folded differences to others, in place; see `page_splat_path`. */
 export function unfolded(folded: Uint16Array, before: Uint16Array | null): Uint16Array {
-  for (let n = 0; n < folded.length; n++) folded[n] = (before === null ? 0 : before[n]) + ((folded[n] >>> 1) ^ -(folded[n] & 1));
+  for (let n = 0; n < folded.length; n++)
+    folded[n] = (before === null ? 0 : before[n]) + ((folded[n] >>> 1) ^ -(folded[n] & 1));
   return folded;
 }
 
@@ -181,7 +203,14 @@ function unpack({ moves, shapes }: State, { low, step, stretch }: Header): Unpac
 type Numbers = number[] | Float32Array;
 
 /** Puts the product of two matrices [3, 3] into `out`; all begin where it is said. */
-function multiply<Out extends Numbers>(out: Out, at: number, one: Numbers, first: number, other: Numbers, second: number): Out {
+function multiply<Out extends Numbers>(
+  out: Out,
+  at: number,
+  one: Numbers,
+  first: number,
+  other: Numbers,
+  second: number,
+): Out {
   for (let i = 0; i < 3; i++)
     for (let j = 0; j < 3; j++) {
       let sum = 0;

@@ -53,7 +53,12 @@ export class SceneViewer {
     private readonly say: (text: string) => void,
     private readonly arrived: (share: number) => void = () => undefined,
   ) {
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
+    const gl = canvas.getContext("webgl2", {
+      alpha: false,
+      antialias: false,
+      depth: false,
+      powerPreference: "high-performance",
+    });
     if (!gl) throw new Error("This browser has no WebGL2, which the scene is drawn with.");
     this.gl = gl;
     this.renderer = new AnyRenderer(gl);
@@ -61,12 +66,19 @@ export class SceneViewer {
     this.orbit = new Orbit(header.start.c2w, header.up, header.centre);
     this.fov = header.start.fov_y_deg;
     listen(canvas, {
-      turn: (x, y) => this.change(() => this.orbit.turn((Math.PI * x) / canvas.clientHeight, (Math.PI * y) / canvas.clientHeight)),
-      shift: (x, y) => this.change(() => this.orbit.shift(x / canvas.clientHeight, y / canvas.clientHeight, this.tangent)),
+      turn: (x, y) =>
+        this.change(() =>
+          this.orbit.turn((Math.PI * x) / canvas.clientHeight, (Math.PI * y) / canvas.clientHeight),
+        ),
+      shift: (x, y) =>
+        this.change(() => this.orbit.shift(x / canvas.clientHeight, y / canvas.clientHeight, this.tangent)),
       zoom: (by) => this.change(() => this.orbit.zoom(by)),
     });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    canvas.addEventListener("webglcontextrestored", () => void this.renderer.restore().then(() => this.touch()));
+    canvas.addEventListener(
+      "webglcontextrestored",
+      () => void this.renderer.restore().then(() => this.touch()),
+    );
     new ResizeObserver(() => this.touch()).observe(canvas);
   }
 
@@ -181,7 +193,9 @@ export class SceneViewer {
     // The full level is not shown before its edits are there.
     if (this.row === null || (renderer.level?.last && this.edits === undefined)) return;
     const dense = Math.min(devicePixelRatio, MOST_PIXELS_PER_POINT);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) => Math.max(1, Math.round(n * dense)));
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) =>
+      Math.max(1, Math.round(n * dense)),
+    );
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     const scale = pacing.scale(width, height);
     const still = (this.sketched && performance.now() - this.moved > STILL) || scale === 1;
@@ -207,10 +221,20 @@ export class SceneViewer {
   private aim(width: number, height: number): void {
     const focal = (0.5 * Math.min(width, height)) / this.tangent;
     this.renderer.setSize(width, height);
-    this.renderer.setCamera({ c2w: this.orbit.c2w, width, height, fx: focal, fy: focal, cx: width / 2, cy: height / 2 });
+    this.renderer.setCamera({
+      c2w: this.orbit.c2w,
+      width,
+      height,
+      fx: focal,
+      fy: focal,
+      cx: width / 2,
+      cy: height / 2,
+    });
   }
 }
 
 async function readPath(file: ArrayBuffer): Promise<PathEdits | SplatPath> {
-  return magicOf(new Uint8Array(file)) === SPLAT_PATH ? await SplatPath.read(file) : await PathEdits.read(file);
+  return magicOf(new Uint8Array(file)) === SPLAT_PATH
+    ? await SplatPath.read(file)
+    : await PathEdits.read(file);
 }
