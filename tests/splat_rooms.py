@@ -8,7 +8,7 @@ from cagefield.completion.lighting.ambient_occlusion import Ambience
 from cagefield.fields.sh import C0
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import Cage
-from cagefield.geometry.quaternions import quaternions_of
+from cagefield.geometry.quaternions import quaternions_from_matrices
 
 STEP = 0.05
 REACH, STRENGTH = 0.3, 0.7
@@ -61,7 +61,7 @@ def room(box: bool, scale: float = 1.0, by: tuple[float, float] = (0.0, 0.0)) ->
     return SplatField(
         scale * means,
         np.broadcast_to(np.log(scale * np.array([0.7, 0.7, 0.1]) * STEP), means.shape),
-        quaternions_of(frames),
+        quaternions_from_matrices(frames),
         np.full(len(means), 0.95),
         ((np.concatenate(rgb) - 0.5) / C0)[:, None],
         bounds=scale * np.array([[-1.0, -1.0, -0.1], [1.0, 1.0, 0.7]]),

@@ -250,7 +250,7 @@ def test_what_was_not_used_for_longest_goes(folder: Path, monkeypatch: pytest.Mo
     os.utime(first, (now - 1000.0,) * 2)
     old = folder / ("0" * 32 + ".npz")
     old.write_bytes(b"old")
-    os.utime(old, (now - user_cache.KEPT_SECONDS - 60.0,) * 2)
+    os.utime(old, (now - user_cache.MAX_UNUSED_SECONDS - 60.0,) * 2)
     made_again((BEND,))
     assert not old.exists() and len(list(folder.iterdir())) == 2
     monkeypatch.setattr(patch_cache, "MOST_BYTES", 4 * size + size // 2)

@@ -163,7 +163,7 @@ def test_a_lock_is_waited_for_and_then_done_without(tmp_path: Path, monkeypatch:
         threading.Timer(0.1, lock.unlink).start()
         assert kept.kernel_cache() == folder
     lock.write_text("")
-    monkeypatch.setattr(kept, "PATIENCE", 0.05)
+    monkeypatch.setattr(kept, "LOCK_WAIT_SECONDS", 0.05)
     with pytest.warns(UserWarning, match=r"another process holds .*qdcache\.lock.*; remove that file"):
         assert kept.kernel_cache() is None
 
@@ -173,13 +173,13 @@ def test_folders_of_other_versions_and_locks_go_when_nobody_uses_them(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     kernels = tmp_path / "cagefield" / "kernels"
-    for name, age in (("old", user_cache.KEPT_SECONDS + 60.0), ("recent", 60.0)):
+    for name, age in (("old", user_cache.MAX_UNUSED_SECONDS + 60.0), ("recent", 60.0)):
         (kernels / name).mkdir(parents=True)
         os.utime(kernels / name, 2 * (time.time() - age,))
     lock = kept.kernel_cache() / "kernel_compilation_manager" / "qdcache.lock"  # type: ignore[operator]
     folder = lock.parent.parent
     lock.write_text("")
-    os.utime(lock, 2 * (time.time() - 2.0 * kept.LOCKED_SECONDS,))
+    os.utime(lock, 2 * (time.time() - 2.0 * kept.MAX_LOCK_SECONDS,))
     kept.kernel_cache()
     assert not lock.exists()
     assert sorted(path.name for path in kernels.iterdir()) == sorted([folder.name, "recent"])

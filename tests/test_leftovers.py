@@ -97,7 +97,7 @@ def test_a_folder_whose_maker_cannot_be_known_to_have_ended_comes_back_later(
     target.mkdir()
     remove_leftovers(target)
     target.rmdir()
-    monkeypatch.setattr(stale_files, "UNTOUCHED", -1.0)
+    monkeypatch.setattr(stale_files, "ABANDONED_AFTER_SECONDS", -1.0)
     with pytest.warns(UserWarning, match="it is back"):
         assert recover_folder(target, lambda f: True) == folder
 

@@ -1,19 +1,19 @@
-"""Every item of a loop is dealt once, and to all threads alike."""
+"""Every item of a loop is scheduled_item once, and to all threads alike."""
 
 import numpy as np
 import pytest
 import quadrants as qd
 
 from cagefield.compute import block_cyclic, devices
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Deal, scheduled_item, turn_count
 
 Counts = qd.types.ndarray(dtype=qd.i32, ndim=1)
 
 
 @qd.kernel
 def _visit(visits: Counts, order: Counts, deal: Deal):
-    for n in range(turns(deal)):
-        i = dealt(n, deal)
+    for n in range(turn_count(deal)):
+        i = scheduled_item(n, deal)
         if i < visits.shape[0]:
             visits[i] += 1
             order[i] = n
@@ -24,7 +24,7 @@ def _visit(visits: Counts, order: Counts, deal: Deal):
 def test_every_item_has_its_turn(items: int, unit: int) -> None:
     devices.start()
     visits, order = np.zeros(items, np.int32), np.zeros(items, np.int32)
-    _visit(visits, order, block_cyclic.deal_of(items, unit))
+    _visit(visits, order, block_cyclic.block_cyclic_schedule(items, unit))
     assert (visits == 1).all()
 
 
@@ -32,7 +32,7 @@ def test_parts_get_their_share_of_any_piece_of_the_items() -> None:
     devices.start()
     parts, items = devices.parts(), 6400
     visits, order = np.zeros(items, np.int32), np.zeros(items, np.int32)
-    deal = block_cyclic.deal_of(items, 1)
+    deal = block_cyclic.block_cyclic_schedule(items, 1)
     _visit(visits, order, deal)
     part = order // deal[0]
     for first in range(0, items, 640):
@@ -42,10 +42,10 @@ def test_parts_get_their_share_of_any_piece_of_the_items() -> None:
 
 def test_few_items_go_to_different_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "parts", lambda: 4)
-    length, parts, unit = block_cyclic.deal_of(4, 1)
+    length, parts, unit = block_cyclic.block_cyclic_schedule(4, 1)
     assert (length, parts, unit) == (block_cyclic.LEAST, 4, 1)
 
 
 def test_a_gpu_keeps_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "is_gpu", lambda: True)
-    assert block_cyclic.deal_of(1000, 1).tolist() == [1000, 1, 1]
+    assert block_cyclic.block_cyclic_schedule(1000, 1).tolist() == [1000, 1, 1]

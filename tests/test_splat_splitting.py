@@ -9,7 +9,7 @@ import pytest
 
 from cagefield import Cage, Camera, Edit, EditStack
 from cagefield.fields.splat_field import SplatField
-from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.images.metrics import psnr
 from cagefield.rendering.splats import splitting
 from cagefield.rendering.splats.bake_splats import baked_splats
@@ -123,7 +123,7 @@ def test_children_that_are_not_drawn_are_not_made() -> None:
 @pytest.mark.parametrize("offset", [-0.2, 0.0, 0.3])
 def test_a_cut_keeps_mass_mean_and_covariance(offset: float) -> None:
     # A faint splat through the middle of the face +x, far from all others.
-    q = quaternions_of(np.linalg.qr(np.random.default_rng(0).normal(size=(1, 3, 3)))[0])
+    q = quaternions_from_matrices(np.linalg.qr(np.random.default_rng(0).normal(size=(1, 3, 3)))[0])
     field = SplatField(
         [[0.3 + 0.03 * offset, 0, 0]], np.log([[0.03, 0.02, 0.01]]), q, [1e-3], np.zeros((1, 1, 3))
     )

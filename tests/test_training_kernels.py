@@ -7,7 +7,7 @@ import pytest
 
 from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
 from cagefield.datasets.views import View
 
@@ -78,7 +78,7 @@ def marched(
     grid.accumulator.fill(0.0)
     step = 0.7 if grid.contracted else 0.7 / float(np.max(grid.args.scale))
     march_batch(
-        deal_of(grid.workers, 1),
+        block_cyclic_schedule(grid.workers, 1),
         PatchArgs(to_device(patches), len(patches), 4),
         data.args(to_device(gains.astype(np.float32))),
         grid.args,

@@ -53,7 +53,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def line_of(error: OSError) -> str:
-    """What the system refused, as one line: the files that it is about, and why."""
+    """One line for a failed system call: the file names and the reason."""
     names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name is not None)
     if not names and error.errno in _FULL:
         names = f"the folder for temporary files, {tempfile.gettempdir()} ($TMPDIR), or the one of the result"

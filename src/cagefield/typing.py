@@ -1,4 +1,4 @@
-"""Arrays as annotations name them: what their elements are. Shapes are in docstrings."""
+"""Array types by element type; shapes are in docstrings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Array: TypeAlias = NDArray[np.float64]
 """The default: coordinates, matrices, everything of the float64 reference."""
 
 Float32: TypeAlias = NDArray[np.float32]
-"""What fields store, kernels take and pictures hold."""
+"""Stored fields, kernel arguments and rendered images."""
 
 UInt8: TypeAlias = NDArray[np.uint8]
 """Pixels and masks of bits."""
@@ -22,4 +22,4 @@ Int: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 
 AnyArray: TypeAlias = NDArray[Any]
-"""Of any kind of number."""
+"""Any numeric element type."""

@@ -38,7 +38,7 @@ from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.atomic import replaced_file
 from cagefield.files.npz import read_arrays
 from cagefield.files.stale_files import remove_unfinished
-from cagefield.files.user_cache import KEPT_SECONDS, cache_root, source_digest
+from cagefield.files.user_cache import MAX_UNUSED_SECONDS, cache_root, source_digest
 from cagefield.geometry.cage import Cage
 
 LEAST_SECONDS = 0.3
@@ -213,6 +213,6 @@ def _tidy(folder: Path) -> None:
     room = MOST_BYTES
     for used, size, path in sorted(found, reverse=True):
         room -= size
-        if room < 0 or time.time() - used > KEPT_SECONDS:
+        if room < 0 or time.time() - used > MAX_UNUSED_SECONDS:
             with contextlib.suppress(OSError):
                 path.unlink()

@@ -1,14 +1,13 @@
-"""How the items of a kernel's loop are dealt to the CPU's threads.
+"""Block-cyclic distribution of a kernel loop's items over the CPU's threads.
 
-Quadrants cuts a loop into `compute.devices.parts` contiguous parts, none of them shorter than LEAST turns.
-Where
-items cost unlike much one thread waits for the others, and a few costly items are all done by one. Dealt out
-like cards, some at a time (a block-cyclic distribution), they keep all threads busy:
+Quadrants cuts a loop into `compute.devices.parts` contiguous parts, none shorter than MIN_PART_TURNS. Where
+items differ in cost, one thread gets the costly ones and the others wait for it. A block-cyclic distribution
+gives every thread blocks of ITEMS_PER_BLOCK items in turn:
 
-    deal = loops.deal_of(items)
+    schedule = block_cyclic_schedule(items)
 
-    for n in range(turns(deal)):
-        i = dealt(n, deal)
+    for n in range(turn_count(schedule)):
+        i = scheduled_item(n, schedule)
         if i < items:
             ...
 
@@ -23,31 +22,31 @@ from numpy.typing import NDArray
 from cagefield.compute import devices
 from cagefield.compute.quadrants import qd
 
-LEAST = 512
-"""Turns of a loop that Quadrants does not cut."""
+MIN_PART_TURNS = 512
+"""Turns of a loop that Quadrants does not divide among threads."""
 
-UNIT = 64
-"""Items that are dealt together: threads should not write to the same cache line in turn."""
+ITEMS_PER_BLOCK = 64
+"""Consecutive items of one thread: two threads should not write to one cache line in turn."""
 
-Deal = qd.types.vector(3, qd.i32)
+Schedule = qd.types.vector(3, qd.i32)
 
 
-def deal_of(items: int, unit: int = UNIT) -> NDArray[np.int32]:
-    """The argument (turns, parts, unit) of a kernel that loops over so many items; see the module."""
+def block_cyclic_schedule(items: int, unit: int = ITEMS_PER_BLOCK) -> NDArray[np.int32]:
+    """Kernel argument (turns, parts, unit) [3] int32 of a loop over `items`; see the module."""
     parts = 1 if devices.is_gpu() else devices.parts()
     units = -(-items // unit)
-    least = -(-LEAST // unit) if parts > 1 else 1
+    least = -(-MIN_PART_TURNS // unit) if parts > 1 else 1
     return devices.ints((max(-(-units // parts), least), parts, unit))
 
 
 @qd.func
-def dealt(n: qd.i32, deal: Deal):
-    """The item of turn n; there is none where it is not less than their number."""
-    k = n // deal[2]
-    return ((k % deal[0]) * deal[1] + k // deal[0]) * deal[2] + n % deal[2]
+def scheduled_item(n: qd.i32, schedule: Schedule):
+    """Item index of turn n; turns whose index is not below the number of items have none."""
+    k = n // schedule[2]
+    return ((k % schedule[0]) * schedule[1] + k // schedule[0]) * schedule[2] + n % schedule[2]
 
 
 @qd.func
-def turns(deal: Deal):
-    """How many turns the loop takes."""
-    return deal[0] * deal[1] * deal[2]
+def turn_count(schedule: Schedule):
+    """Number of turns of the loop."""
+    return schedule[0] * schedule[1] * schedule[2]

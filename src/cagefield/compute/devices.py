@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cagefield.compute.kernel_cache import forgive, kernel_cache
+from cagefield.compute.kernel_cache import kernel_cache, tolerate_cache_failures
 from cagefield.errors import DeviceError
 
 DeviceName = Literal["auto", "cpu", "cuda", "metal", "vulkan"]
@@ -78,7 +78,7 @@ def start(device: str = "auto", *, double: bool = False) -> str:
     except Exception as error:
         raise DeviceError(f'device {chosen!r} did not start ({error}); use device="cpu"') from error
     if cache is not None:
-        forgive(cache)
+        tolerate_cache_failures(cache)
     _started = chosen
     return chosen
 

@@ -1,4 +1,4 @@
-"""Arrays that are made once in the life of what they are made from."""
+"""Memoization of arrays by the identity of their source, as long as the source lives."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cagefield.typing import Float32
 Source = TypeVar("Source")
 
 
-def kept(make: Callable[[Source], Float32]) -> Callable[[Source], Float32]:
-    """`make`, called once for each source while it lives; what it returns becomes read-only."""
+def memoized_by_identity(make: Callable[[Source], Float32]) -> Callable[[Source], Float32]:
+    """`make` with its array remembered for each living source; the array becomes read-only."""
     known: WeakKeyDictionary[Source, Float32] = WeakKeyDictionary()
 
     @wraps(make)

@@ -1,6 +1,6 @@
-"""The folders in which compiled kernels are kept: those of Quadrants, and those of Numba.
+"""Disk caches of compiled kernels, of Quadrants and of Numba.
 
-Where one cannot be used, or fails in the middle, a warning says so, and every process compiles its own.
+Where a cache cannot be used, or fails later, a warning says so, and every process compiles its own kernels.
 """
 
 from __future__ import annotations
@@ -17,25 +17,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cagefield.files.user_cache import KEPT_SECONDS, cache_root, source_digest
+from cagefield.files.user_cache import MAX_UNUSED_SECONDS, cache_root, source_digest
 
-LOCKED_SECONDS = 60.0
-"""How long a process may hold the lock of a folder of kernels: it writes a few megabytes."""
+MAX_LOCK_SECONDS = 60.0
+"""Age of a lock file that counts as abandoned: writing a few megabytes takes less."""
 
-PATIENCE = 1.0
-"""Seconds that a lock is waited for: without it Quadrants neither reads the folder nor writes to it."""
+LOCK_WAIT_SECONDS = 1.0
+"""Longest wait for a lock; without the lock Quadrants neither reads nor writes its cache."""
 
-LEAST_BYTES = 16 << 20
-"""Room that is needed to keep kernels: all of them take less than 10 megabytes."""
+MIN_FREE_BYTES = 16 << 20
+"""Free disk space below which kernels are not cached; all kernels take less than 10 megabytes."""
 
 
 def kernel_cache() -> Path | None:
-    """The folder of the compiled kernels of this state of the package's source; None, with a warning, where
-    none can be used.
+    """Cache folder of Quadrants for the present source of the package; None, with a warning, if unusable.
 
     Quadrants finds a kernel again by the source of its functions, without the constants that they name: two
-    states of the packages that hold kernels must not share a folder. Folders that nobody used for long are
-    removed.
+    states of the packages that hold kernels must not share a folder. Folders unused for MAX_UNUSED_SECONDS
+    are removed.
     """
     # Quadrants ends the process where it cannot make this folder in its own.
     folder = cache_folder(
@@ -45,7 +44,7 @@ def kernel_cache() -> Path | None:
         return None
     lock = folder / "kernel_compilation_manager" / "qdcache.lock"
     with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > LOCKED_SECONDS:
+        if time.time() - lock.stat().st_mtime > MAX_LOCK_SECONDS:
             lock.unlink()
     if _is_held(lock):
         warnings.warn(
@@ -58,9 +57,10 @@ def kernel_cache() -> Path | None:
 
 
 def cache_folder(name: str, within: str = "") -> Path | None:
-    """The folder `name` of compiled kernels, made where it is missing, with the folder `within` in it.
+    """Cache folder `name` of compiled kernels, created with its subfolder `within`; None, with a warning, if
+    unusable.
 
-    None, with a warning, where it cannot be used. Folders beside it that nobody used for long are removed.
+    Sibling folders unused for MAX_UNUSED_SECONDS are removed.
     """
     place: str | Path = "~/.cache/cagefield/kernels"
     try:
@@ -71,15 +71,14 @@ def cache_folder(name: str, within: str = "") -> Path | None:
         if not all(map(_is_usable, (folder, *folder.rglob("*")))):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except (OSError, RuntimeError) as error:
-        tell_that_none_are_kept(place, error)
+        warn_cache_unusable(place, error)
         return None
     _tidy(folder)
     return folder
 
 
-def forgive(folder: Path) -> None:
-    """Has Quadrants go on where its folder can no longer be written while kernels are compiled, or when the
-    process ends."""
+def tolerate_cache_failures(folder: Path) -> None:
+    """Make Quadrants survive a cache folder that can no longer be written, also at the end of the process."""
     from quadrants.lang import impl
     from quadrants.lang._fast_caching.python_side_cache import PythonSideCache
 
@@ -90,7 +89,7 @@ def forgive(folder: Path) -> None:
 
     def look_for_room() -> None:
         with contextlib.suppress(OSError):
-            if shutil.disk_usage(folder).free >= LEAST_BYTES:
+            if shutil.disk_usage(folder).free >= MIN_FREE_BYTES:
                 return
         keep_none()
 
@@ -101,7 +100,7 @@ def forgive(folder: Path) -> None:
                 return method(cache, *args)
             except OSError as error:
                 if not told:
-                    tell_that_none_are_kept(Path(cache.cache_folder).parent, error)
+                    warn_cache_unusable(Path(cache.cache_folder).parent, error)
                     keep_none()
                 told.append(error)
                 return None
@@ -112,7 +111,7 @@ def forgive(folder: Path) -> None:
 
     def store(cache: Any, key: str, value: str) -> None:
         # The compiled kernel follows after this note of it, and says nothing where there is no room for it.
-        if shutil.disk_usage(cache.cache_folder).free < LEAST_BYTES:
+        if shutil.disk_usage(cache.cache_folder).free < MIN_FREE_BYTES:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         own_store(cache, key, value)
 
@@ -124,12 +123,12 @@ def forgive(folder: Path) -> None:
 
 
 def _is_usable(part: Path) -> bool:
-    """Whether a folder or file of the cache can be read and written, or has just gone."""
+    """True where a folder or file of the cache can be read and written, or no longer exists."""
     return os.access(part, os.R_OK | os.W_OK | (os.X_OK if part.is_dir() else 0)) or not part.exists()
 
 
-def tell_that_none_are_kept(place: str | Path, error: Exception) -> None:
-    """Warns that kernels are not kept in a folder."""
+def warn_cache_unusable(place: str | Path, error: Exception) -> None:
+    """Warn that kernels cannot be cached in a folder."""
     reason = getattr(error, "strerror", None) or error
     warnings.warn(
         f"compiled kernels cannot be kept in {place} ({reason}), so every process compiles its own; "
@@ -139,17 +138,17 @@ def tell_that_none_are_kept(place: str | Path, error: Exception) -> None:
 
 
 def _tidy(folder: Path) -> None:
-    """Removes the folders beside one of kernels that nobody needs."""
+    """Remove sibling cache folders unused for MAX_UNUSED_SECONDS."""
     with contextlib.suppress(OSError):
         for other in list(folder.parent.iterdir()):
             with contextlib.suppress(OSError):
-                if time.time() - other.stat().st_mtime > KEPT_SECONDS:
+                if time.time() - other.stat().st_mtime > MAX_UNUSED_SECONDS:
                     shutil.rmtree(other, ignore_errors=True)
 
 
 def _is_held(lock: Path) -> bool:
-    """Whether somebody holds a lock for longer than PATIENCE."""
-    ends = time.monotonic() + PATIENCE
+    """True where a lock file outlasts LOCK_WAIT_SECONDS."""
+    ends = time.monotonic() + LOCK_WAIT_SECONDS
     while lock.exists():
         if time.monotonic() > ends:
             return True

@@ -16,7 +16,7 @@ from typing import Any
 
 import numba
 
-from cagefield.compute.kernel_cache import cache_folder, tell_that_none_are_kept
+from cagefield.compute.kernel_cache import cache_folder, warn_cache_unusable
 
 FAST: dict[str, Any] = {"fastmath": True, "error_model": "numpy", "cache": True}
 """Options of every kernel: without `error_model`, checks for division by zero keep loops from vectorising."""
@@ -76,7 +76,7 @@ def _forgiven(method: Callable[..., Any], folder: Path) -> Callable[..., Any]:
 def _tell(folder: Path, error: Exception) -> None:
     """Warns for the first kernel that is not kept."""
     if not _TOLD:
-        tell_that_none_are_kept(folder.parent, error)
+        warn_cache_unusable(folder.parent, error)
     _TOLD.append(error)
 
 

@@ -21,7 +21,7 @@ _MARK = re.compile(r"\.(.+)\.(part|new|old)-([0-9a-f]{6})-(\d+)-\w+(\.\w+)*")
 _LONGEST = 100
 """Bytes of a target's name in a hidden one: names have 255 at most."""
 
-UNTOUCHED = 300.0
+ABANDONED_AFTER_SECONDS = 300.0
 """Seconds after which a folder that was put aside is nobody's: what its maker had to do takes none."""
 
 
@@ -46,7 +46,8 @@ def put_aside(target: Path) -> list[Path]:
     """The folders of exactly its name that programs have put aside beside `target`, where nothing is now.
 
     A maker that has another host's name (a container's), or a number that is a process's again, cannot be
-    told from one that goes on: its folders count once nothing has touched them for UNTOUCHED seconds.
+    told from one that goes on: its folders count once nothing has touched them for ABANDONED_AFTER_SECONDS
+    seconds.
     """
     found = []
     for path in target.parent.glob(".*"):
@@ -101,7 +102,7 @@ def _is_settled(path: Path) -> bool:
     if is_abandoned(path):
         return True
     try:
-        return time.time() - path.stat().st_ctime > UNTOUCHED
+        return time.time() - path.stat().st_ctime > ABANDONED_AFTER_SECONDS
     except OSError:
         return False
 

@@ -1,4 +1,4 @@
-"""The user's cache folder, and a digest of the package's source."""
+"""Cache folder of the user, and a digest of the package's source."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import hashlib
 import os
 from pathlib import Path
 
-KEPT_SECONDS = 30 * 86400.0
-"""How long what nobody used is kept."""
+MAX_UNUSED_SECONDS = 30 * 86400.0
+"""Age after which an unused cache entry is removed."""
 
 
 def cache_root() -> Path:
@@ -21,7 +21,7 @@ def cache_root() -> Path:
 
 @functools.cache
 def source_digest(mark: bytes = b"") -> str:
-    """A digest of the package's source: of the folders that have a file with `mark` in it."""
+    """SHA-256 digest, 16 hexadecimal digits, of all source folders with a file that contains `mark`."""
     sources = {path: path.read_bytes() for path in sorted(Path(__file__).parents[1].rglob("*.py"))}
     folders = {path.parent for path, source in sources.items() if mark in source}
     digest = hashlib.sha256()

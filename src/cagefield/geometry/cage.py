@@ -1,4 +1,4 @@
-"""Cages: the hexahedra that say what moves and how much of the surroundings may give way.
+"""Cages: hexahedra that bound the moved region (inner) and its deformable surroundings (outer).
 
 Corner k = x + 2y + 4z with x, y, z in {0, 1} along the cage's own axes (VTK voxel order). Edges are corner
 pairs (i, j), i < j, that differ in one bit. Faces are "+x", "-x", "+y", "-y", "+z", "-z" of the same axes.
@@ -34,13 +34,13 @@ class Cage:
     must be positive over the whole cage.
 
     Parameters: corners [8,3] in world units; pivot [3], about which `rotate`, `scale` and `shear` turn. The
-    pivot of a new cage is its centre, travels with `translate`, and stays where it is when a corner, an edge
+    pivot of a new cage is its center, travels with `translate`, and stays where it is when a corner, an edge
     or a face is moved.
 
     Raises `CageError` when a corner is not finite, or the cage is flat, mirrored or inside out.
 
     Source: Li & Pan, "Interactive Geometry Editing of Neural Radiance Fields", section 3. Its formula for the
-    centre divides the sum of the corners by 6; a hexahedron has 8, and the centre here is their mean. Its
+    center divides the sum of the corners by 6; a hexahedron has 8, and the center here is their mean. Its
     R_z is the transpose of the right-handed rotation; rotations here are right-handed.
     """
 

@@ -1,4 +1,4 @@
-"""What corners and vectors a cage takes, and the errors that say what is wrong with others."""
+"""Validation of cage corners and vectors; `CageError` names the value and the cure."""
 
 from __future__ import annotations
 

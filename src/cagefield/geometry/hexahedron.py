@@ -152,7 +152,7 @@ def _derivative(C: Array, xi: Array) -> tuple[Array, Array, Array]:
 
 def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
     """Roots xi [N,3] of xi + K-terms = y [N,3] from a start, and a mask of those with residual < 1e-11."""
-    C = _centred(K)
+    C = _centered(K)
     y, xi = y.T.copy(), start.T.copy()
     residual = _evaluate(C, xi) - y
     size = np.abs(residual).max(axis=0)
@@ -172,7 +172,7 @@ def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
     return np.ascontiguousarray(xi.T), np.asarray(size < 1e-11)
 
 
-def _centred(K: Array) -> Array:
+def _centered(K: Array) -> Array:
     """Monomial coefficients [8,3] of xi + K-terms."""
     return np.concatenate([np.zeros((1, 3)), np.eye(3)[:2], K[:1], np.eye(3)[2:], K[1:]])
 
@@ -186,7 +186,7 @@ def _snap(K: Array, y: Array, xi: Array, tolerance: float) -> None:
     excess = np.abs(xi).max(axis=1, initial=0.0) - 1.0
     near = np.flatnonzero((excess > 0.0) & (excess < 1e-3))
     clipped = xi[near].clip(-1.0, 1.0)
-    residual = np.abs(_evaluate(_centred(K), clipped.T) - y[near].T).max(axis=0)
+    residual = np.abs(_evaluate(_centered(K), clipped.T) - y[near].T).max(axis=0)
     close = residual <= tolerance
     xi[near[close]] = clipped[close]
 
@@ -215,7 +215,7 @@ def _newton_from_cells(K: Array, y: Array, on_face: float) -> tuple[Array, Mask]
     A sub-hexahedron lies in the box of its own eight corners. Newton's method is tried from those of the
     512, and for what that leaves, near corners where the determinant almost vanishes, from ever smaller ones.
     """
-    C = _centred(K)
+    C = _centered(K)
     best = np.zeros((len(y), 3))
     done = np.zeros(len(y), dtype=bool)
     rows, cell = np.arange(len(y)), np.zeros((len(y), 3), dtype=np.intp)

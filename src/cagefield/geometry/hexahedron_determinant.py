@@ -1,4 +1,4 @@
-"""Whether a trilinear hexahedron's Jacobian determinant is positive all over it: by Bernstein coefficients.
+"""Positivity of a trilinear hexahedron's Jacobian determinant, proven by Bernstein coefficients.
 
 Notation: see `geometry.hexahedron`.
 """

@@ -17,7 +17,7 @@ def rotation_matrices(quaternions: NDArray[np.floating]) -> NDArray[np.floating]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def quaternions_of(rotations: NDArray[np.floating]) -> NDArray[np.floating]:
+def quaternions_from_matrices(rotations: NDArray[np.floating]) -> NDArray[np.floating]:
     """Unit quaternions [N,4] (w, x, y, z) of rotations [N,3,3]."""
     from scipy.spatial.transform import Rotation
 

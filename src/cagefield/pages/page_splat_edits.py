@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
-from cagefield.geometry.quaternions import quaternions_of
+from cagefield.geometry.quaternions import quaternions_from_matrices
 from cagefield.pages.page_file import LEVEL, QUICK_LEVEL, pack, unpack
 from cagefield.pages.page_splats import (
     CHUNK,
@@ -84,12 +84,12 @@ def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed
     if packed:
         arrays["chunks"], arrays["means"] = encode_means(splats.means[rows], field.center, field)
         log_scales, axes = axes_of(splats.covariances[rows])
-        arrays.update(encode_shapes(quaternions_of(axes), log_scales, splats.opacities[rows]))
+        arrays.update(encode_shapes(quaternions_from_matrices(axes), log_scales, splats.opacities[rows]))
     else:
         arrays["means"] = (splats.means.astype(np.float64) - field.center).astype(np.float32)
         arrays["covariances"] = splats.covariances
         arrays["opacities"] = byte_pairs(np.round(65535.0 * splats.opacities.astype(np.float64)))
-    quaternions = np.broadcast_to(quaternions_of(turns), (len(splats), 4))[rows]
+    quaternions = np.broadcast_to(quaternions_from_matrices(turns), (len(splats), 4))[rows]
     arrays["turns"] = encode_rotations(quaternions, bits=ROTATION_BITS if packed else 15)
     arrays["gains"] = gains_of(changed)[rows]
     return pack(MAGIC, VERSION, header, arrays, level=LEVEL if packed else QUICK_LEVEL)

@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.fields.splat_field import SplatField
-from cagefield.geometry.quaternions import quaternions_of
+from cagefield.geometry.quaternions import quaternions_from_matrices
 from cagefield.pages.page_file import pack
 from cagefield.pages.page_splat_edits import gains_of
 from cagefield.pages.page_splats import (
@@ -105,7 +105,7 @@ class SplatPathState:
             np.packbits(changed.hidden[order], bitorder="little"),
             sources[rows],
             splats.means[rows].astype(np.float64) - field.center,
-            np.asarray(quaternions_of(turns), np.float64),
+            np.asarray(quaternions_from_matrices(turns), np.float64),
             0.5 * (stretches + stretches.transpose(0, 2, 1)),
             np.concatenate([each.quaternions for each in fields])[made_of],
             np.concatenate([each.log_scales for each in fields])[made_of],

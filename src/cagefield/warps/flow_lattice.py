@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
 from cagefield.warps.flow_shell import FlowShell
 from cagefield.warps.flow_table import table
@@ -39,9 +39,9 @@ def sample(shell: FlowShell, resolution: int) -> NDArray[np.float32]:
     if devices.is_gpu():  # which has a lane for every node
         nodes[:] = LOST
     else:
-        blocks = deal_of(-(-len(nodes) // LANES), 1)
+        blocks = block_cyclic_schedule(-(-len(nodes) // LANES), 1)
         march(nodes, blocks, *place, not shell.motion.confines.is_affine, not shell.motion.is_affine)
     lost = np.flatnonzero(nodes[:, 0] == np.float32(LOST)).astype(np.int32)
     if len(lost):
-        march_lost(nodes, lost, deal_of(len(lost), 1), *place)
+        march_lost(nodes, lost, block_cyclic_schedule(len(lost), 1), *place)
     return nodes

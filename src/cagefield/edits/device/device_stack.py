@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
-from cagefield.compute.identity_memo import kept
+from cagefield.compute.block_cyclic import block_cyclic_schedule
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.edits.device.buffer_pool import BufferPool
 from cagefield.edits.device.edit_lattice import nodes_of
 from cagefield.edits.device.kernels.device_stack import map_samples
@@ -118,11 +118,11 @@ class DeviceStack:
         out = np.empty((n, 8), dtype=np.float32)
         samples = np.ascontiguousarray(np.concatenate([points, viewdirs], axis=1), dtype=np.float32)
         if n:
-            map_samples(samples, deal_of(len(samples)), out, self.args, self.has_flows)
+            map_samples(samples, block_cyclic_schedule(len(samples)), out, self.args, self.has_flows)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7].astype(np.int32)
 
 
-@kept
+@memoized_by_identity
 def _flow_table(edit: PackedEdit) -> NDArray[np.float32]:
     """The table [T,3] of an exact flow shell, see `flow_table`; [0,3] for all other edits."""
     warp = edit.exact_warp

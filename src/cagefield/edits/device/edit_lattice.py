@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
-from cagefield.compute.identity_memo import kept
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.edits.device.kernels.edit_lattice import sample_lattice
 from cagefield.edits.device.packing import RESOLUTION, SIMPLE, PackedEdit, row_of
 from cagefield.errors import EditError
@@ -47,7 +47,7 @@ def lattice_of(edit: PackedEdit) -> Lattice:
     return Lattice(origin, frame, nodes_of(edit).reshape(R, R, R, 3).astype(np.float64))
 
 
-@kept
+@memoized_by_identity
 def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
     """The nodes [R^3,3] of a continuous edit's lattice, x fastest; raises as `lattice_of` does.
 
@@ -68,7 +68,9 @@ def nodes_of(edit: PackedEdit) -> NDArray[np.float32]:
     place = (floats(origin), floats(frame), resolution)
     params = row_of(edit)[None].copy()
     params[0, [RESOLUTION, SIMPLE]] = 0.0
-    sample_lattice(nodes, deal_of(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place)
+    sample_lattice(
+        nodes, block_cyclic_schedule(len(nodes)), params, np.zeros((1, 3), dtype=np.float32), *place
+    )
     return nodes
 
 

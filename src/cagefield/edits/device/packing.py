@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.identity_memo import kept
+from cagefield.compute.identity_memo import memoized_by_identity
 from cagefield.errors import EditError
 from cagefield.geometry import hexahedron
 from cagefield.typing import Array
@@ -72,7 +72,7 @@ class PackedEdit(Protocol):
     def unread(self) -> EditError: ...
 
 
-@kept
+@memoized_by_identity
 def row_of(edit: PackedEdit) -> NDArray[np.float32]:
     """The row [WIDTH] of an edit, but for what depends on the others in its stack.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cagefield.fields.sh_rotation import turned_sh
 from cagefield.formats.splats.splat_table import SplatBatch
-from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.typing import AnyArray, Array
 
 
@@ -42,7 +42,7 @@ def transformed(batch: SplatBatch, matrix: Array) -> SplatBatch:
         turned[np.linalg.det(turned) < 0.0, :, 2] *= -1.0
         with np.errstate(divide="ignore"):
             log_scales = np.where(is_number[:, None], np.log(lengths), np.nan)
-    quaternions = np.where(is_number[:, None], quaternions_of(turned), np.nan)
+    quaternions = np.where(is_number[:, None], quaternions_from_matrices(turned), np.nan)
     return SplatBatch(means, log_scales, quaternions, batch.opacities, _turned(batch.sh, P))
 
 

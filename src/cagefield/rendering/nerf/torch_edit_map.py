@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.quadrants import take_tensors
 from cagefield.edits.device.device_stack import DeviceStack, PackedStack
 from cagefield.edits.device.kernels.edit_maps import EditArgs
@@ -89,5 +89,7 @@ class TensorMap:
         out = torch.empty((len(samples), 8), dtype=torch.float32, device=self.device)
         if len(samples):
             table, result = [values.numpy() if self._as_arrays else values for values in (samples, out)]
-            map_tensors(table, deal_of(len(samples)), result, self._edits, self.flows, preserve_opacity)
+            map_tensors(
+                table, block_cyclic_schedule(len(samples)), result, self._edits, self.flows, preserve_opacity
+            )
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]

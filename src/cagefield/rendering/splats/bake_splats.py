@@ -17,7 +17,7 @@ import numpy as np
 from cagefield.edits import EditStack
 from cagefield.fields.sh_rotation import rotated_sh
 from cagefield.fields.splat_field import SplatField
-from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.rendering.splats.splat_motion import MovedSplats, moved_splats
 from cagefield.rendering.splats.splat_provenance import with_pasted
 from cagefield.rendering.splats.splitting import split_of
@@ -82,7 +82,7 @@ def _baked(field: SplatField, moved: MovedSplats, preserve_opacity: bool) -> tup
     elsewhere = (
         moved.points,
         np.log(np.maximum(scales, 1e-30)),
-        quaternions_of(turned),
+        quaternions_from_matrices(turned),
         opacities,
         rotated_sh(field.sh[source] if sh is None else sh, _polar_rotations(moved.jacobian)),
     )

@@ -52,7 +52,7 @@ from cagefield.edits import Edit, EditStack
 from cagefield.edits.patch import SplatPatch
 from cagefield.fields.splat_field import SplatField
 from cagefield.geometry.cage import FACES, Cage
-from cagefield.geometry.quaternions import quaternions_of, rotation_matrices
+from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_matrices
 from cagefield.rendering.splats.gaussian_profile import (
     ENDS,
     LEAST_OPAQUE,
@@ -443,7 +443,7 @@ def _parted(
     parted = SplatField(
         (field.means[n] + along * children.x[:, None]).astype(np.float32),
         np.log(np.maximum(s, 1e-30)).astype(np.float32),
-        quaternions_of(U).astype(np.float32),
+        quaternions_from_matrices(U).astype(np.float32),
         children.opacity.astype(np.float32),
         field.sh[n],
         antialiased=field.antialiased,

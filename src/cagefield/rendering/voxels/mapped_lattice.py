@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
 from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid
@@ -27,7 +27,7 @@ def images_of(
     images = np.empty((wanted.size, 3), np.float32)
     map_points(
         images,
-        deal_of(len(images)),
+        block_cyclic_schedule(len(images)),
         np.zeros((1, 3), np.float32) if starts is None else starts,
         int(starts is not None),
         np.ascontiguousarray(wanted, np.uint8).reshape(-1),

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
 from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
@@ -103,7 +103,7 @@ def _occupied(
     out = np.empty(len(images), np.uint8)
     occupied_points(
         out,
-        deal_of(len(out)),
+        block_cyclic_schedule(len(out)),
         images,
         occupancy_args(canonical),
         ints(count),
@@ -119,7 +119,7 @@ def _refined(
     out = np.empty(len(candidates), np.uint8)
     dense_blocks(
         out,
-        deal_of(len(out)),
+        block_cyclic_schedule(len(out)),
         candidates.reshape(-1),
         images,
         ints(count),

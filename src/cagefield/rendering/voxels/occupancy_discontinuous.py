@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import ints
 from cagefield.edits.device.device_stack import DeviceStack
 from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args
@@ -83,7 +83,7 @@ def _corners(
     out = np.zeros(int(np.prod(count)), np.uint8)
     occupied_corners(
         out,
-        deal_of(len(out)),
+        block_cyclic_schedule(len(out)),
         occupancy_args(canonical),
         ints(lower),
         ints(count),
@@ -103,7 +103,7 @@ def _refined(
     out = np.zeros(len(candidates), np.uint8)
     dense_blocks(
         out,
-        deal_of(len(out)),
+        block_cyclic_schedule(len(out)),
         np.ascontiguousarray(candidates).reshape(-1),
         ints(lower),
         grid.args,

@@ -135,7 +135,7 @@ class Renderer:
         `region` (x, y, width, height) in pixels is the part of the camera's picture that is rendered; `step`
         takes the place of the renderer's own.
         """
-        from cagefield.compute.block_cyclic import deal_of
+        from cagefield.compute.block_cyclic import block_cyclic_schedule
         from cagefield.rendering.voxels.kernels import march
 
         field = self.field
@@ -158,7 +158,7 @@ class Renderer:
             few = min(rows, down - row)
             march.march_tiles(
                 out,
-                deal_of(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
+                block_cyclic_schedule(-(-width // march.TILE) * few * march.TILE**2, march.TILE**2),
                 pose,
                 march.TileArgs(ints((x, y)), ints((width, height)), row, few),
                 how,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.compute import devices
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats, ints
 from cagefield.compute.quadrants import qd
 from cagefield.training.voxels.exposure import Exposure
@@ -67,7 +67,7 @@ class Batches:
         cells = grid.args
         step = config.step if space.contracted else config.step / float(np.max(cells.scale))
         march_batch(
-            deal_of(workers, 1),
+            block_cyclic_schedule(workers, 1),
             PatchArgs(patches, count, config.patch),
             photos.args(gains),
             cells,

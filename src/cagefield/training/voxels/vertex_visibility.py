@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cagefield.cameras.camera import Camera
-from cagefield.compute.block_cyclic import deal_of
+from cagefield.compute.block_cyclic import block_cyclic_schedule
 from cagefield.compute.devices import floats
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy
@@ -48,7 +48,7 @@ def unseen_vertices(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.
         local = camera.local_directions().reshape(camera.height, camera.width, 3)[::stride, ::stride]
         mark_seen(
             seen,
-            deal_of(local.shape[0] * local.shape[1]),
+            block_cyclic_schedule(local.shape[0] * local.shape[1]),
             to_device(local.astype(np.float32)),
             local.shape[0] * local.shape[1],
             floats(camera.c2w[:3, :3]),

@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.warps.flow_table import HEADER, MOMENT
 from cagefield.warps.kernels.flow_shell import flow_point
@@ -33,10 +33,10 @@ FOLLOWED = 0.05
 
 @qd.kernel(fastcache=True)
 def march_lost(
-    nodes: Nodes, lost: Numbers, deal: Deal, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
+    nodes: Nodes, lost: Numbers, deal: Schedule, table: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
 ):
-    for turn in range(turns(deal)):
-        item = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        item = scheduled_item(turn, deal)
         if item < lost.shape[0]:
             n = lost[item]
             p = place(n, origin, frame, resolution)
@@ -46,7 +46,7 @@ def march_lost(
 @qd.kernel(fastcache=True)
 def march(
     nodes: Nodes,
-    deal: Deal,
+    deal: Schedule,
     table: Nodes,
     origin: vec3,
     frame: mat3,
@@ -55,8 +55,8 @@ def march(
     bent_inner: qd.template(),
 ):
     count = nodes.shape[0]
-    for turn in range(turns(deal)):
-        block = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        block = scheduled_item(turn, deal)
         if block * LANES < count:
             # z, its rate k and the weighted sum of rates s; xi; the largest residual of xi; 1 where z is at
             # rest.

@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import Nodes, Params, map_edit
 
@@ -12,10 +12,10 @@ mat3 = qd.types.matrix(3, 3, qd.f32)
 
 @qd.kernel(fastcache=True)
 def sample_lattice(
-    nodes: Nodes, deal: Deal, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
+    nodes: Nodes, deal: Schedule, params: Params, none: Nodes, origin: vec3, frame: mat3, resolution: qd.i32
 ):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         if n < nodes.shape[0]:
             i = n % resolution
             j = (n // resolution) % resolution

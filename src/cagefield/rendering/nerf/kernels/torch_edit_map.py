@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, Params, map_sample
 from cagefield.edits.device.kernels.hexahedron import read3
@@ -11,14 +11,14 @@ from cagefield.edits.device.kernels.hexahedron import read3
 @qd.kernel(fastcache=True)
 def map_tensors(
     samples: Params,
-    deal: Deal,
+    deal: Schedule,
     out: Params,
     edits: EditArgs,
     flows: qd.template(),
     preserve_opacity: qd.template(),
 ):
-    for turn in range(turns(deal)):
-        i = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        i = scheduled_item(turn, deal)
         if i < samples.shape[0]:
             d = read3(samples, i, 3)
             q, v, place = map_sample(read3(samples, i, 0), d, edits, flows)

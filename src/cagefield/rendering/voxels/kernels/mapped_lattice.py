@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, Nodes, map_sample
 from cagefield.rendering.voxels.kernels.grid import U8, GridArgs, ivec3, to_grid, to_world, vec3
@@ -14,7 +14,7 @@ UNKNOWN = 1e30
 @qd.kernel(fastcache=True)
 def map_points(
     images: Nodes,
-    deal: Deal,
+    deal: Schedule,
     starts: Nodes,
     started: qd.i32,
     wanted: U8,
@@ -26,8 +26,8 @@ def map_points(
     contracted: qd.template(),
     flows: qd.template(),
 ):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         image = vec3(UNKNOWN, UNKNOWN, UNKNOWN)
         if n < images.shape[0] and wanted[n] > 0:
             at = lower + spacing * ivec3(n // (count.y * count.z), (n // count.z) % count.y, n % count.z)

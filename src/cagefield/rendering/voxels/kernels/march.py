@@ -9,7 +9,7 @@ length, so it grows with distance; the march ends half a voxel before infinity.
 
 from dataclasses import dataclass
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.rendering.voxels.kernels.edited_ray import (
@@ -82,7 +82,7 @@ class MarchArgs:
 @qd.kernel(fastcache=True)
 def march_tiles(
     out: F32,
-    deal: Deal,
+    deal: Schedule,
     camera: CameraArgs,
     tiles: TileArgs,
     march: MarchArgs,
@@ -106,8 +106,8 @@ def march_tiles(
     """
     across = (tiles.size.x + TILE - 1) // TILE
     qd.loop_config(block_dim=64)
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         tile = n // (TILE * TILE)
         x = (tile % across) * TILE + n % TILE
         y = (tiles.first_row + tile // across) * TILE + (n // TILE) % TILE

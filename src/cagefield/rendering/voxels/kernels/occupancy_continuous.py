@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import Nodes
 from cagefield.rendering.voxels.kernels.grid import I32, U8, GridArgs, ivec3, vec3
@@ -14,14 +14,14 @@ from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 @qd.kernel(fastcache=True)
 def occupied_points(
     out: U8,
-    deal: Deal,
+    deal: Schedule,
     images: Nodes,
     bricks: OccupancyArgs,
     count: ivec3,
     most: qd.f32,
 ):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         if n < images.shape[0]:
             found = 0
             image = images[n]
@@ -48,14 +48,14 @@ def occupied_points(
 @qd.kernel(fastcache=True)
 def dense_blocks(
     out: U8,
-    deal: Deal,
+    deal: Schedule,
     candidates: I32,
     images: Nodes,
     count: ivec3,
     grid: GridArgs,
 ):
-    for turn in range(turns(deal)):
-        c = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        c = scheduled_item(turn, deal)
         if c < out.shape[0]:
             i = candidates[3 * c]
             j = candidates[3 * c + 1]

@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.edits.device.kernels.edit_maps import EditArgs, map_sample
 from cagefield.rendering.voxels.kernels.grid import (
@@ -23,7 +23,7 @@ from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
 @qd.kernel(fastcache=True)
 def occupied_corners(
     out: U8,
-    deal: Deal,
+    deal: Schedule,
     bricks: OccupancyArgs,
     lower: ivec3,
     count: ivec3,
@@ -33,8 +33,8 @@ def occupied_corners(
     contracted: qd.template(),
     flows: qd.template(),
 ):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         if n < count.x * count.y * count.z:
             i = n // (count.y * count.z)
             j = (n // count.z) % count.y
@@ -53,7 +53,7 @@ def occupied_corners(
 @qd.kernel(fastcache=True)
 def dense_blocks(
     out: U8,
-    deal: Deal,
+    deal: Schedule,
     candidates: I32,
     lower: ivec3,
     grid: GridArgs,
@@ -61,8 +61,8 @@ def dense_blocks(
     contracted: qd.template(),
     flows: qd.template(),
 ):
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         if n < out.shape[0]:
             block = ivec3(candidates[3 * n], candidates[3 * n + 1], candidates[3 * n + 2])
             found = 0

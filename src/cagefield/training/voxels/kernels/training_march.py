@@ -22,7 +22,7 @@ on a CPU.) b_v are trilinear weights.
 
 from dataclasses import dataclass
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import (
     F32,
@@ -106,7 +106,7 @@ class BatchArgs:
 
 @qd.kernel(fastcache=True)
 def march_batch(
-    deal: Deal,
+    deal: Schedule,
     patches: PatchArgs,
     photos: PhotoArgs,
     grid: GridArgs,
@@ -125,8 +125,8 @@ def march_batch(
     per = (patches.count + work.workers - 1) // work.workers * rays
     if qd.static(gpu):
         per = (total + work.workers - 1) // work.workers
-    for turn in range(turns(deal)):
-        worker = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        worker = scheduled_item(turn, deal)
         base = 0
         if qd.static(not gpu):
             base = worker * work.record

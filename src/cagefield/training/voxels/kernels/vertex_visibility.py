@@ -2,7 +2,7 @@
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
-from cagefield.compute.block_cyclic import Deal, dealt, turns
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import (
     F32,
@@ -21,7 +21,7 @@ mat3 = qd.types.matrix(3, 3, qd.f32)
 @qd.kernel(fastcache=True)
 def mark_seen(
     seen: U8,
-    deal: Deal,
+    deal: Schedule,
     directions: F32,
     rays: qd.i32,
     rotation: mat3,
@@ -32,8 +32,8 @@ def mark_seen(
     least: qd.f32,
 ):
     """Writes 1 into `seen` [nx*ny*nz], at the first vertex of each cell, where rays of a camera come by."""
-    for turn in range(turns(deal)):
-        n = dealt(turn, deal)
+    for turn in range(turn_count(deal)):
+        n = scheduled_item(turn, deal)
         if n < rays:
             d = rotation @ vec3(directions[3 * n], directions[3 * n + 1], directions[3 * n + 2])
             go = (origin - grid.lower) * grid.scale
