@@ -5,13 +5,13 @@ import pytest
 import quadrants as qd
 
 from cagefield.compute import block_cyclic, devices
-from cagefield.compute.block_cyclic import Deal, scheduled_item, turn_count
+from cagefield.compute.block_cyclic import Schedule, scheduled_item, turn_count
 
 Counts = qd.types.ndarray(dtype=qd.i32, ndim=1)
 
 
 @qd.kernel
-def _visit(visits: Counts, order: Counts, deal: Deal):
+def _visit(visits: Counts, order: Counts, deal: Schedule):
     for n in range(turn_count(deal)):
         i = scheduled_item(n, deal)
         if i < visits.shape[0]:
