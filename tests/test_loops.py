@@ -43,7 +43,7 @@ def test_parts_get_their_share_of_any_piece_of_the_items() -> None:
 def test_few_items_go_to_different_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(devices, "parts", lambda: 4)
     length, parts, unit = block_cyclic.block_cyclic_schedule(4, 1)
-    assert (length, parts, unit) == (block_cyclic.LEAST, 4, 1)
+    assert (length, parts, unit) == (block_cyclic.MIN_PART_TURNS, 4, 1)
 
 
 def test_a_gpu_keeps_the_order(monkeypatch: pytest.MonkeyPatch) -> None:
