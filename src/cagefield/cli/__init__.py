@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 _LONGEST = 1200
-"""Characters of a complaint: what users gave stands in it."""
+"""Characters of an error message, which quotes the user's input."""
 
 _DESCRIPTION = """Edit the geometry of a captured radiance field with two nested cages.
 

@@ -82,7 +82,7 @@ def bake_scene(
 ) -> tuple[Scene, str]:
     """The scene of a NeRF's or splats' voxels, with a progress bar on stderr, and a line of figures.
 
-    Of an `unbounded` one what the cameras see is baked.
+    Of an `unbounded` one the region that the cameras see is baked.
     """
     import time
     from typing import cast

@@ -33,7 +33,7 @@ class Convert:
     """Replace the file that is there."""
 
     def run(self) -> None:
-        """Converts; prints what was written."""
+        """Convert, and print a summary of the written file."""
         from cagefield.formats.splats.splat_files import convert_splats, writer_of
 
         writer_of(self.out, self.spz_version)

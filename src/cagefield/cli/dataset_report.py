@@ -1,4 +1,4 @@
-"""Lines of text that say what a data set holds."""
+"""Text report of a data set's contents."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ class Demo:
 
 @contextmanager
 def _timed(what: str) -> Iterator[None]:
-    """Prints what was done and how long it took."""
+    """Print the name of a step and its seconds."""
     began = time.perf_counter()
     yield
     print(f"{what}: {time.perf_counter() - began:.0f} s", flush=True)

@@ -29,7 +29,7 @@ class ApplyEdits:
     """Replace the scene that is there."""
 
     def run(self) -> None:
-        """Checks every edit, writes the scene, prints what changes."""
+        """Check every edit, write the scene, print the changes."""
         from cagefield.cli.report import describe_edits
         from cagefield.edits import EditStack
         from cagefield.edits.edit_files import load_edits

@@ -81,7 +81,7 @@ class Export:
     """Replace the file that is there."""
 
     def run(self) -> None:
-        """Bakes or fits, writes; prints what is in the file."""
+        """Bake or fit, write, and print the contents of the file."""
         if self.embed or self.out.suffix.lower() == ".html":
             return self._page()
         self._check()
@@ -96,7 +96,7 @@ class Export:
         print(f"{write(scene, cages)}\nwritten to {self.out}")
 
     def _page(self) -> None:
-        """Writes a page; prints what is in it."""
+        """Write a page, and print its contents."""
         from cagefield.cameras.keyframe_files import load_keys
         from cagefield.compute import devices
         from cagefield.files.atomic import replaced_file
@@ -154,7 +154,7 @@ class Export:
             print(f'<iframe src="{name}/{INDEX}" width="800" height="600" style="border: 0"></iframe>')
 
     def _check(self) -> None:
-        """Refuses what cannot be written before anything is computed."""
+        """Check the options before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
         from cagefield.formats.splats.splat_files import writer_of
 

@@ -1,4 +1,4 @@
-"""`cagefield import`: what another program trained, as a scene: splats, or a NeRF."""
+"""`cagefield import`: splats or a NeRF of another program as a scene."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ImportField:
     """Replace the scene that is there."""
 
     def run(self) -> None:
-        """Reads, bakes where it must, and writes; prints what it found."""
+        """Read, bake where necessary, write, and print the contents."""
         from cagefield.formats.splats.open_splats import holds_splats
         from cagefield.scene.scene_files import check_destination
 
@@ -65,7 +65,7 @@ class ImportField:
         print(f"{lines}\nscene written to {self.out}")
 
     def _splats(self) -> tuple[Scene, str]:
-        """The scene of a splat file, and lines that say what it holds."""
+        """The scene of a splat file, and a text report of its contents."""
         from cagefield.formats.splats.splat_files import read_splats
         from cagefield.scene.import_splats import import_splats
         from cagefield.scene.scene import Scene
@@ -90,7 +90,7 @@ class ImportField:
         return Scene(splats, cameras=imported.cameras, background=imported.background), line
 
     def _nerf(self) -> tuple[Scene, str]:
-        """The baked scene of a checkpoint, and lines that say what it holds."""
+        """The baked scene of a checkpoint, and a text report of its contents."""
         from cagefield.cli.bake import bake_scene
         from cagefield.compute import devices
         from cagefield.formats.nerf.nerf_pytorch import read_checkpoint

@@ -1,4 +1,4 @@
-"""`cagefield info`: what a scene folder or a data set holds."""
+"""`cagefield info`: contents of a scene folder or a data set."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _is_dataset(path: Path) -> bool:
 
 
 def _voxels(field: VoxelField) -> tuple[str, str]:
-    """What a voxel field holds, and how fine it is."""
+    """(contents, resolution) of a voxel field, as text."""
     nx, ny, nz = field.resolution
     stored = len(field.vertices)
     share = stored / (nx * ny * nz)
@@ -91,7 +91,7 @@ def _voxels(field: VoxelField) -> tuple[str, str]:
 
 
 def _splats(field: SplatField) -> tuple[str, str]:
-    """What a splat field holds, and how fine it is."""
+    """(contents, resolution) of a splat field, as text."""
     arrays = (field.means, field.log_scales, field.quaternions, field.opacities, field.sh)
     megabytes = sum(array.nbytes for array in arrays) / 1e6
     offset = f", without the offset {', '.join(f'{v:.15g}' for v in field.offset)}" * any(field.offset)

@@ -1,4 +1,4 @@
-"""What several subcommands share: option types, sizes, colours, destinations, progress."""
+"""Shared parts of subcommands: option types, sizes, colors, destinations, progress."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 
 SEEDS = (0, 2**32 - 1)
-"""What NumPy and the kernels take."""
+"""Valid range of seeds for NumPy and the kernels."""
 
 
 def check_number(name: str, value: int | None, low: int, high: int) -> None:
@@ -154,7 +154,7 @@ def parse_background(text: str | None) -> str | tuple[float, float, float]:
 def check_folder(path: Path, overwrite: bool, mark: str | None = None) -> None:
     """Passes where `path` is new or an empty folder; with `overwrite` any (that holds the file `mark`).
 
-    What a program put aside when it was ended while it replaced the folder is back first; a warning says so.
+    A folder displaced by a program that was killed during its replacement is restored first, with a warning.
 
     Raises:
         CagefieldError: something is there that may not be replaced.

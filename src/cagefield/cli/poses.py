@@ -41,7 +41,7 @@ class Poses:
     """Replace the data set that is there."""
 
     def run(self) -> None:
-        """Makes the data set; prints what became of the photos."""
+        """Write the data set, and print the number of registered photos."""
         from cagefield.datasets import load_dataset
         from cagefield.datasets.dataset_loader import has_photos_alone
         from cagefield.datasets.sfm.transforms_writer import RECORD, write_transforms

@@ -1,4 +1,4 @@
-"""Lines of text that say what a scene holds and what its edits do."""
+"""Text report of a scene's contents and of the effects of its edits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class _Content:
-    """What a field is made of (`noun`): positions [M,3], weights [M]; a length of it, in `lengths`."""
+    """Elements of a field (`noun`): positions [M,3], weights [M]; a length, in `lengths`."""
 
     noun: str
     positions: Array
@@ -49,7 +49,7 @@ class _Content:
 
 
 def describe_edits(edits: Iterable[Edit], field: VoxelField | SplatField) -> list[str]:
-    """Per edit, in the order of the stack: a line on what it is, and indented ones on what it changes.
+    """Per edit, in the order of the stack: a line with its kind, and indented lines with its changes.
 
     The shares are of the field's stored voxels, or of its splats' opacities, inside the canonical inner cage
     and in the shell around it. An edit that cannot be evaluated says why.
@@ -77,7 +77,7 @@ def _title(edit: Edit) -> str:
 
 
 def _left_out(edit: Edit) -> str:
-    """What a discrete edit leaves as it was, though others would not."""
+    """Options by which a discrete edit leaves its surroundings unchanged, as text."""
     if edit.adjustment == "continuous":
         return ""
     word = "clone" if isinstance(edit.fill, Clone) else edit.fill

@@ -41,7 +41,7 @@ FOG = (
     "voxels explain what has no texture in a capture (walls, floors, tables) by fog in front of the cameras; "
     "--field splat is made for it"
 )
-"""What is said before voxels are trained on an unbounded capture."""
+"""Warning before voxels are trained on an unbounded capture."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Train:
             self.training.config()
 
     def _kind(self, dataset: Dataset) -> FieldKind:
-        """What is trained; where that was left open, a line on stderr says so."""
+        """Kind of field to train; an automatic choice is reported on stderr."""
         if self.field != "auto":
             return self.field
         kind: FieldKind = "splat" if dataset.unbounded else "voxel"
@@ -194,7 +194,7 @@ class Train:
 
     @contextmanager
     def _kept(self, checkpoint: Path, finished: bool) -> Iterator[None]:
-        """Says, where what follows a training fails, that the training itself is kept.
+        """Context that adds to an error after the training that the training itself is kept.
 
         Raises:
             CagefieldError: the one that was raised within, with that added.

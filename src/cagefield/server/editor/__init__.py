@@ -1,4 +1,4 @@
-"""The document and its editing: what a user makes, and what may be made of it. Knows no web, no rendering.
+"""Document of the editor and its editing operations, without web and rendering.
 
-`session` has one method per command; `document` is what undo goes back to, `persistence` what is saved.
+`session` has one method per command; `document` is the state that undo restores, `persistence` writes files.
 """

@@ -1,4 +1,4 @@
-"""The drags that go on, one for each page at most: what was dragged, and what it has become."""
+"""Active drags, at most one per page, each with its entry before the drag and its present result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cagefield.server.editor.drag_solver import Moved, Target, move
 
 @dataclass(frozen=True)
 class Drag:
-    """A drag in progress: its number on its page, the entry as it was, and what it has become."""
+    """A drag in progress: its number on its page, the entry before it, and its present result."""
 
     number: int
     target: Target
@@ -55,7 +55,7 @@ class Drags:
         self._drags.clear()
 
     def dragged(self, page: int) -> Entry | None:
-        """What the page's drag has become, or None."""
+        """Present result of the page's drag, or None without a drag."""
         drag = self._drags.get(page)
         return None if drag is None else drag.now
 

@@ -24,7 +24,8 @@ PROBES = 40
 def pair_around(point: Array, view_height: float, bounds: Array, voxel: float) -> tuple[Cage, Cage]:
     """(inner, outer) cages, cubes along the world's axes, around a point [3].
 
-    `view_height` is the height of what the picture shows at the point's distance; the edge is a share of it,
+    `view_height` is the height of the view frustum at the point's distance, world units; the edge is a share
+    of it,
     not below 8 voxels and not above a third of the field's longest side.
     """
     longest = float((bounds[1] - bounds[0]).max())
@@ -52,7 +53,7 @@ def probes(cage: Cage) -> Array:
 
 
 def fitted(cage: Cage, dense: Mask) -> Cage:
-    """The part of a cage that holds what is dense [PROBES^3] at its `probes`, half a probe left around it.
+    """Smallest box in a cage around its `dense` probes [PROBES^3], with a margin of half a probe.
 
     Specks (pieces that touch nothing and have less than a fiftieth of the largest piece's probes) do not
     count.

@@ -1,4 +1,4 @@
-"""Document: what an editor's user makes, as one immutable value, so that undo is going back to an old one."""
+"""Document of an editor as one immutable value; undo restores an earlier value."""
 
 from __future__ import annotations
 

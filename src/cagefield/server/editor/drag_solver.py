@@ -1,4 +1,4 @@
-"""What a drag or a numeric field does to an edit's cages, and how far it may go.
+"""Result of a drag or a numeric field on an edit's cages, limited to its safe fraction.
 
 *Edit* mode moves the inner cage with the field: the operation joins the edit's. *Set* mode moves cages alone:
 the inner cage as it was trained, the outer one, or both about the inner one's pivot.
@@ -23,7 +23,7 @@ _ROUNDING = 1e-3
 """Share by which a drag stops earlier where operations, added up, are not safe as they were one by one."""
 
 Target: TypeAlias = Literal["field", "inner", "outer", "both"]
-"""What a drag moves: "field" the inner cage with the field (Edit mode); the others cages alone (Set mode).
+"""Target of a drag: "field", the inner cage with the field (Edit mode); the others, cages alone (Set mode).
 
 "both" turns and scales both cages about the inner cage's pivot.
 """
@@ -31,7 +31,7 @@ Target: TypeAlias = Literal["field", "inner", "outer", "both"]
 
 @dataclass(frozen=True)
 class Moved:
-    """An edit after `part` of an operation; `why` says what stopped the rest.
+    """An edit after the fraction `part` of an operation; `why` names the limit that stopped the rest.
 
     `problem` is the edit's, as `problem` finds it.
     """

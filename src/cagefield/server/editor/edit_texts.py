@@ -1,4 +1,4 @@
-"""Edits of texts that pages send, with what is slow to find out about many of them; needs no session."""
+"""Parsing of edit texts from pages, with the slow checks of many edits done outside of the session."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cagefield.server.editor.validity import problem
 
 @dataclass(frozen=True)
 class ReadEdits:
-    """Edits, why each cannot be shown (or None), and what an edit file has of each."""
+    """Parsed edits, the problem of each (or None), and the edit-file value of each."""
 
     edits: tuple[Edit, ...]
     problems: tuple[str | None, ...]
@@ -37,13 +37,13 @@ def edits_in(text: str, admitted: Callable[[Edit], Edit] = lambda edit: edit) ->
 
 
 def read_edits(text: str, admitted: Callable[[Edit], Edit]) -> ReadEdits:
-    """The same with all that is asked of them next: milliseconds for each edit."""
+    """Parsed and checked edits of a text; milliseconds for each edit."""
     edits = edits_in(text, admitted)
     problems = (problem(edit) if edit.changes_anything else None for edit in edits)
     return ReadEdits(edits, tuple(problems), tuple(file_values(edits)))
 
 
 def file_values(edits: Sequence[Edit]) -> list[object]:
-    """What an edit file in JSON has of each edit."""
+    """Values of edits in a JSON edit file, one per edit."""
     values: list[object] = json.loads(dump_edits(EditStack(edits), format="json"))["edits"]
     return values

@@ -1,7 +1,7 @@
-"""History: the states that were, in order, and where in it we are.
+"""Undo history: the sequence of states and the index of the present one.
 
-Thrown away is what a new entry replaces, the entries that had been undone, and beyond `LONGEST` entries the
-oldest after the beginning, which always stays.
+A new entry replaces the undone entries. Beyond `LONGEST` entries the oldest after the initial state is
+dropped; the initial state always stays.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class History(Generic[T]):
         return self.states[self.entry]
 
     def push(self, name: str, state: T) -> History[T]:
-        """One entry more after the present one; what had been undone is gone."""
+        """History with one more entry after the present one and without the undone ones."""
         keep = self.entry + 1
         first = 1 + max(0, keep + 1 - LONGEST)
         names = (self.names[0], *self.names[first:keep], name)

@@ -1,4 +1,4 @@
-"""What was worked out about an object, remembered by the object itself: equal ones are not the same."""
+"""Cache of results per object identity: equal objects are different keys."""
 
 from __future__ import annotations
 
@@ -42,5 +42,5 @@ class IdentityCache(Generic[K, V]):
         self._items = {number: item for number, item in self._items.items() if number in known}
 
     def values(self) -> list[V]:
-        """What is remembered, the oldest first."""
+        """Cached values, oldest first."""
         return [value for _, value in self._items.values()]

@@ -1,4 +1,4 @@
-"""Names of edits, and of what was done to them, as the lists show them."""
+"""Labels of edits and of history entries in the editor's lists."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def mirrored_cage(cage: Cage, axis: int, at: float) -> Cage:
 
 
 def mirrored_operation(operation: Operation, axis: int) -> Operation:
-    """The operation that does to a mirrored cage what this one does to the cage."""
+    """Operation on the mirrored cage that corresponds to `operation` on the cage."""
     if isinstance(operation, ops.Translate):
         return ops.Translate(_flipped(operation.by, axis))
     if isinstance(operation, ops.Rotate):

@@ -1,4 +1,4 @@
-"""Scenes and files that an editor's pages may paste from: those under its root, and what its edits named.
+"""Scenes and splat files that pages may paste from: those under the root and those named by edits.
 
 In a session sources are absolute paths. In files they are relative to the scene's folder where they lie under
 the root, so that both can be moved together.
@@ -68,10 +68,10 @@ def source_problem(edit: Edit) -> str | None:
 
 
 def sources_under(root: Path, own: Iterable[Path], *, splats: bool) -> list[str]:
-    """What can be pasted into a scene of splats, or of voxels: paths relative to a root, with slashes.
+    """Sources for pastes into a scene of splats or of voxels: paths relative to a root, with slashes.
 
-    Scene folders and, for splats, files of splats. Not the scene's `own` folders, hidden ones, and what lies
-    deeper than DEEP.
+    Scene folders and, for splats, files of splats. The scene's `own` folders, hidden folders, and folders
+    deeper than DEEP are left out.
     """
     mine, found, seen = {real_path(path) for path in own}, list[str](), 0
     for folder, folders, files in os.walk(root):

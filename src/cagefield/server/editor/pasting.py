@@ -1,4 +1,4 @@
-"""Pastes in the editor: what of the other scene is shown is set where it stands in this one."""
+"""Pastes in the editor: the initial cage and placement of content from another scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cagefield.typing import Array
 from cagefield.warps.hexahedron_map import HexahedronMap
 
 SHARE_OF_VIEW = 0.5
-"""Longest edge of what is pasted, as a share of the picture's height at the surface it stands on."""
+"""Longest edge of pasted content, as a share of the view's height at the surface below it."""
 
 BENT = "what is pasted was bent; take the moves of its corners back, then set its cage"
 TURNED = "the cage of a paste shrinks, grows and moves in Set mode; turn it in Edit mode (Tab)"

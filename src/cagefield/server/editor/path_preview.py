@@ -12,7 +12,8 @@ from cagefield.edits import Edit
 
 @dataclass(frozen=True)
 class Preview:
-    """What a page plays: the page, its number for it, the path, and the edits as they are shown now."""
+    """Preview of a camera path: the page, the page's number for it, the path, and the edits at the present
+    time."""
 
     page: int
     number: int
@@ -20,7 +21,7 @@ class Preview:
     edits: tuple[Edit, ...]
 
     def is_of(self, page: int, number: int) -> bool:
-        """True where it is what that page calls by that number."""
+        """True for the preview that `page` identifies by `number`."""
         return (self.page, self.number) == (page, number)
 
     def parts(self, seconds: float) -> dict[int, float]:

@@ -1,8 +1,8 @@
-"""Saving, and what survives a crash. Nothing is overwritten that the user has not asked to be.
+"""Saving and autosave (crash recovery). No file is overwritten without the user's request.
 
 Saving writes the edits, the camera path and the opacity choice into the scene's folder, each file whole or
 not at all. After every change an autosave goes beside the folder, into a hidden file; saving removes it, and
-an editor that is started and finds one restores what it holds.
+the next editor restores the document from it.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class SceneStore:
         self.origin = real_path(path)
         self.path = real_path(path)
         self.root = real_path(self.shown_path.parent if root is None else root)
-        """What pages save and render lies in it."""
+        """Folder that holds all saved and rendered files of pages."""
         self._lock: SceneLock | None = None
         self.trouble: str | None = None
         """Why the last autosave failed, or None."""
         self.damaged: str | None = None
-        """What became of an autosave that could not be read, or None."""
+        """Report of an unreadable autosave, or None."""
         self._written = self._fingerprint()
         self.files = field_states(path) if files is None else files
         """The states that the files of the scene, as it is edited here, have in the folder that has it."""
@@ -79,12 +79,12 @@ class SceneStore:
         self._warned: object = None
         self._kept: Document | None = None
         self._values: IdentityCache[Edit, object] = IdentityCache(4 * MOST_EDITS)
-        """What files have of the edits that were written last."""
+        """Edit-file values of the edits written last."""
 
     # ---- opening ----
 
     def document(self) -> Document:
-        """What the scene's folder holds. Raises CagefieldError for a camera path that cannot be read."""
+        """Document of the scene's folder. Raises CagefieldError for a camera path that cannot be read."""
         keys: tuple[Keyframe, ...] = ()
         loop = False
         if (self.path / CAMERA_PATH).exists():
@@ -97,9 +97,9 @@ class SceneStore:
         )
 
     def recovered(self) -> Document | None:
-        """What an editor that ended without saving left behind; None where that is nothing new.
+        """Document of the autosave of an editor that ended without saving; None where it has nothing new.
 
-        What cannot be read is put aside under another name, with a warning.
+        An unreadable autosave is renamed, with a warning.
         """
         try:
             content = json_text.loads(read_text(self.autosave_path))
@@ -132,7 +132,7 @@ class SceneStore:
         return self.path if self.source is None else self.source.with_name(f"{stem_of(self.source)}-scene")
 
     def lock(self) -> None:
-        """Keeps other programs from editing the scene, and removes what ended ones left half-written.
+        """Lock the scene against other programs, and remove unfinished files of ended ones.
 
         Their videos beside it and their temporary folders, too. Raises SceneError where another one does
         edit it.
@@ -151,7 +151,7 @@ class SceneStore:
     # ---- keeping ----
 
     def place(self, path: str) -> Path:
-        """Where a page may write what it calls `path`: in `root`, and relative to the scene's place.
+        """Destination of a page's `path`: in `root`, relative to the scene's place.
 
         Raises SceneError for any other place.
         """
@@ -177,11 +177,11 @@ class SceneStore:
         return admitted(edit, self.path, self.root)
 
     def source_of(self, name: str) -> Path:
-        """The path of one of them, or of any other in `root`. Raises SceneError for what lies outside."""
+        """Path of one of the `sources`, or of another in `root`. Raises SceneError for a path outside."""
         return source_in(name, self.root, self.root)
 
     def sources(self) -> list[str]:
-        """What pages may paste, as paths in `root`."""
+        """Sources that pages may paste, as paths in `root`."""
         splats = isinstance(self.scene.field, SplatField)
         return sources_under(self.root, (self.origin, self.path), splats=splats)
 
@@ -191,7 +191,7 @@ class SceneStore:
         return self.path.with_name(f".{self.path.name}.cagefield-autosave.json")
 
     def autosave(self, session: Session) -> None:
-        """Keeps what is not saved yet, if it is not kept already; `trouble` says why it could not be."""
+        """Write the autosave where the document has unsaved changes; `trouble` names a failure."""
         document = session.document
         if document is self._kept:
             return
@@ -208,7 +208,7 @@ class SceneStore:
             self.trouble = f"changes cannot be kept in {self.autosave_path} ({error.strerror}); save often"
 
     def remember(self, read: ReadEdits) -> None:
-        """What files have of edits is known already."""
+        """Store the edit-file values of edits that were read from a file."""
         for edit, values in zip(read.edits, read.values, strict=True):
             self._values.put(edit, values)
 

@@ -1,4 +1,4 @@
-"""Session: what several pages edit together. One method per command; no web, no rendering.
+"""Editing session of several pages: one method per command, without web and rendering.
 
 A drag works on the edit as it was when the drag began, and becomes one entry of the history when it ends.
 Every method that changes something raises a `CagefieldError` with the cure where it cannot, and then
@@ -58,7 +58,7 @@ class Session:
         self.selected: int | None = document.entries[-1].id if document.entries else None
         self.drags = Drags()
         self.preview: Preview | None = None
-        """What a page plays; over with the next change of the document, or drag."""
+        """Preview that a page plays; ends with the next change of the document or drag."""
         self.revision = 1
         self._saved: Document | None = document
         self._next = max((entry.id for entry in document.entries), default=0) + 1
@@ -78,7 +78,7 @@ class Session:
 
     @property
     def moving(self) -> bool:
-        """True while pictures show what is not in the document: drags, or a preview."""
+        """True while images differ from the document: during drags and previews."""
         return bool(self.drags) or self.preview is not None
 
     @property
@@ -103,7 +103,7 @@ class Session:
         )
 
     def below(self, number: int) -> tuple[Edit, ...]:
-        """The drawn edits before the one of that number: what makes the space its inner cage stands in."""
+        """Drawn edits before edit `number`, which define the space of its inner cage."""
         first = self.document.entries[: self.document.place(number)]
         return tuple(entry.edit for entry in first if entry.edit.enabled and self.problem(entry.edit) is None)
 
@@ -125,9 +125,9 @@ class Session:
         return moved
 
     def drag_end(self, page: int, number: int, operation: Operation) -> Moved:
-        """The same for the last time; becomes an entry of the history.
+        """Last step of a drag, as an entry of the history.
 
-        Where another page has changed the edit meanwhile, the operation is done to what it is now.
+        Where another page has changed the edit meanwhile, the operation is applied to its present state.
         """
         drag = self.drags.take(page, number)
         self.revision += 1
@@ -145,7 +145,7 @@ class Session:
     # ---- the preview ----
 
     def play_begin(self, page: int, number: int) -> None:
-        """A page begins to play the camera path, from its beginning; what was played before is over.
+        """Start the preview of the camera path from its beginning; ends an earlier preview.
 
         Raises EditError while anybody drags, CagefieldError where the path or an edit on it is not possible.
         """
@@ -170,7 +170,7 @@ class Session:
         self.preview = replace(preview, edits=edits)
 
     def play_end(self, page: int, number: int | None = None) -> None:
-        """What the page plays is over: that of a number, or whatever it is."""
+        """End the page's preview: the one of a number, or any."""
         preview = self.preview
         if preview is not None and preview.is_of(page, preview.number if number is None else number):
             self.preview = None
@@ -257,7 +257,7 @@ class Session:
             self._push("Preserve opacity", replace(self.document, preserve_opacity=value))
 
     def select(self, number: int | None) -> None:
-        """What all pages show as selected; no entry of the history."""
+        """Select an edit on all pages; no entry of the history."""
         if number is not None:
             self.document.entry(number)
         self.selected = number
@@ -351,7 +351,7 @@ class Session:
         self._travel(lambda history: history.go_to(entry))
 
     def mark_saved(self) -> None:
-        """What is now is what is saved."""
+        """Mark the present document as saved."""
         self._saved = self.document
         self.revision += 1
 

@@ -1,4 +1,4 @@
-"""What the editor's page and its server say to each other, and how that becomes edits and comes from them.
+"""Message protocol between the editor's page and its server, and the conversion of messages to edits.
 
 Messages are pydantic models; `schema` gives them all as one JSON schema, of which the page's types are made.
 """

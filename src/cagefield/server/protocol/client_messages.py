@@ -1,4 +1,4 @@
-"""What the editor's page says to its server; see `common`."""
+"""Messages from the editor's page to its server; see `common`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from cagefield.server.protocol.operation_messages import OperationMessage
 
 
 class DisplayMessage(Message):
-    """What is shown: a view; `before` leaves the edits out, `split` left of a share of the width."""
+    """Display of a view; `before` leaves the edits out, `split` left of a share of the width."""
 
     type: Literal["display"] = "display"
     view: View = "colour"
@@ -40,14 +40,14 @@ class DisplayMessage(Message):
 
 
 class PresentedMessage(Message):
-    """The page has shown a picture, or what edits make; until then the server sends at most one more."""
+    """The page has shown an image, or its edits; until then the server sends at most one more."""
 
     type: Literal["presented"] = "presented"
     picture: int
 
 
 class Drawing(Message):
-    """Which pictures the page draws itself: none, those of what moves, or all. It gets the edits instead."""
+    """Images that the page draws itself: none, those during motion, or all. It receives the edits instead."""
 
     type: Literal["drawing"] = "drawing"
     here: DrawnHere
@@ -140,7 +140,7 @@ class SetCage(Message):
 class Place(Message):
     """A new edit: a cage pair around the surface seen at a pixel (x, y in [0,1] of the camera's picture).
 
-    Without a pixel it goes around the middle of what the camera sees.
+    Without a pixel it goes around the middle of the visible surface.
     """
 
     type: Literal["place"] = "place"
@@ -174,7 +174,7 @@ class OuterMargin(Message):
 
 
 class Change(Message):
-    """Changes an edit's options; what is left out stays."""
+    """Change an edit's options; omitted options stay."""
 
     type: Literal["change"] = "change"
     edit: EditId
@@ -193,14 +193,14 @@ class Change(Message):
 
 
 class SceneChange(Message):
-    """Changes what holds for all edits."""
+    """Change options that hold for all edits."""
 
     type: Literal["scene_change"] = "scene_change"
     preserve_opacity: bool
 
 
 class Command(Message):
-    """What has no more than an edit to say."""
+    """Command with an edit's number as its only argument."""
 
     type: Literal["command"] = "command"
     name: Literal[
@@ -291,7 +291,7 @@ class ExportSplats(Message):
 
 
 class CancelJob(Message):
-    """Stops a job; what it wrote of its file is removed."""
+    """Stop a job and remove its unfinished file."""
 
     type: Literal["cancel_job"] = "cancel_job"
     job: int

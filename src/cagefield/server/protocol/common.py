@@ -1,7 +1,7 @@
-"""What the editor's page and its server say to each other: how they say it, and what both say.
+"""Message protocol of the editor: conventions, and the parts that both directions share.
 
-`client_messages` has what pages say, `server_messages` what the server answers; the page's types are made
-from these.
+`client_messages` has the messages of pages, `server_messages` those of the server; the page's types are
+generated from these.
 
 One WebSocket per page carries text messages, one JSON object each, with a `type`; and, from server to page,
 pictures as binary messages (see `server_messages.PictureHeader`). Lengths are world units, angles degrees;
@@ -53,7 +53,7 @@ class Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     ordered: ClassVar[bool] = True
-    """False where newer messages may be done before this one: it says only what pictures are of."""
+    """False for messages that newer ones may overtake: they only set the camera or display of images."""
 
     def redundancy_key(self) -> str | None:
         """Of the waiting messages with one key only the newest counts; None where every one does."""
@@ -65,7 +65,7 @@ class Message(BaseModel):
 
 
 class CameraMessage(Message):
-    """What the page looks from; `moving` while the mouse turns the view."""
+    """Camera of the page; `moving` while the mouse turns the view."""
 
     type: Literal["camera"] = "camera"
     seq: Annotated[int, Field(ge=0)]

@@ -1,4 +1,4 @@
-"""Between what is said on the socket and what is edited: operations, cages, keyframes, the state."""
+"""Conversion between messages and edited values: operations, cages, keyframes, the state."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def state_of(
 
 
 def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
-    """What became of a drag."""
+    """Message with the result of a drag."""
     edit = moved.edit
     return server_messages.Dragged(
         drag=drag,
@@ -163,7 +163,7 @@ def dragged_of(drag: int, seq: int, moved: Moved) -> server_messages.Dragged:
 
 
 def view_height(camera: Camera, distance: float) -> float:
-    """Height of what a picture shows at a distance from its camera."""
+    """Height of the view frustum at a distance from its camera, world units."""
     return camera.height / camera.fy * distance
 
 

@@ -1,4 +1,4 @@
-"""What waits between a page and the server. Where only the newest counts, an older one gives way to it."""
+"""Queues of messages between a page and the server; a newer message of a kind may replace an older one."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SendQueue:
         self._append(None, content)
 
     def end(self) -> None:
-        """Nothing comes after what waits."""
+        """End the queue after its waiting messages."""
         self._append(None, None)
         self._ended = True
 

@@ -24,8 +24,8 @@ _TUPLES: dict[str, dict[str, Any]] = {
 def schema() -> dict[str, Any]:
     """JSON schema (tuples as in draft 4) that defines every message, `PageMessage` and `ServerMessage`.
 
-    What a page sends may leave out fields that have a default; what a server sends has them all, and so has
-    what both send. Every `type` and `kind` is required.
+    Messages of a page may leave out fields that have a default; messages of a server have them all, and so
+    have those of both. Every `type` and `kind` is required.
     """
     page = TypeAdapter(PageMessage).json_schema(ref_template=_REF)
     server = TypeAdapter(ServerMessage).json_schema(ref_template=_REF)

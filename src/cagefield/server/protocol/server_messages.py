@@ -1,4 +1,4 @@
-"""What the editor's server says to its pages; see `common`."""
+"""Messages from the editor's server to its pages; see `common`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cagefield.server.protocol.common import (
 
 
 class Hello(Message):
-    """The first message: what is being edited. `page` names this page among those that are open."""
+    """First message, with the edited scene. `page` identifies this page among the open ones."""
 
     type: Literal["hello"] = "hello"
     version: str
@@ -34,7 +34,7 @@ class Hello(Message):
     scene: str
     """Another one where another scene or file is opened in the place of this one."""
     field: str
-    """Names what the scene holds: a page that has loaded the field of this name need not load it again."""
+    """Identifier of the scene's field: a page that has loaded this field need not load it again."""
     name: str
     splats: bool
     """True where the field is of splats, which can be downloaded."""
@@ -89,7 +89,7 @@ class State(Message):
     edits: list[EditState]
     selected: EditId | None
     history: list[str]
-    """What was done, oldest first; entry 0 is the beginning."""
+    """Labels of the history, oldest first; entry 0 is the initial state."""
     entry: int
     """Where in the history we are; entries after it can be redone."""
     saved: bool
@@ -106,7 +106,7 @@ class State(Message):
 
 
 class Dragged(Message):
-    """What became of a `drag`: `part` of the operation was followed; `why` where that is less than all."""
+    """Result of a `drag`: `part` of the operation was followed; `why` where `part` is below 1."""
 
     type: Literal["dragged"] = "dragged"
     drag: int
@@ -164,7 +164,7 @@ class Preview(Message):
 
 
 class Preparing(Message):
-    """How much of the renderer is ready: what a machine's first run compiles, later ones load."""
+    """Progress of the renderer's kernels: compiled by a machine's first run, loaded by later ones."""
 
     type: Literal["preparing"] = "preparing"
     done: int
@@ -235,7 +235,7 @@ class PictureHeader(Message):
 class EditsHeader(Message):
     """Heads a binary message to a page that draws itself as PictureHeader does; a file of the edits follows.
 
-    The file is one of `cagefield.pages.page_edits`, without what was sent before, or of
+    The file is one of `cagefield.pages.page_edits`, without parts that were sent before, or of
     `cagefield.pages.page_splat_edits`; it is empty where the edits cannot be drawn by a page, and `why`
     says why. The page answers `presented` when it shows them.
     """

@@ -19,7 +19,7 @@ _PATH = {
 
 
 def refusal(error: ValidationError) -> str:
-    """What is wrong first with a message, in a line with its cure."""
+    """First problem of a message, in one line with its cure."""
     problem = error.errors(include_url=False, include_input=False)[0]
     where = problem["loc"]
     if where and where[0] == "set_path":

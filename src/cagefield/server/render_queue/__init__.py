@@ -1,4 +1,4 @@
-"""What the rendering process does next, and for which page: pictures first, then what can wait.
+"""Queue of rendering tasks of all pages: images first, then background tasks.
 
 `scheduler` decides, `dispatcher` hands over, `coordinator` holds pages, session and rendering together.
 """

@@ -1,4 +1,4 @@
-"""What the rendering process does when no page waits for a picture.
+"""Background tasks of the rendering process, for times when no page waits for an image.
 
 It makes its kernels ready, then measures the lattices of edits, then renders the pictures of background jobs.
 """
@@ -54,7 +54,7 @@ class BackgroundWork:
         self.exports = Exports(session, store, tell)
 
     def next(self, generation: int) -> BackgroundTask | None:
-        """What is to be done next, or None; tasks of older generations than `generation` are abandoned."""
+        """Next background task, or None; tasks of older generations than `generation` are abandoned."""
         if self.warming:
             return self._warm()
         edit = self._unmeasured()

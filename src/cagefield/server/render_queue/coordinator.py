@@ -41,7 +41,7 @@ from cagefield.server.render_worker.view import Display
 
 @dataclass
 class Page:
-    """An open page: its camera and view, and what waits to be sent to it."""
+    """An open page: its camera and view, and its outgoing messages."""
 
     number: int
     send_queue: SendQueue = field(default_factory=SendQueue)
@@ -50,7 +50,7 @@ class Page:
     drag: int = 0
     seq: int = 0
     has: tuple[str, ...] = ()
-    """Keys of what the page has of edits that it draws itself."""
+    """Keys of the layers that the page already has, of edits that it draws itself."""
 
     @property
     def stamp(self) -> tuple[int, int]:
@@ -84,7 +84,7 @@ class Coordinator:
         self.greeting: str | None = None
         """A line for the pages that come."""
         self._replaced: str | None = None
-        """That the scene on disk is another one, for pages that come, or None."""
+        """Notice for new pages that the scene on disk was replaced, or None."""
         self._pages = 0
         self._shown = self._what_is_shown()
         self._drawn = session.drawn()
@@ -125,7 +125,7 @@ class Coordinator:
         return page
 
     def leave(self, page: Page) -> None:
-        """A page is gone; its drag is given up, and what it plays is over."""
+        """Remove a closed page; its drag is cancelled and its preview ends."""
         self.pages.pop(page.number, None)
         self.session.drag_cancel(page.number)
         self.session.play_end(page.number)
@@ -191,7 +191,7 @@ class Coordinator:
         )
 
     def changed(self, but: Page | None = None) -> None:
-        """The session is another one: tells the pages, renders what is new to see, keeps it from a crash."""
+        """Publish a changed session: notify the pages, render visible changes, write the autosave."""
         self.store.autosave(self.session)
         if self.store.trouble is not None and self.store.trouble != self._trouble:
             self.notice("warning", self.store.trouble)
@@ -201,7 +201,7 @@ class Coordinator:
         self.pump()
 
     def save(self) -> None:
-        """Saves what is edited where it came from."""
+        """Save the document to its scene folder."""
         self.store.save(self.session)
         self.notice("info", f"saved to {self.store.path}")
 
@@ -215,18 +215,18 @@ class Coordinator:
     # ---- rendering ----
 
     def close(self) -> None:
-        """Ends the rendering process and what goes on, and tells the pages to come again."""
+        """End the rendering process and its tasks, and tell the pages to reconnect."""
         self.background.exports.close()
         self.dispatcher.close()
         self.store.close()
 
     async def ask(self, make: Callable[[int], Task]) -> Any:
-        """What the rendering process answers to a task. Raises CagefieldError."""
+        """Result of a task of the rendering process. Raises CagefieldError."""
         self.dispatcher.interrupt()
         return await self.dispatcher.ask(make)
 
     async def ask_patiently(self, page: int, make: Callable[[int, int], Task]) -> Any:
-        """The same of a task that gives way to pages' pictures; one at a time of each page.
+        """Result of a task of lower priority than the pages' images; one at a time for each page.
 
         Raises TooManyError where the page has one already, or too many wait.
         """
@@ -239,11 +239,11 @@ class Coordinator:
             self._asking.discard(page)
 
     def shown(self) -> Shown:
-        """What pictures show now."""
+        """Edits and options that images show now."""
         return self._what_is_shown()
 
     def pump(self) -> None:
-        """Has rendered what is new to see."""
+        """Dispatch the rendering of visible changes."""
         self._tell_preview()
         self._refresh_shown()
         self.dispatcher.scheduler.edits(self._pictures, self.session.moving, time.monotonic())
@@ -298,7 +298,7 @@ class Coordinator:
             page.send_queue.put_picture(edits_message(request, stamp, done))
 
     def background_task(self) -> BackgroundTask | None:
-        """What may be done now that no page waits for anything."""
+        """Next background task while no page waits for an image, or None."""
         return self.background.next(self.dispatcher.scheduler.generation)
 
     def _tell_preview(self) -> None:
@@ -330,7 +330,7 @@ class Coordinator:
         return self._stacks.get(revision)
 
     def _keep_stack(self) -> None:
-        """Remembers what is shown, before it is something else."""
+        """Store the shown stack before it changes."""
         wanted = self.dispatcher.scheduler.remembered()
         self._stacks = {number: stack for number, stack in self._stacks.items() if number in wanted}
         self._stacks[self._pictures] = EditStack(self._drawn), self._shown.preserve_opacity

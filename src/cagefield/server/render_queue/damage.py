@@ -1,10 +1,10 @@
-"""Which part of a page's picture is not what it should be, so that only that part is rendered.
+"""Damage tracking: the part of a page's image that must be rendered anew.
 
 A page draws what arrives over what is there. After a whole picture, its *base*, it shows the base everywhere,
-but where later pictures of parts were drawn; those show other revisions of the edits, the *later* ones. What
-two revisions show is the same outside a rectangle. So to show a revision it is enough to render what differs
-between the base and that one, and between the base and each of the later ones. At rest what was drawn
-coarsely is drawn anew, too.
+but where later pictures of parts were drawn; those show other revisions of the edits, the *later* ones. Two
+revisions have equal images outside a rectangle. So to show a revision it is enough to render the difference
+between the base and that one, and between the base and each of the later ones. At rest the parts drawn
+coarsely are drawn anew, too.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ LEAST = 16
 """Least width and height of a part that is rendered, pixels."""
 
 BESIDE = 2.0
-"""Pixels that a part is larger than what it must show, on each side: enlarging it smooths its edge."""
+"""Margin of a part on each side, pixels: enlarging a coarse image smooths its edge."""
 
 
 def everywhere(page: int, one: int, another: int) -> Rect | None:
@@ -102,7 +102,7 @@ def tiles(part: tuple[int, int, int, int], count: float) -> list[tuple[int, int,
 
 @dataclass
 class Showing:
-    """What a page shows: a view (camera and display), the base's revision, and the later ones.
+    """Contents of a page: a view (camera and display), the base's revision, and the later ones.
 
     `coarse` is where it was drawn coarsely since the base.
     """
@@ -149,5 +149,5 @@ class Showing:
             self.later = self.later | ({revision} - {self.base})
 
     def lost(self) -> None:
-        """What the page shows is not known."""
+        """Mark the page's contents as unknown."""
         self.base = None

@@ -1,6 +1,6 @@
-"""Gives the rendering process its tasks, one at a time, and passes on what comes back.
+"""Dispatcher: hands tasks to the rendering process, one at a time, and passes the results on.
 
-Answers that somebody waits for come first, then pictures as the scheduler wants them, then what can wait.
+Tasks with a waiting caller come first, then images as the scheduler orders them, then background tasks.
 Everything here runs in the server's event loop; the rendering process answers through
 `call_soon_threadsafe`.
 """
@@ -52,7 +52,7 @@ class TooManyError(CagefieldError):
 
 @dataclass(frozen=True)
 class Stamp:
-    """What a picture shows of the session: its revision, and the newest of the page's drag."""
+    """Session state of an image: its revision, and the newest step of the page's drag."""
 
     revision: int
     drag: int = 0
@@ -61,14 +61,14 @@ class Stamp:
 
 @dataclass(frozen=True)
 class BackgroundTask:
-    """What can wait: a task, made when there is time for it, and what is done with its result."""
+    """Background task: a task built when the process is idle, and the receiver of its result."""
 
     make: Make
     done: Callable[[Result], None]
 
 
 class TaskSource(Protocol):
-    """Where the dispatcher gets its tasks, and what it reports to."""
+    """Source of the dispatcher's tasks and receiver of its reports."""
 
     def picture_task(self, request: Request, generation: int) -> tuple[PictureTask, Stamp]:
         """The task of a picture that the scheduler wants."""
@@ -92,7 +92,7 @@ class TaskSource(Protocol):
         """The scene's folder holds another scene, but pictures are of the one that was opened."""
 
     def background_task(self) -> BackgroundTask | None:
-        """What may be done now that no page waits for anything."""
+        """Next background task while no page waits for an image, or None."""
 
 
 @dataclass
@@ -136,7 +136,7 @@ class Dispatcher:
         self.worker.close()
 
     async def ask(self, make: Make) -> Any:
-        """What the rendering process answers to the task `make(number)`. Raises CagefieldError."""
+        """Result of the task `make(number)` of the rendering process. Raises CagefieldError."""
         if self._given_up:
             raise CagefieldError(_GIVEN_UP)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
@@ -157,7 +157,7 @@ class Dispatcher:
         return await future
 
     async def ask_patiently(self, make: Callable[[int, int], Task]) -> Any:
-        """The same of a task `make(number, generation)` that waits until no page does, and gives way to them.
+        """Result of a task `make(number, generation)` of lower priority than the pages' images.
 
         Begun anew where a page interrupts it; not done at all where the caller is cancelled before.
 
@@ -201,7 +201,7 @@ class Dispatcher:
         return _Running(make(self._number(), self.scheduler.generation), done=done)
 
     def pump(self) -> None:
-        """Gives the rendering process its next task, if it is free; abandons what nobody wants any more."""
+        """Hand the next task to a free rendering process; cancel tasks without a receiver."""
         now = time.monotonic()
         if not self.scheduler.idle():
             self.interrupt()

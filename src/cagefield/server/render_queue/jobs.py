@@ -20,7 +20,7 @@ from cagefield.server.render_worker.tasks import FrameTask, Shown, values_of
 
 @dataclass
 class Job:
-    """A job: what it renders, where to, and how far it is. Its edits are those there were when it began."""
+    """A background job: its content, destination and progress. Its edits are those of its start."""
 
     number: int
     what: JobKind

@@ -1,13 +1,13 @@
-"""Scheduler: which picture is rendered next, for which page, how large. A state machine that knows no clock,
-no web and no renderer: it is told what happens and when, and asked for the next picture.
+"""Scheduler of images: the next one, its page and its size. A state machine without clock, web and renderer:
+its inputs are events with their times, its output the next image.
 
 - While anything moves (a camera, a drag) pictures of the whole view come at the resolution that the measured
   speed allows; each shows the newest input, older input that no picture showed is passed over.
 - At rest the view is rendered at full resolution in tiles, the middle first; they are abandoned the moment
   anything changes.
-- Where the camera is the one of the last whole picture, only the part is rendered that the edits change.
+- Where the camera is the one of the last whole picture, only the part that the edits change is rendered.
 - A page is owed a picture only while none of its pictures is on its way; at rest, fewer than two.
-- A page that draws itself is owed the edits instead, the newest of a drag, and no pictures of what moves.
+- A page that draws itself is owed the edits instead, the newest of a drag, and no images during motion.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ FIRST_RATE = 4e5
 
 @dataclass
 class _Page:
-    """What is known of a page."""
+    """State of a page."""
 
     width: int = 0
     height: int = 0
@@ -88,7 +88,7 @@ class Scheduler:
     """See the module. Times are seconds of any one clock."""
 
     def __init__(self, differing: Differing = everywhere, *, whole_at_rest: bool = False) -> None:
-        """`differing` says what of a page's picture two revisions show differently.
+        """`differing` gives the part of a page's image in which two revisions differ.
 
         Where it may miss a little, all of a picture is drawn anew at rest (`whole_at_rest`).
         """
@@ -137,8 +137,8 @@ class Scheduler:
     def edits(self, revision: int, dragging: bool, now: float) -> None:
         """The edits' picture is another one, or a drag begins or ends.
 
-        Where a drag ends nothing has to settle: the fine picture comes as soon as a quick one shows what was
-        dragged, or at once where that is shown already, or on a fine picture.
+        Where a drag ends nothing has to settle: the fine picture comes as soon as a quick one shows the
+        drag, or at once where that is shown already, or on a fine picture.
         """
         if revision == self._revision and dragging == self._dragging:
             return
@@ -263,7 +263,7 @@ class Scheduler:
     def idle(self) -> bool:
         """True where nothing moves, and no page waits for a picture or can be sent one.
 
-        What can wait, background jobs too, stands still while anybody drags.
+        Background tasks and jobs pause during drags.
         """
         return (self._running is None and not self._dragging) and all(
             p.camera < 0
@@ -348,7 +348,7 @@ class Scheduler:
         return max(next((s for s in SCALES if s <= wanted), SCALES[-1]), least)
 
     def _cut(self, page: int, exact: bool) -> None:
-        """Cuts what of the view is not as it should be into tiles of about TILE_SECONDS."""
+        """Divide the damaged part of the view into tiles of about TILE_SECONDS."""
         p = self._pages[page]
         view = p.camera, p.display
         rect = p.showing.wanting(page, view, self._revision, self._differing, exact=exact)

@@ -84,7 +84,7 @@ class Exports:
         return self._path(export) if export is not None and export.is_done else None
 
     def close(self) -> None:
-        """Ends what goes on and removes the files."""
+        """Cancel running exports and remove their files."""
         for export in self._exports.values():
             if export.task is not None:
                 export.task.cancel()

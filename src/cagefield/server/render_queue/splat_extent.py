@@ -1,4 +1,4 @@
-"""How far splats show beside where edits map points: pictures change as far around what was edited."""
+"""Extent of splats beyond their means: images change within this distance of edited points."""
 
 from __future__ import annotations
 

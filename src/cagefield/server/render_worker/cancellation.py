@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 Stop = Callable[[], bool]
-"""Whether what is being made is not wanted any more."""
+"""True once the result under construction is no longer wanted."""
 
 
 class GivenUpError(Exception):
-    """What was being made is not wanted any more."""
+    """Cancellation: the result under construction is no longer wanted."""
 
 
 def giving_up(stop: Stop) -> Callable[[], None]:
-    """A `proceed` that gives up what is being made where `stop` says so, by raising GivenUpError."""
+    """A `proceed` callback that raises GivenUpError once `stop` returns True."""
 
     def proceed() -> None:
         if stop():

@@ -1,4 +1,4 @@
-"""Renderers of one field under the edits that were shown last: exact ones, and quick ones for what moves."""
+"""Renderers of one field under the edits shown last: exact ones, and coarse ones for motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ QUICK_LATTICE = 32
 
 @dataclass(frozen=True)
 class _Kept:
-    """A renderer that is ready, and what it shows."""
+    """A renderer that is ready, and its edits."""
 
     edits: tuple[Edit, ...]
     preserve_opacity: bool
@@ -45,7 +45,7 @@ class EditedRenderers:
         return [kept.renderer for kept in self._exact]
 
     def keep_only(self, edits: Sequence[Edit]) -> None:
-        """Forgets what was made of other edits, which nobody else keeps; but for the renderers."""
+        """Release results of other edits, except renderers."""
         self._coarse.keep_only(edits)
 
     def renderer(

@@ -1,6 +1,6 @@
 """The faint grid: lines of a regular grid through an edit's outer cage, as the edit bends them.
 
-A line x(s) of the grid lies in canonical space; what is drawn is the deformed p with phi(p) = x. With the
+A line x(s) of the grid lies in canonical space; drawn is the deformed p with phi(p) = x. With the
 displacement u(p) = phi(p) - p known at lattice nodes, p = x - u(p) is iterated from the last p; where the map
 contracts too much for that to converge, the line has a gap.
 """

@@ -24,11 +24,11 @@ MARK = ".cagefield-pictures"
 
 
 class JobFiles:
-    """What jobs have written so far."""
+    """Unfinished files of jobs."""
 
     def __init__(self) -> None:
         self._jobs: dict[int, tuple[AbstractContextManager[Any], Any]] = {}
-        """Job -> (what makes its files appear, the folder or the function that takes pictures)."""
+        """Job -> (context that publishes its files, the folder or the function that takes images)."""
 
     def misses(self, task: FrameTask) -> bool:
         """Whether a job's pictures before this one are gone: another process has rendered them."""
@@ -63,7 +63,7 @@ class JobFiles:
         write_png(to / f"{task.index:0{digits}d}.png", pixels)
 
     def end(self, job: int, keep: bool) -> bool:
-        """A job ends: its files appear, or what is unfinished is removed; False where there is nothing of it.
+        """Publish or remove the files of an ended job; False where it has none.
 
         Raises OSError where they cannot appear.
         """
@@ -84,7 +84,7 @@ class JobFiles:
             shutil.rmtree(to, ignore_errors=True)
 
     def close(self) -> None:
-        """Gives up all jobs; what of their files cannot be removed stays."""
+        """Cancel all jobs and remove their files where possible."""
         for job in list(self._jobs):
             with suppress(OSError):
                 self.end(job, keep=False)

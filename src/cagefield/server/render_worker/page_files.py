@@ -31,7 +31,7 @@ NOT_DRAWN = "pages draw voxels and splats alone; the server draws this scene"
 
 
 class PageFiles:
-    """See the module. Makes the files of one scene; of voxels, what pages have is not sent again."""
+    """Builder of the page files of one scene; layers of voxels that a page has are not sent again."""
 
     def __init__(self, renderers: RendererCache) -> None:
         self._renderers = renderers
@@ -41,7 +41,8 @@ class PageFiles:
         self._occupancies: dict[str, Occupancy] = {}
 
     def field(self) -> bytes:
-        """The field's file. Raises CagefieldError for what pages cannot draw, and for an empty field."""
+        """File of the field. Raises CagefieldError for a field that pages cannot draw, and for an empty
+        one."""
         scene, plain = self._renderers.scene, self._renderers.plain
         if isinstance(scene.field, SplatField):
             return encode_page_splats(scene.field, background=scene.background)

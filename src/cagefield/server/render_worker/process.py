@@ -35,7 +35,7 @@ TO_END = 10.0
 Colour = tuple[float, float, float] | None
 
 _LOST = (EOFError, OSError)
-"""What sending and receiving raise where the other process has gone."""
+"""Errors of sending to, and receiving from, a process that has ended."""
 
 
 @warnings_in_one_line()
@@ -198,7 +198,7 @@ class Worker:
         return None if self.process is None else self.process.pid
 
     def close(self) -> None:
-        """Ends the process; what it does is abandoned."""
+        """End the process and abandon its task."""
         connection, self._connection = self._connection, None
         if connection is not None:
             self._generation.value = ctypes.c_ulong(-1).value
@@ -225,7 +225,7 @@ class Worker:
             self._on_result(result)
 
     def _hand_over(self, connection: Connection) -> Result:
-        """Gives the process a copy of the scene that is edited; what it says to that."""
+        """Send the process a copy of the edited scene; returns its answer."""
         assert self.write_opened is not None  # nothing is replaced where `files` are not known
         with ExitStack() as kept:
             try:

@@ -139,7 +139,7 @@ class RendererCache:
         return self.edited.renderer(self.edits(shown.edits), shown.preserve_opacity, exact, proceed)
 
     def edits(self, values: tuple[EditValues, ...]) -> list[Edit]:
-        """The edits with these fields; those that were there before are the same objects.
+        """Edits with these field values; unchanged ones are the same objects as before.
 
         Those shown last are kept, as far as `KEPT_EDITS` and `KEPT_BYTES` allow.
         """
@@ -192,7 +192,7 @@ class RendererCache:
         )
 
     def _step(self, camera: Camera, least: float) -> float:
-        """Voxels between the samples of a moving picture: what a pixel shows in the middle of the field."""
+        """Sampling distance of a moving image, voxels: the size of a pixel in the middle of the field."""
         distance = float(np.linalg.norm(camera.origin - self._middle))
         shown = distance / camera.fx / self.scene.field.sample_spacing
         return min(max(shown, least), LONGEST_STEP)

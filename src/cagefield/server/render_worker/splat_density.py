@@ -1,4 +1,4 @@
-"""What of a cage holds splats, for fitting it to its content."""
+"""Cells of a cage that hold splats, for fitting the cage to its content."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ ACROSS = 7
 
 
 def dense(cage: Cage, splats: DeformedSplats) -> Mask:
-    """Which of the cells around a cage's `probes` [PROBES^3] splats make dense.
+    """Mask [PROBES^3] of the cells around a cage's `probes` that splats make dense.
 
     Each splat is sampled on a grid of points in the plane of its two larger axes, up to `REACH` standard
-    deviations. What a cell lets through is the product of what its splats do, each where it is densest in it.
+    deviations. The transmittance of a cell is the product of its splats' transmittances, each at its densest
+    point there.
     """
     low, high = cage.aabb
     full = splats.covariances[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)

@@ -15,9 +15,9 @@ from cagefield.server.render_worker.parent_watch import end_with_parent
 
 
 async def in_own_process(work: Callable[..., Any], *args: Any) -> Any:
-    """What `work(*args)` returns; work, arguments and result can be pickled.
+    """Result of `work(*args)`, run in a process of its own; work, arguments and result must be picklable.
 
-    Cancelled, it ends the process. Raises CagefieldError: what the work raised, or that the process was lost.
+    Cancellation ends the process. Raises CagefieldError: the error of the work, or the loss of the process.
     """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)

@@ -1,4 +1,4 @@
-"""What the rendering process does with each kind of task."""
+"""Handlers of the rendering process, one per kind of task."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class TaskHandlers:
         return Answered(task.number, self._answer(task))
 
     def close(self) -> None:
-        """Drops what is half done."""
+        """Drop unfinished work."""
         self._files.close()
 
     def _answer(
@@ -153,7 +153,7 @@ class TaskHandlers:
         return (sigma * field.sample_spacing > DENSE).tolist()
 
     def _look(self, task: LookTask) -> tuple[list[list[float]], list[float], list[float]]:
-        """(box, up direction) of what is to be pasted, and this scene's up direction."""
+        """(box, up direction) of the content to paste, and this scene's up direction."""
         scene = self._renderers.scene
         look = scene.sources.look(task.source, scene.field)
         return look.box.tolist(), look.up.tolist(), scene.up.tolist()

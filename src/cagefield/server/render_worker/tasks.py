@@ -1,4 +1,4 @@
-"""What the server asks the rendering process for, and what comes back. Plain values that can be pickled."""
+"""Tasks of the rendering process and their results, as plain picklable values."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ EditValues: TypeAlias = Mapping[str, Any]
 
 
 def values_of(edits: tuple[Edit, ...]) -> tuple[EditValues, ...]:
-    """The edits' fields alone, without what they have worked out about themselves."""
+    """Field values of edits, without their cached properties."""
     return tuple({f.name: getattr(edit, f.name) for f in fields(edit)} for edit in edits)
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What a picture is of: edits (see `values_of`) and the scene's opacity choice."""
+    """Content of an image: edits (see `values_of`) and the scene's opacity choice."""
 
     edits: tuple[EditValues, ...]
     preserve_opacity: bool = True
@@ -91,7 +91,7 @@ class FitTask:
 
 @dataclass(frozen=True)
 class LookTask:
-    """What a scene or a file holds that is to be pasted: its box, its up direction, and this scene's."""
+    """Query of the content to paste, a scene or a file: its box, its up direction, and this scene's."""
 
     number: int
     source: str
@@ -156,7 +156,8 @@ class PageFieldTask:
 
 @dataclass(frozen=True)
 class PageEditsTask:
-    """Edits as a page's GPU draws them, of voxels without what the page `has` (see `pages.page_edits`).
+    """Edits as a page's GPU draws them, of voxels without the layers that the page `has` (see
+    `pages.page_edits`).
 
     Abandoned once the shared generation is past `generation`.
     """
@@ -235,7 +236,7 @@ class Stopped:
 
 @dataclass(frozen=True)
 class Failed:
-    """The task could not be done; `text` says why and what helps."""
+    """Failure of a task; `text` has the reason and the cure."""
 
     number: int
     text: str
@@ -243,7 +244,7 @@ class Failed:
 
 @dataclass(frozen=True)
 class Answered:
-    """What was found; None where there is nothing."""
+    """Result of a query; None where nothing was found."""
 
     number: int
     value: Any = field(default=None)

@@ -1,4 +1,4 @@
-"""Memory that a process has freed, given back to the system.
+"""Return of freed memory to the operating system.
 
 The C library keeps what lies between blocks that are in use. Edits, lattices and pictures come and go in all
 sizes: after some minutes that was 175 MiB beside 420 MiB in use, and it grew for hours.
@@ -33,7 +33,7 @@ class UnusedMemory:
 
 
 async def giving_back() -> None:
-    """The same for as long as it is not cancelled, amid other work of an event loop."""
+    """Periodic return of freed memory in an event loop, until cancelled."""
     unused = UnusedMemory()
     while True:
         await asyncio.sleep(EVERY)

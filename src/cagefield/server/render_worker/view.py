@@ -1,4 +1,4 @@
-"""What a picture shows: a display of the scene, and a region of the picture."""
+"""Display options of the scene, and regions of an image."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cagefield.server.protocol.common import View
 
 @dataclass(frozen=True)
 class Display:
-    """What of the scene is shown: a view; without the edits `before`, or left of `split` (0 to 1)."""
+    """Display of a view: without the edits where `before`, or left of `split` (0 to 1)."""
 
     view: View = "colour"
     before: bool = False

@@ -191,7 +191,7 @@ def _download(content: str | bytes, name: str, kind: str) -> Response:
 
 
 class _Guarded:
-    """Lets through what the guard lets through, and adds the headers of every answer."""
+    """Middleware that admits requests by the guard, and adds the headers of every answer."""
 
     def __init__(self, app: ASGIApp, guard: Guard) -> None:
         self._app, self._guard, self._attempts = app, guard, Attempts()
@@ -240,7 +240,7 @@ class _Guarded:
             await self._app(scope, receive, respond)
 
     async def _keep_token(self, token: str, scope: Scope, receive: Receive, send: Send) -> None:
-        """The token moves from the address to a cookie; what else the address says stays."""
+        """Redirect that moves the token from the address to a cookie and keeps the rest of the address."""
         others = [(k, v) for k, v in HTTPConnection(scope).query_params.multi_items() if k != "token"]
         path = "/" + scope["path"].lstrip("/\\")  # two of them would be another site
         response = RedirectResponse(path + (f"?{urlencode(others)}" if others else ""), 303)

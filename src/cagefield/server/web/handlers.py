@@ -1,4 +1,4 @@
-"""What each message from a page does: one method per message, found by the message's class."""
+"""Handlers of messages from a page: one method per class of message."""
 
 from __future__ import annotations
 
@@ -65,19 +65,19 @@ _LOOKING = (
     client_messages.Drawing,
     client_messages.Ask,
 )
-"""What changes nothing that other pages see, and no file: all that pages of read-only links may say."""
+"""Messages without effect on other pages and files, the only ones allowed to pages of read-only links."""
 
 
 class MessageHandlers:
-    """Does what one page's messages say. Raises CagefieldError where a message cannot be followed."""
+    """Handlers of one page's messages. Raises CagefieldError where a message cannot be followed."""
 
     def __init__(self, coordinator: Coordinator, page: Page, may_edit: bool = True) -> None:
-        """A page that may not edit may send what `_LOOKING` has, and nothing else."""
+        """A page that may not edit may send the messages in `_LOOKING`, and nothing else."""
         self._coordinator, self._page, self._may_edit = coordinator, page, may_edit
         self._session = coordinator.session
 
     def handle(self, message: client_messages.PageMessage) -> Coroutine[Any, Any, None] | None:
-        """Does what a message says and tells the pages what came of it.
+        """Execute a message and publish the result to the pages.
 
         Returns the rest where it has to wait for the rendering process; other messages need not wait.
         """
@@ -231,7 +231,8 @@ class MessageHandlers:
         self._coordinator.changed()
 
     async def _seen(self, x: float, y: float, *, anywhere: bool) -> tuple[Array, float]:
-        """The point [3] of the surface seen at a pixel, and the height of what the picture shows there.
+        """The point [3] of the surface seen at a pixel, and the height of the view frustum there, world
+        units.
 
         Where none is seen, `anywhere` takes the middle of the field.
         """

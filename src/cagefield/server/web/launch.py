@@ -48,9 +48,9 @@ MAX_REQUEST_HEAD_BYTES = 64 << 10
 def open_scene(
     path: Path, device: str = "auto", root: Path | None = None
 ) -> tuple[Coordinator, server_messages.Hello]:
-    """The editor of a scene folder or a file of splats, and what its pages are told first.
+    """Coordinator of a scene folder or a file of splats, and the first message to its pages.
 
-    What a crash left is restored. `root` is the folder that pages may write into, None for the one that the
+    An autosave is restored. `root` is the folder that pages may write into, None for the one that the
     scene is in. Raises CagefieldError for a folder that is no scene, a file without splats, and a scene that
     another program edits.
     """
@@ -63,7 +63,8 @@ def open_scene(
 def open_cached(
     path: Path, source: Path | None, device: str = "auto", root: Path | None = None
 ) -> tuple[Coordinator, server_messages.Hello]:
-    """The same of a scene folder, which is that of a file `source` where one is given."""
+    """Coordinator and first message of a scene folder; of the cached folder of a file `source` where
+    given."""
     lock = SceneLock(real_path(path))  # what is read is what the last editor saved
     try:
         recover(path)
@@ -83,7 +84,7 @@ def open_cached(
 def _greeted(
     scene: Scene, store: SceneStore, device: str, shown: Path, field: FileState
 ) -> tuple[Coordinator, server_messages.Hello]:
-    """The editor of a scene that pages are told to be `shown`, with what a crash left."""
+    """Coordinator of a scene that pages name `shown`, with a restored autosave."""
     session = Session(store.document(), scene.field.bounds, scene.field.sample_spacing, source_problem)
     coordinator = Coordinator(session, store, device)
     recovered = store.recovered()
@@ -98,7 +99,7 @@ def _greeted(
 
 
 def hello_of(scene: Scene, name: str, path: str = "", field: FileState = None) -> server_messages.Hello:
-    """What a page is told first; `path` tells the scene from others, and its field's file `field`."""
+    """First message to a page; `path` identifies the scene, `field` the file of its field."""
     cameras = scene.cameras.get("test") or next((c for c in scene.cameras.values() if c), ())
     first = cameras[0] if cameras else _from_outside(scene)
     lower, upper = scene.field.bounds

@@ -28,7 +28,7 @@ _MOST = 256
 """Of them at most: ours have as many as are needed, and nothing else is one of ours."""
 
 Role = Literal["edit", "look"]
-"""What a token lets its holder do."""
+"""Permission of a token."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -81,7 +81,7 @@ def is_loopback(host: str) -> bool:
 
 @dataclass(frozen=True)
 class Guard:
-    """What is checked of every request. `token` None lets everybody in who passes the other checks.
+    """Checks of every request. `token` None admits every request that passes the other checks.
 
     Who has `look_token` in its place may look but not change anything.
     """
@@ -105,10 +105,12 @@ class Guard:
         needs_origin: bool,
         has_data: bool = True,
     ) -> str | None:
-        """Why a request is refused, in a line, or None. Headers have lower-case names.
+        """Reason for refusing a request, in one line, or None. Headers have lower-case names.
 
-        A socket must say its origin; other requests may, and then it must be ours too. What `has_data` of the
-        scene is not given to other sites, which browsers name in Sec-Fetch-Site: not even as a picture.
+        A socket must say its origin; other requests may, and then it must be ours too. Answers with
+        data of the scene (`has_data`) are refused to other sites, which browsers name in Sec-Fetch-Site,
+        also as
+        images.
         """
         host = headers.get("host", "")
         if not self._is_ours(host):
@@ -130,7 +132,7 @@ class Guard:
         return query.get("token") or cookies.get(self.cookie) or bearer
 
     def role(self, given: str) -> Role | None:
-        """What the holder of a token may do; None for a wrong one."""
+        """Permission of a token's holder; None for a wrong token."""
         if self.token is None or hmac.compare_digest(given.encode(), self.token.encode()):
             return "edit"
         if self.look_token is not None and hmac.compare_digest(given.encode(), self.look_token.encode()):

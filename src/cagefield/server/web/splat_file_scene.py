@@ -29,10 +29,12 @@ KEPT_DAYS = 30
 """Cached scenes that were not opened for longer are removed, but those with an autosave."""
 
 LEFT_OUT = "left-out.txt"
-"""In the scene's folder: a line of what its file has and the scene has not, for the pages."""
+"""File in the scene's folder with one line, shown on pages, that lists contents of the source file that the
+scene lacks."""
 
 _LONGEST = 100
-"""Bytes of a file's name in its scene's: names have 255 at most, with what autosaves and drafts add."""
+"""Bytes of a file's name in its scene's: names have 255 at most, with the suffixes of autosaves and
+drafts."""
 
 _BLOCK = 1 << 22
 

@@ -1,4 +1,4 @@
-"""What is edited now, and a file of splats from a page that takes its place."""
+"""Upload of a splat file that replaces the edited scene."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ STALLED = 30.0
 """Seconds without a byte of a file that a page sends, after which it is given up."""
 
 MOST_NAME = 200
-"""Bytes of the name of a file that a page sends: systems take 255, some with what is encrypted 143."""
+"""Bytes of the name of a file that a page sends: systems take 255, some with encryption 143."""
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
-"""What no name of a file has: systems refuse some, and others break lines."""
+"""Characters forbidden in file names: systems refuse some, and others break lines."""
 
 Opened = tuple[Coordinator, server_messages.Hello]
 Reopen = Callable[[Path, Path], Opened]
@@ -51,7 +51,7 @@ class OpenEditor:
     async def open(self, name: str, content: AsyncIterator[bytes], size: int | None) -> None:
         """Opens a file of splats that a page sends, of a `size` that it says; pages come again by themselves.
 
-        Changes that were not saved stay in the autosave of what was edited before.
+        Unsaved changes stay in the autosave of the scene edited before.
 
         Raises:
             TooLargeError: more than MOST_UPLOAD bytes.
@@ -103,7 +103,8 @@ def _file_name(name: str) -> str:
 
 
 async def _receive(file: Path, content: AsyncIterator[bytes], size: int | None) -> None:
-    """Writes what comes into a file. Raises TooLargeError, and CagefieldError where not all of it came."""
+    """Write the received bytes to a file. Raises TooLargeError, and CagefieldError for an incomplete
+    upload."""
     if size is not None and size > MOST_UPLOAD:
         raise TooLargeError(_too_large(size))
     received, blocks = 0, content.__aiter__()

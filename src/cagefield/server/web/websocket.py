@@ -1,4 +1,5 @@
-"""One WebSocket per page: reads, checks and hands on messages; sends what waits. Knows nothing of editing."""
+"""WebSocket of a page: receives, validates and hands on messages; sends queued ones. Independent of
+editing."""
 
 from __future__ import annotations
 
@@ -167,7 +168,7 @@ async def _finish(rest: Coroutine[Any, Any, None], page: Page) -> None:
 
 @contextlib.contextmanager
 def errors_reported_to(page: Page) -> Iterator[None]:
-    """What cannot be done becomes a line for the page's user."""
+    """Context that reports errors to the page's user in one line."""
     try:
         yield
     except CagefieldError as error:

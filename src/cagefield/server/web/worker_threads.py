@@ -29,7 +29,8 @@ def all_started(count: int = THREADS) -> ThreadPoolExecutor:
 
 
 async def in_thread(work: Callable[[], T]) -> T:
-    """What `work` returns. Who gives it up waits for its end: so long a lock keeps others out."""
+    """Result of `work`, run in a worker thread. A cancelled caller still waits for its end, as its lock is
+    held so long."""
     working = asyncio.get_running_loop().run_in_executor(None, work)
     try:
         return await asyncio.shield(working)
