@@ -94,7 +94,7 @@ class BakingOptions:
     """How a field is baked into voxels."""
 
     resolution: int = 256
-    """Voxels along the longest axis of what the field holds."""
+    """Voxels along the longest axis of the field's content."""
     sh_degree: int = 2
     """Degree of the colour's spherical harmonics, 0 to 2: how much it changes with the view."""
     compare: int = 3

@@ -40,7 +40,7 @@ class Render:
     views: tuple[int, ...] = ()
     """Only these cameras of the split, by index; all if left out."""
     turntable: int = 0
-    """Number of pictures on an orbit around what the cameras look at, instead of the split's cameras."""
+    """Number of pictures on an orbit around the cameras' common target, instead of the split's cameras."""
     camera_path: Path | None = None
     """nerfstudio camera-path JSON, instead of the split's cameras."""
     dataparser_transforms: Path | None = None
@@ -60,7 +60,7 @@ class Render:
     exact: Flag = False
     """Every edit exact at every sample, of the original NeRF where the scene has one; minutes a picture."""
     fps: float | None = None
-    """Pictures a second in a video: 24, or what the camera path says."""
+    """Pictures a second in a video: 24, or the rate of the camera path."""
     device: Device = "auto"
     overwrite: Flag = False
     """Replace files that are there."""

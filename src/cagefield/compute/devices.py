@@ -25,8 +25,9 @@ _started: str | None = None
 def start(device: str = "auto", *, double: bool = False) -> str:
     """The name of the running device: "cpu", "cuda", "metal" or "vulkan".
 
-    The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes what
-    the environment's CAGEFIELD_DEVICE names, else CUDA or Metal where there is one, else the CPU. With
+    The first call starts the runtime; later calls with "auto" or the same name return it. "auto" takes the
+    device named by the environment variable CAGEFIELD_DEVICE, else CUDA or Metal where there is one, else
+    the CPU. With
     `double`, numbers that kernels give no type are float64: for references, not for the renderer; the first
     call decides.
 

@@ -1,8 +1,7 @@
-"""Quadrants, imported without PyTorch, which it would load where that is installed.
+"""Import of Quadrants without PyTorch, which Quadrants would load where it is installed.
 
-That takes over a second and 150 megabytes of every process, for tensors that only networks hand to kernels.
-
-What is loaded already stays in use, and what is loaded later can be: see `take_tensors`.
+PyTorch costs every process over a second and 150 megabytes, for tensors that only networks hand to kernels.
+A PyTorch that is already loaded stays in use, and one loaded later can be used: see `take_tensors`.
 """
 
 from __future__ import annotations

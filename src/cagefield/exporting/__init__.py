@@ -166,7 +166,8 @@ def scene_mesh(
 
 
 def scene_points(scene: Scene, count: int, on_stage: OnStage) -> Surface:
-    """At most `count` points of an edited scene's surface, drawn evenly from what its cameras see."""
+    """At most `count` points of an edited scene's surface, drawn evenly from the surface that its cameras
+    see."""
     from cagefield.training.splats.fit_splats import surface_seen
 
     cameras, _ = fitting_cameras(scene)

@@ -1,8 +1,8 @@
 """Splats, meshes and points in the coordinates of the reconstruction that a scene's cameras came from.
 
 Notation: a scene's `source_to_world` is x' = M x + t, M a similarity's matrix (rotation times scale, perhaps
-mirrored). Its inverse is applied in float64. What float32 would not hold of the result, its distance from the
-origin, becomes an offset.
+mirrored). Its inverse is applied in float64. The distance of the result from the
+origin, too large for float32, becomes an offset.
 """
 
 from __future__ import annotations

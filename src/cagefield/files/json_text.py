@@ -1,4 +1,4 @@
-"""JSON as strangers may write it: what would end in another error than ValueError is one here."""
+"""JSON of untrusted files: every fault of the text is a ValueError."""
 
 from __future__ import annotations
 

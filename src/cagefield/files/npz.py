@@ -1,4 +1,4 @@
-"""Files of arrays (.npy), by name (.npz), as damage may leave them: what does not fit is ValueError."""
+"""Array files (.npy, .npz), possibly damaged: every fault of a file is a ValueError."""
 
 from __future__ import annotations
 

@@ -12,11 +12,11 @@ _AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 """Of Linux's <fcntl.h> and <linux/fs.h>."""
 
 _UNABLE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EPERM)
-"""What a system answers that cannot, and a file system of another (a network's) likewise."""
+"""Error numbers of systems and (network) file systems that cannot exchange names."""
 
 
 def exchanged(one: Path, other: Path) -> bool:
-    """Exchanges what two names stand for, both of which must be there; False where that is not possible here.
+    """Exchange two existing names atomically; False where the system cannot.
 
     Raises OSError where it is refused for another reason.
 

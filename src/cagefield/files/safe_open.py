@@ -28,17 +28,18 @@ _PART = 1 << 16
 
 
 class UnreadableError(OSError):
-    """What is no file to be read, or too long; its text says why and what to do, without the file's name."""
+    """Error of a path that is no regular file, or too long; the message has the reason and cure, not the
+    name."""
 
     def __str__(self) -> str:
         return str(self.strerror)
 
 
 def check_regular(path: str | os.PathLike[str], most: int | None = None) -> int:
-    """The bytes of a regular file, which is not opened.
+    """Size of a regular file, bytes, without opening it.
 
-    Raises UnreadableError for a device, a pipe or a socket, and for more than `most` bytes; OSError for what
-    is not there or a folder.
+    Raises UnreadableError for a device, a pipe or a socket, and for more than `most` bytes; OSError for a
+    missing path or a folder.
     """
     return _checked(os.stat(path), path, most)
 

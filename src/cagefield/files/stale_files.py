@@ -1,7 +1,7 @@
-"""Hidden files and folders of programs that were ended: known by their names, removed by the next one.
+"""Stale files: hidden files and folders of killed programs, known by name, removed by the next program.
 
-A name is .TARGET.ROLE-HOST-PROCESS-RANDOM: what it is for, and who makes it. Those whose process is gone
-belong to nobody. TARGET is the whole name, or a long one's beginning and a hash of it: another scene's name
+A name is .TARGET.ROLE-HOST-PROCESS-RANDOM, with the destination and the writer. Names whose process has
+ended are stale. TARGET is the whole name, or a long one's beginning and a hash of it: another scene's name
 may begin with this one's.
 """
 
@@ -22,11 +22,11 @@ _LONGEST = 100
 """Bytes of a target's name in a hidden one: names have 255 at most."""
 
 ABANDONED_AFTER_SECONDS = 300.0
-"""Seconds after which a folder that was put aside is nobody's: what its maker had to do takes none."""
+"""Age after which a displaced folder counts as stale: its writer needs no time between two renames."""
 
 
 def hidden_name(target: Path, role: str) -> str:
-    """A new name for what becomes `target`, or was it: role "part" (a file), "new" or "old" (folders)."""
+    """Hidden name of a future or former `target`: role "part" (a file), "new" or "old" (folders)."""
     suffix = target.suffix if role == "part" and len(target.suffix) < 16 else ""
     return f".{_cut(target.name)}.{role}-{host()}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
 
@@ -62,10 +62,10 @@ def put_aside(target: Path) -> list[Path]:
 
 
 def remove_leftovers(target: Path, *, inside: bool = False) -> None:
-    """Removes what ended programs left beside `target`: for exactly it, its autosave, training and work.
+    """Remove stale files beside `target`: those of itself, its autosave, training and work folder.
 
-    With `inside` also what they were writing in the folder itself. A folder that one had put aside stays
-    while there is nothing at `target`.
+    With `inside` also the unfinished files in the folder itself. A displaced folder stays while `target`
+    does not exist.
     """
     name = target.name
     beside = {
@@ -82,7 +82,7 @@ def remove_leftovers(target: Path, *, inside: bool = False) -> None:
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Removes what ended programs were writing in a folder, whatever it was to become."""
+    """Remove unfinished files of ended programs in a folder, for any destination."""
     for path in folder.glob(".*"):
         made = _MARK.fullmatch(path.name)
         if made is not None and made[2] != "old" and is_abandoned(path):

@@ -1,8 +1,8 @@
-"""Folders for temporary files: they go with what made them, and those of killed programs with the next one.
+"""Temporary folders, removed with their owner, or by the next program after a kill.
 
-A name is cagefield-ROLE-HOST-PROCESS-RANDOM, in the system's folder for temporary files, where others may
-make what they want: what is removed is a folder, no link, of this user, whose process is gone and whose lock
-nobody holds.
+A name is cagefield-ROLE-HOST-PROCESS-RANDOM, in the system's folder for temporary files, which
+other users can write. Only a folder, no link, of this user is removed, whose process has ended and whose lock
+is free.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class TemporaryFolder:
         self._lock = _locked(self.path)
 
     def close(self) -> None:
-        """Removes it, with what it holds; once is enough."""
+        """Remove the folder and its contents; repeated calls do nothing."""
         shutil.rmtree(self.path, ignore_errors=True)
         if self._lock >= 0:
             os.close(self._lock)

@@ -17,7 +17,7 @@ _Fast: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class YamlError(ValueError):
-    """What is wrong with a text, and in which line (0 where unknown)."""
+    """Fault of a YAML text, with its line (0 where unknown)."""
 
     def __init__(self, problem: str, line: int = 0) -> None:
         super().__init__(problem)
@@ -59,7 +59,7 @@ def loads(text: str) -> Any:
 
 
 def scalar(node: yaml.Node) -> Any:
-    """A str, int, float, bool, None, or what its tag makes of it. Raises YamlError."""
+    """Value of a scalar: str, int, float, bool, None, or the type of its tag. Raises YamlError."""
     try:
         return yaml.constructor.SafeConstructor().construct_object(node)
     except Exception as error:  # constructors of tags raise anything on values that are not theirs
@@ -78,7 +78,7 @@ def _built(node: yaml.Node) -> Any:
 
 
 def _check_extent(text: str, loader: Any) -> None:
-    """Refuses what is nested too deeply or holds too many values, as it stands in the text."""
+    """Raise YamlError for a text nested too deeply or with too many values, aliases not followed."""
     depth = values = 0
     for event in yaml.parse(text, Loader=loader):
         if isinstance(event, yaml.CollectionStartEvent):

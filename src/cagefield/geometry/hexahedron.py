@@ -69,7 +69,7 @@ def inverse(corners: Array, targets: Array) -> tuple[Array, Mask]:
     the corners are not tried. A target on a face up to rounding gets a u on that face.
 
     Damped Newton with the analytic Jacobian from the affine guess; targets that it did not take to [0,1]^3
-    are tried again from the centres of the sub-hexahedra whose boxes hold them, so that no preimage in the
+    are tried again from the centers of the sub-hexahedra whose boxes hold them, so that no preimage in the
     cube is missed.
     """
     C = coefficients(corners)
@@ -167,7 +167,7 @@ def _newton(K: Array, y: Array, start: Array) -> tuple[Array, Mask]:
         step /= np.maximum(1.0, np.abs(step).max(axis=0) / 2.0)
         before = size[active]
         _line_search(C, y, xi, residual, size, active, step)
-        # What creeps is stuck at a fold outside the hexahedron, or has arrived.
+        # A point that creeps is stuck at a fold outside the hexahedron, or has converged.
         active = active[(size[active] < 0.9 * before) & (size[active] > arrived[active])]
     return np.ascontiguousarray(xi.T), np.asarray(size < 1e-11)
 
@@ -202,7 +202,7 @@ def _line_search(
         better = new_size < size[rows]
         moved = rows[better]
         xi[:, moved], residual[:, moved], size[moved] = trial[:, better], new[:, better], new_size[better]
-        # What no longer improves at rounding level has arrived.
+        # A point that no longer improves at rounding level has converged.
         worse = ~better & (size[rows] > 1e-14)
         if not worse.any():
             return
@@ -210,10 +210,11 @@ def _line_search(
 
 
 def _newton_from_cells(K: Array, y: Array, on_face: float) -> tuple[Array, Mask]:
-    """Roots in [-1,1]^3 found from the centres of the sub-hexahedra whose boxes hold y, and their mask.
+    """Roots in [-1,1]^3 found from the centers of the sub-hexahedra whose boxes hold y, and their mask.
 
     A sub-hexahedron lies in the box of its own eight corners. Newton's method is tried from those of the
-    512, and for what that leaves, near corners where the determinant almost vanishes, from ever smaller ones.
+    512, and for the remaining points, near corners where the determinant almost vanishes, from ever smaller
+    ones.
     """
     C = _centered(K)
     best = np.zeros((len(y), 3))

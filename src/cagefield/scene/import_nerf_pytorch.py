@@ -31,7 +31,7 @@ Cameras = dict[str, tuple[Camera, ...]]
 
 @dataclasses.dataclass(frozen=True)
 class ImportedNerf:
-    """The field, its cameras by split, and what is behind it."""
+    """Imported NeRF: the field, its cameras by split, and its background."""
 
     field: NerfField
     cameras: Cameras

@@ -1,4 +1,4 @@
-"""Splats of a file as a scene: what is the thing and what its surroundings, and cameras to look at it with.
+"""Splat file as a scene: box of interest, surroundings, and cameras around it.
 
 Splat files hold no cameras and do not say where up is. Coordinates stay the file's; cameras turn around the
 middle of the splats, upright by the axis that is given.
@@ -42,7 +42,7 @@ SIDE = 800  # pixels
 
 @dataclass(frozen=True)
 class ImportedSplats:
-    """The field with its box, cameras by split, and what is behind it."""
+    """Imported splats: the field with its box, cameras by split, and its background."""
 
     field: SplatField
     cameras: Cameras

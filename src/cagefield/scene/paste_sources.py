@@ -1,7 +1,7 @@
 """Other scenes that a scene's edits paste from: scene folders, and files of splats.
 
-What is pasted is the other scene as it is seen, its own edits done, pastes of its own among them. So scenes
-must not paste each other in a circle, and none itself.
+Pasted content is the other scene with its own edits and pastes applied. So scenes must not paste each other
+in a circle, and none itself.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _SOG = ("meta.json", "lod-meta.json")
 
 @dataclass(frozen=True)
 class SourceLook:
-    """What a source holds before it is edited: its box [2,3] and the unit direction [3] that is up."""
+    """Extent of a source before its edits: box [2,3] and unit up direction [3]."""
 
     box: Array
     up: Array
 
 
 class OpenedScene(Protocol):
-    """What is asked of a scene."""
+    """Protocol of an opened source scene."""
 
     @property
     def cameras(self) -> Mapping[str, tuple[Camera, ...]]: ...

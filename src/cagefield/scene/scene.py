@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer
 
     class Trained(Protocol):
-        """What a trainer hands out: the field, and the gains [train views,3] of the photos."""
+        """Result of a trainer: the field, and the gains [train views,3] of the photos."""
 
         @property
         def field(self) -> VoxelField | SplatField: ...
@@ -131,8 +131,8 @@ class Scene:
     def trained(cls, result: Trained, dataset: Dataset) -> Scene:
         """The scene of a field trained on a data set, with its cameras and no edits.
 
-        Its background is the result's, where that has one, else what the photos have: white behind cut-outs,
-        else black. Splats get the data set's offset.
+        Its background is the result's if present, else that of the photos: white behind cut-outs, else
+        black. Splats get the data set's offset.
         """
         white = (1.0, 1.0, 1.0) if dataset.white_background else (0.0, 0.0, 0.0)
         splits = {"train": dataset.train, "test": dataset.test, "val": dataset.val}
@@ -162,7 +162,8 @@ class Scene:
         unbounded: bool = False,
         on_progress: Callable[[float], None] | None = None,
     ) -> Scene:
-        """The scene of a field's voxels, unedited; of an `unbounded` one what the cameras see is baked.
+        """The scene of a field's voxels, unedited; of an `unbounded` one the region that the cameras see is
+        baked.
 
         A NerfField is kept beside its voxels, splats are not.
 
@@ -287,7 +288,7 @@ class Scene:
             yield
 
     def with_edits(self, edits: EditStack) -> Scene:
-        """The same scene under another edit stack.
+        """Scene with another edit stack.
 
         Raises:
             SceneError: something else than a stack.
@@ -312,8 +313,9 @@ class Scene:
         """The edit that pastes all of another scene, a scene folder or a file of splats, upright.
 
         Put it into a stack: `scene.with_edits(scene.edits.append(scene.paste("../chair")))`, and move, turn
-        and scale it as any other edit. `at` [3] is where the middle of its base stands, beside what this
-        scene holds where it is left out; `size` is its longest edge, in this scene's units, as large as it is
+        and scale it as any other edit. `at` [3] is the position of the middle of its base, by default beside
+        this
+        scene's content; `size` is its longest edge, in this scene's units, as large as it is
         there where it is left out. A relative path is relative to the scene's folder.
 
         Raises:
@@ -333,10 +335,10 @@ class Scene:
         return self.field.offset if isinstance(self.field, SplatField) else NO_OFFSET
 
     def lattice_errors(self) -> tuple[LatticeError, ...]:
-        """How far the edits' lattices are off their exact maps, in units of `field.sample_spacing`.
+        """Errors of the edits' lattices against their exact maps, in units of `field.sample_spacing`.
 
         That is a voxel's smallest edge, in the middle of the box of interest where the field is unbounded, or
-        what most splats are wide.
+        the width of most splats.
         """
         return self.edits.lattice_errors(self.field.sample_spacing)
 
@@ -427,7 +429,7 @@ class Scene:
 
     @cached_property
     def patcher(self) -> Patcher:
-        """What fills the places that edits uncover, and takes light along; shared by `with_edits`."""
+        """Patcher that inpaints uncovered places and relights edits; shared by `with_edits`."""
         from cagefield.completion.pasting.paste_loader import Pastes
         from cagefield.completion.patcher import Patcher
         from cagefield.rendering.renderers import renderer_of

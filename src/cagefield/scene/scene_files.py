@@ -1,4 +1,4 @@
-"""What a scene's folder holds, and the reading of its parts; `scene` states the layout."""
+"""Files of a scene folder and their readers; `scene` states the layout."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def field_states(folder: Path | str) -> tuple[FileState, FileState, FileState]:
 
 
 def check_part(path: Path) -> None:
-    """Passes where a file of a scene is there to be read. Raises SceneError with what is there instead."""
+    """Check that a file of a scene is readable. Raises SceneError that names the obstacle."""
     cure = "copy it back or train the scene again"
     try:
         check_regular(path)

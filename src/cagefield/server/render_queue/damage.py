@@ -1,6 +1,7 @@
 """Damage tracking: the part of a page's image that must be rendered anew.
 
-A page draws what arrives over what is there. After a whole picture, its *base*, it shows the base everywhere,
+A page draws arriving images over its present one. After a whole picture, its *base*, it shows the base
+everywhere,
 but where later pictures of parts were drawn; those show other revisions of the edits, the *later* ones. Two
 revisions have equal images outside a rectangle. So to show a revision it is enough to render the difference
 between the base and that one, and between the base and each of the later ones. At rest the parts drawn
