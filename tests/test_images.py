@@ -104,8 +104,8 @@ def test_unreadable_files_are_named(tmp_path):
     (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:600])
     with pytest.raises(DatasetError, match=r"none\.png: there is no such image"):
         read_image(tmp_path / "none.png")
-    for name in ("text.png", "cut.png"):
-        with pytest.raises(DatasetError, match=f"{name}: not a readable image"):
+    for name, reason in (("text.png", "no picture of a format that Pillow reads"), ("cut.png", "truncated")):
+        with pytest.raises(DatasetError, match=rf"{name}: not a readable image \(.*{reason}"):
             read_image(tmp_path / name)
 
 

@@ -6,7 +6,6 @@ import io
 import json
 import struct
 import zlib
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,6 @@ from cagefield.fields.field_files import write_tensors
 from cagefield.fields.nerf_file import load_nerf
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files import json_text, memory
-from cagefield.images import image_files
 from cagefield.images.image_files import read_image
 from cagefield.scene.scene_files import is_scene, read_cameras
 from cagefield.server.editor.document import Document
@@ -52,22 +50,6 @@ def test_a_grid_that_holds_next_to_nothing_is_refused(tmp_path: Path) -> None:
     assert VoxelField.load(grid(tmp_path, 640, 300_000)).resolution == (640,) * 3
 
 
-def test_a_picture_is_not_asked_for_more_than_its_file_holds(tmp_path: Path) -> None:
-    """A chunk that claims 4 GB: pillow asks for them, and Python fetches memory before it reads.
-
-    A petabyte is a MemoryError on every machine.
-    """
-    content = bytearray(_png(16, 12))
-    at = content.index(b"IDAT") - 4
-    content[at : at + 4] = struct.pack(">I", 0xFFFF0017)
-    (tmp_path / "a.png").write_bytes(content)
-    with image_files.opened_picture(tmp_path / "a.png") as picture:
-        file = picture.fp
-        file.seek(0)
-        assert file.read(1 << 50) == bytes(content) and file.read(1 << 50) == b""
-        assert file.read(10) == b"" and file.seek(8) == 8 and file.read() == bytes(content[8:])
-
-
 def _png(width: int, height: int) -> bytes:
     """A grey picture of zeros, a thousandth of its size."""
 
@@ -81,72 +63,16 @@ def _png(width: int, height: int) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", content) + chunk(b"IEND", b"")
 
 
-def _tiff(strips: int, tag: tuple[int, int], big: bool = False) -> bytes:
-    """A grey picture of 64 x `strips` pixels, a strip for each line, with a further tag (type, count)."""
-    kind, count = tag
-    form, start = ("<HHQQ", b"II+\0\x08\0\0\0") if big else ("<HHLL", b"II*\0")
-    head, tags = (16, 20) if big else (8, 12)
-    pixels = head + (8 if big else 2) + 9 * tags + (8 if big else 4)
-    offsets = pixels + 64 * strips
-    entries = [
-        (256, 3, 1, 64), (257, 3, 1, strips), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1),
-        (273, 4, strips, offsets if strips > 1 else pixels), (278, 3, 1, 1),
-        (279, 4, strips, offsets + 4 * strips if strips > 1 else 64), (60_000, kind, count, head),
-    ]  # fmt: skip
-    content = start + struct.pack("<Q" if big else "<L", head) + struct.pack("<Q" if big else "<H", 9)
-    content += b"".join(struct.pack(form, *entry) for entry in entries) + bytes(8 if big else 4)
-    content += bytes(64 * strips)
-    content += struct.pack(f"<{strips}L", *(pixels + 64 * n for n in range(strips)))
-    return content + struct.pack(f"<{strips}L", *[64] * strips)
-
-
-@pytest.mark.parametrize("big", [False, True])
-def test_a_tiff_whose_tags_are_long_is_refused_before_they_are_read(tmp_path: Path, big: bool) -> None:
-    """Of each number pillow makes one of Python's: a picture of 6 MB took 75."""
-    file = tmp_path / "a.tif"
-    for good in (_tiff(1, (3, 1), big), _tiff(2000, (4, 20_000), big)):
-        file.write_bytes(good)
-        assert read_image(file).shape[1:] == (64, 3)
-    for bad, count in (((4, 270_000), 270_000), ((5, 34_000), 272_000)):
-        file.write_bytes(_tiff(5000, bad, big) + bytes(1_000_000))
-        with pytest.raises(DatasetError, match=f"its tags hold {count + 10_006} numbers"):
-            read_image(file)
-
-
-def _jpeg(width: int, height: int, **options: object) -> bytes:
-    """Noise, and something behind the end, as some cameras leave it."""
-    pixels = np.random.default_rng(0).integers(0, 256, (height, width, 3)).astype(np.uint8)
-    out = io.BytesIO()
-    Image.fromarray(pixels).save(out, "JPEG", **options)
-    return out.getvalue() + b"\xff\xd8\xff\xd9 more"
-
-
-@pytest.mark.parametrize("size", [(1, 1), (17, 9), (160, 121)])
-def test_jpegs_are_read_to_the_last_pixel(
-    tmp_path: Path, size: tuple[int, int], capfd: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "a.jpg"
-    for quality, subsampling, restarts, progressive in product((5, 95), (0, 2), (0, 1), (False, True)):
-        options = {"subsampling": subsampling, "restart_marker_blocks": restarts, "progressive": progressive}
-        file.write_bytes(_jpeg(*size, quality=quality, **options))
-        with Image.open(file) as expected:
-            np.testing.assert_array_equal(read_image(file), np.asarray(expected))
-        assert read_photo(file).shape == (*size[::-1], 3)
-    assert capfd.readouterr().err == ""
-
-
-@pytest.mark.parametrize("restarts", [0, 1])
-def test_a_jpeg_that_lacks_pixels_is_refused(tmp_path: Path, restarts: int) -> None:
-    """They were made up: 200 kB became 39 million pixels."""
-    content, file = bytearray(_jpeg(300, 200, restart_marker_blocks=restarts)), tmp_path / "a.jpg"
-    at = content.index(b"\xff\xc0") + 5
-    for side in (at, at + 2):
-        damaged = content.copy()
-        damaged[side : side + 2] = struct.pack(">H", 65_500)
-        file.write_bytes(damaged)
+def test_a_jpeg_that_is_cut_off_is_one_line(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (200, 300, 3)).astype(np.uint8)
+    out, file = io.BytesIO(), tmp_path / "a.jpg"
+    Image.fromarray(pixels).save(out, "JPEG")
+    for share in (0.3, 0.9):
+        file.write_bytes(out.getvalue()[: int(share * len(out.getvalue()))])
         for read in (read_image, read_photo):
-            with pytest.raises(DatasetError, match="image file is truncated"):
+            with pytest.raises(DatasetError, match=r"a\.jpg: .*image file is truncated") as refused:
                 read(file)
+            assert "\n" not in str(refused.value)
 
 
 @pytest.mark.filterwarnings("ignore:Image size")  # pillow's own

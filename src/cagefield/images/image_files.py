@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +24,11 @@ from cagefield.images.image_formats import (
     orientation_is_pixels,
     turned_as_stored,
 )
-from cagefield.images.jpeg_scan import end_of_pixels
 from cagefield.images.render_result import to_uint8
-from cagefield.images.tiff_tags import check_tags
 from cagefield.images.video import encoder
 from cagefield.typing import UInt8
 
-MOST_PIXELS = 100 << 20
+MAX_PIXELS = 100 << 20
 """Pixels of a picture that is read: a file of kilobytes may have any number of them."""
 
 MOST_BYTES = 1 << 30
@@ -45,9 +41,6 @@ _DENSEST_EFFICIENT = 16 * _DENSEST
 """Pixels for each byte of HEIF and AVIF, at most: flat blocks of 64 x 64 pixels take a fraction of a bit."""
 
 _TILE = 1 << 16
-
-_ZEROS = bytes(64)
-"""What libjpeg looks ahead at the end of the pixels, and more."""
 
 DAMAGED = (
     OSError, SyntaxError, ValueError, LookupError, TypeError, AttributeError, OverflowError, EOFError,
@@ -62,48 +55,23 @@ def reason_of(error: Exception) -> str:
 
 
 def check_pixels(image: Image.Image, size: int | None = None) -> None:
-    """Passes where an opened picture, of which only the header is read, has at most MOST_PIXELS.
+    """Passes where an opened picture, of which only the header is read, has at most MAX_PIXELS.
 
     `size` bytes of its file can hold so many, too. Raises ValueError.
     """
     count = image.width * image.height
-    if count > MOST_PIXELS:
+    if count > MAX_PIXELS:
         raise ValueError(
-            f"{image.width} x {image.height} pixels, at most {MOST_PIXELS >> 20} million are read; shrink it"
+            f"{image.width} x {image.height} pixels, at most {MAX_PIXELS >> 20} million are read; shrink it"
         )
     densest = _DENSEST_EFFICIENT if image.format in EFFICIENT_FORMATS else _DENSEST
     if size is not None and count > max(_ALWAYS, densest * size):
         raise ValueError(f"{image.width} x {image.height} pixels in {size} bytes; it is damaged or cut off")
 
 
-class _PictureFile(io.BufferedReader):
-    """A file of which no more is asked than it holds: pillow asks for what damaged headers say, gigabytes.
-
-    With `pixels_end` it ends there, and zeros are in the place of the mark at the end.
-    """
-
-    pixels_end: int | None = None
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(io.FileIO(path))
-        self._size = os.fstat(self.fileno()).st_size
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        if size is not None and size > io.DEFAULT_BUFFER_SIZE:
-            size = min(size, max(0, self._size - self.tell()))
-        begin, content = self.tell(), super().read(size)
-        if self.pixels_end is None or begin + len(content) <= self.pixels_end:
-            return content
-        self.seek(self.pixels_end + 1)
-        return content[: self.pixels_end - begin] + _ZEROS if begin <= self.pixels_end else b""
-
-    def __repr__(self) -> str:
-        return repr(str(self.name))
-
-
 @contextmanager
 def opened_picture(path: Path) -> Iterator[Image.Image]:
-    """The picture in a file, of which the header is read, and at most MOST_PIXELS can be.
+    """The picture in a file, of which the header is read, and at most MAX_PIXELS can be.
 
     Pixels are as stored: EXIF's orientation is not applied, the rotation of HEIF and AVIF is.
 
@@ -111,26 +79,9 @@ def opened_picture(path: Path) -> Iterator[Image.Image]:
     whose decoder is not installed.
     """
     check_regular(path, MOST_BYTES)
-    with _PictureFile(path) as file:
-        check_tags(file, path.stat().st_size)
-        with open_picture(file) as image:
-            check_pixels(image, path.stat().st_size)
-            if image.format in ("JPEG", "MPO"):
-                image.load = partial(_load_jpeg, image, file)
-            try:
-                yield turned_as_stored(image) if orientation_is_pixels(image) else image
-            finally:
-                image.__dict__.pop("load", None)  # it holds the picture
-
-
-def _load_jpeg(image: Image.Image, file: _PictureFile) -> Any:
-    """Its `load`, which refuses a file that lacks pixels, where libjpeg would make them up."""
-    del image.load  # the class has its own
-    place = file.tell()
-    file.seek(0)
-    file.pixels_end = end_of_pixels(file)
-    file.seek(place)
-    return image.load()
+    with path.open("rb") as file, open_picture(file) as image:
+        check_pixels(image, path.stat().st_size)
+        yield turned_as_stored(image) if orientation_is_pixels(image) else image
 
 
 def load_whole(image: Image.Image) -> None:

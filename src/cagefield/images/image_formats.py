@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from typing import BinaryIO
 
-from PIL import Image, ImageOps
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from cagefield.errors import DatasetError
 
@@ -49,7 +49,10 @@ def open_picture(file: BinaryIO) -> Image.Image:
         return _open_avif(file)
     if any(brand in HEIF_BRANDS for brand in found):
         return _open_heif(file)
-    return Image.open(file)
+    try:
+        return Image.open(file)
+    except UnidentifiedImageError:  # Pillow's message shows the open file, not its name
+        raise UnidentifiedImageError("no picture of a format that Pillow reads") from None
 
 
 def _open_avif(file: BinaryIO) -> Image.Image:
