@@ -59,7 +59,7 @@ ROWS, MOST_ROWS = 44, 1024
 
 @dataclass(frozen=True)
 class PageEdits:
-    """A file of edits, and what a page has that has read it."""
+    """A file of edits, and the keys of the layers that a page has after reading it."""
 
     data: bytes
     keys: tuple[str, ...] = ()
@@ -93,7 +93,8 @@ def encode_changed_edits(
     occupancies: Mapping[str, Occupancy] | None = None,
     level: int = LEVEL,
 ) -> PageEdits:
-    """The same for a page that `has` what some keys name; `occupancies` are known ones by their keys.
+    """File of edits for a page that already `has` the layers of some keys; `occupancies` are known ones by
+    key.
 
     `level` is deflate's. Raises EditError as `encode_page_edits` does.
     """

@@ -54,7 +54,7 @@ Level = tuple[dict[str, Any], dict[str, NDArray[Any]]]
 
 @dataclass(frozen=True)
 class PageField:
-    """What a page's file holds: the levels of a field from coarse to full, and how it is drawn.
+    """Contents of a page's field file: the levels of a field from coarse to full, and its display options.
 
     `step` is the distance between samples in voxels; background None is nothing behind the scene.
     """
@@ -93,7 +93,7 @@ def encode_page_field(
 
 
 def decode_page_field(data: bytes) -> PageField:
-    """What a file holds, its numbers as the page has them.
+    """Decoded file, with numbers as the page has them.
 
     Raises:
         FieldError: the file is of another kind or version, truncated or garbled.

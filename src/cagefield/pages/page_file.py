@@ -4,7 +4,7 @@
 
 Numbers are little-endian. The header's "arrays" lists name, type, shape and bytes of each array in the order
 in which they come, so that a page can use the first ones while the others are on their way. Each array is a
-zlib stream, whose checksum finds what was garbled.
+zlib stream, whose checksum finds damage.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LEVEL = 6
 """Of deflate: 9 is 2% smaller and takes five times as long."""
 
 QUICK_LEVEL = 1
-"""For what somebody waits for."""
+"""Deflate level for files that a user waits for."""
 
 TYPES = {"u1": np.uint8, "u2": np.uint16, "i4": np.int32, "f4": np.float32}
 _MOST = 1 << 31

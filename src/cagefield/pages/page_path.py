@@ -126,7 +126,7 @@ def encode_page_path(
 
 _KINDS = [FIRST, LAST, CONTINUOUS, RESOLUTION, OFFSET, OFFSET + 1, SIMPLE, UNDER, PART]
 _KINDS += [RECORDS + number * RECORD + AFFINE for number in range(2)]
-"""Columns that say of what kind an edit is, and where its layers lie."""
+"""Columns with the kind of an edit and the offsets of its layers."""
 
 
 def mixable(one: PathState, other: PathState) -> bool:
@@ -156,7 +156,7 @@ def mixed(one: PathState, other: PathState, share: float) -> DeviceStack:
 
 
 def joined_occupancy(found: Sequence[Occupancy]) -> Occupancy:
-    """The occupancy of what any of some, of the same grid, holds."""
+    """Union of occupancies of one grid."""
     low = np.min([each.origin for each in found], axis=0)
     high = np.max([each.origin + BRICK * np.array(each.codes.shape) for each in found], axis=0)
     blocks = np.zeros((high - low) // BRICK * 2, bool)

@@ -1,4 +1,4 @@
-"""What edits change of a page's splats: those that go, and those that come, as the rasteriser draws them.
+"""Difference that edits make to a page's splats: hidden ones, and new ones as the rasterizer draws them.
 
 The page keeps the splats that it has loaded (`page_splats`) and lays these over them. With N splats of the
 field, in the page's order, and M that come (moved ones, copies, the children of split ones):
@@ -8,7 +8,7 @@ field, in the page's order, and M that come (moved ones, copies, the children of
     means        [M, 3] float32, in deformed space, less the field's centre
     covariances  [M, 6] float32: xx, xy, xz, yy, yz, zz
     opacities    [2, M] uint8, high bytes first, of 65535 o
-    gains        [M] int32: what the red, green and blue of a source's colour is multiplied by, see
+    gains        [M] int32: factors of the red, green and blue of a source's color, see
                  `encode_gains`
     turns        [2, 3, M] uint8, see `page_splats.encode_rotations`: R; colours are those of the source seen
                  along R^T d
@@ -17,8 +17,8 @@ Where the header says `packed`, sources rise, and in the place of means and cova
 `means`, `rotations` and `scales` as in `page_splats`, of the splats' axes in deformed space: half the bytes,
 for a file that is kept.
 
-A whole difference to the field without edits is sent each time, so that the newest is right whatever came
-before.
+A whole difference to the field without edits is sent each time, so that the newest is right after any
+earlier one.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ MAGIC, VERSION = b"cagesped", 2
 
 @dataclass(frozen=True)
 class PageSplatEdits:
-    """What a file holds: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
+    """Decoded file: hidden [N], sources [M], means [M,3] less the centre, covariances [M,6], opacities
     [M], turns [M,4] (w, x, y, z), gains [M,3]."""
 
     hidden: NDArray[np.bool_]
@@ -68,7 +68,7 @@ class PageSplatEdits:
 
 
 def encode_page_splat_edits(field: SplatField, changed: ChangedSplats, *, packed: bool = False) -> bytes:
-    """The file of what edits changed of a field."""
+    """File of the difference that edits make to a field."""
     order = page_order(field)
     place = np.empty(len(order), np.int32)
     place[order] = np.arange(len(order), dtype=np.int32)
@@ -121,13 +121,13 @@ def encode_gains(gains: Float32) -> NDArray[np.int32]:
 
 
 def decode_gains(codes: NDArray[np.int32]) -> Float32:
-    """The gains [M,3] of what `encode_gains` made."""
+    """Gains [M,3] from codes of `encode_gains`."""
     parts = codes[:, None] >> np.array([0, 10, 20], np.int32) & np.int32(1023)
     return np.asarray(np.exp2((parts.astype(np.float32) - 512.0) * GAIN_STEP), np.float32)
 
 
 def decode_page_splat_edits(data: bytes) -> PageSplatEdits:
-    """What a file holds, its numbers as the page has them.
+    """Decoded file, with numbers as the page has them.
 
     Raises:
         FieldError: the file is of another kind or version, truncated or garbled.

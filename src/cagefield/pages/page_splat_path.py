@@ -22,7 +22,7 @@ same splats (entry n of the header's `after`, or -1), else q. They are modulo 65
 ... are 0, 1, 2, 3, ...
 
 Between two states, the k-th splat of a source has the mean of the k-th ones' means and covariances: splats
-follow chords of their ways. What one of the states alone has is shown on its half of the way. The header's
+follow chords of their ways. Splats of only one of the states are shown on its half of the way. The header's
 `whole` is the state in which the edits have gone all the way, for which a page has their own file; -1 where
 none is.
 
@@ -70,7 +70,7 @@ STRETCH = 1.0 / 256.0
 
 @dataclass(frozen=True)
 class SplatPathState:
-    """What edits change at one moment: hidden [ceil(N/8)] and sources [M] as in the file.
+    """Difference that edits make at one moment: hidden [ceil(N/8)] and sources [M] as in the file.
 
     Of each splat: means [M,3], less the field's centre; turns [M,4] (w, x, y, z) and stretches [M,3,3], R and
     S of the map's Jacobian R S; its own shape, quaternions [M,4] and log_scales [M,3]; opacities [M]; encoded
@@ -89,7 +89,7 @@ class SplatPathState:
 
     @classmethod
     def of(cls, field: SplatField, changed: ChangedSplats, split: Split | None) -> SplatPathState:
-        """The state of what edits change of a field, where `split` says what was split of it."""
+        """State of the difference that edits make to a field, with its `split` splats."""
         order = page_order(field)
         place = np.empty(len(order), np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)

@@ -6,8 +6,9 @@ are 27 to 50 dB from our rasteriser's, and 40 to 66 dB with every option set lik
 so that edits would show the colours of other directions; it gives no depth, which the editor's lines, cages
 and moving pictures need; and its module is 2.7 MB, where ours is 30 kB.
 
-A level is some of the splats, drawn with those before it: what covers most comes first, so that the start of
-a file is a coarse picture. In a level, splats lie in an order in which neighbours in space are neighbours
+A level is some of the splats, drawn with those before it: splats of the largest area come first, so that the
+start of
+a file is a coarse image. In a level, splats lie in an order in which neighbours in space are neighbours
 (`page_order`), in chunks of CHUNK. With M splats, C chunks and K coefficients a channel, a level has
 
     chunks     [C, 2, 3] float32, least and largest of the means of a chunk, less the header's `centre`
@@ -71,7 +72,7 @@ SCALES = (-20.0, 12.0)
 
 @dataclass(frozen=True)
 class PageSplats:
-    """What a page's file of splats holds: the splats in the page's order, levels one after the other.
+    """Contents of a page's splat file: the splats in the page's order, levels one after the other.
 
     `ends` [L] are the numbers of splats with which each level ends; background None is nothing behind them.
     """
@@ -91,7 +92,7 @@ def encode_page_splats(
 ) -> bytes:
     """The file of a field. Raises FieldError for a field without splats, and for one of discs.
 
-    What edits paste (`pasted_splats.with_pasted`) has no opacity in it: their file shows it.
+    Pasted splats (`splat_provenance.with_pasted`) have opacity 0 in it: the file of the edits shows them.
     """
     if not len(field):
         raise FieldError("the field is empty: it has no splats to show")
@@ -131,7 +132,7 @@ def encode_page_splats(
 
 
 def decode_page_splats(data: bytes) -> PageSplats:
-    """What a file holds, its numbers as the page has them.
+    """Decoded file, with numbers as the page has them.
 
     Raises:
         FieldError: the file is of another kind or version, truncated or garbled.
@@ -184,7 +185,7 @@ def encode_means(means: AnyArray, centre: AnyArray, field: SplatField) -> tuple[
 
 
 def decode_means(chunks: Float32, planes: NDArray[np.uint8], centre: AnyArray) -> Float32:
-    """The means [M,3] of what `encode_means` made."""
+    """Means [M,3] from values of `encode_means`."""
     whole = np.zeros(planes.shape[1:], np.float64)
     for plane in planes:
         whole = 256.0 * whole + plane

@@ -33,16 +33,16 @@ SIZES = (LATTICE, 48, 32, 24, 16)
 """Nodes an axis of the lattices of edits that move: the most that fit into the budget."""
 
 LEAST = 1e-3
-"""The part that stands for 0: what has not begun has all its numbers too, and is where it was, nearly."""
+"""Part that replaces 0, so that an edit before its start has all its numbers too, almost at the identity."""
 
 PROBES = 4000
-"""Points at which what the page shows is compared with the exact edits, half-way between two states."""
+"""Points at which the page's edits are compared with the exact ones, half-way between two states."""
 
 
 @dataclass(frozen=True)
 class PathEdits:
-    """What a page holds of edits along a path: the file, how many states, the nodes an axis of lattices; None
-    of splats, which have none.
+    """Edits along a path in a page: the file, the number of states, the nodes per axis of lattices (None for
+    splats).
 
     `error` is the distance (mean, 99th percentile) of points half-way between states from where the stack of
     that moment, with the lattices of `for_pages`, takes them, in world units.
@@ -70,8 +70,8 @@ def path_edits(
     `renderer` draws the field. `on_progress` is told the share that is done. Raises EditError for an edit
     that is not possible at a part that is shown.
 
-    Of an edit that moves, `patcher` fills what it left once it has begun, and takes its light along once it
-    has gone all the way: a patch of every state would take some hundred KB each.
+    Of an edit in motion, `patcher` fills the uncovered region after its start, and takes its light along at
+    its end: a patch of every state would take some hundred KB each.
     """
     if len(keys) < 2:
         return None
@@ -182,8 +182,8 @@ def stack_at(
 def _patch(edits: EditStack, on_way: EditStack, parts: Parts, number: int) -> Patch | SplatPatch | None:
     """The patch that an edit has at these parts.
 
-    Patches show what the whole edits before them make: there is none while one of these, that reaches into
-    its region, is on its way.
+    Patches show the result of the complete edits before them: there is none while one of these that reaches
+    into its region is in motion.
     """
     edit, part = edits[number], parts[number]
     if part < 1.0 and not edit.deleted:

@@ -54,9 +54,9 @@ FOLDER = _POLICY + "script-src 'self'; connect-src 'self'"
 
 @dataclass(frozen=True)
 class ScenePage:
-    """What a page shows: title, header (cameras, background), and files by the names in NAMES.
+    """Contents of a page: title, header (cameras, background), and files by the names in NAMES.
 
-    `along` says how edits move along the path, None where they do not.
+    `along` has the motion of edits along the path, None without one.
     """
 
     title: str
@@ -145,7 +145,7 @@ class ScenePage:
 def write_folder(folder: Path, written: Mapping[str, bytes]) -> None:
     """Writes the files of `ScenePage.folder` into a folder, which appears whole, or not at all.
 
-    What else an older folder holds stays there.
+    Other files of an older folder stay.
     """
     recover_folder(folder, lambda left: (left / SCRIPT).is_file())
     with replaced_folder(folder, [INDEX, SCRIPT, *NAMES.values()]) as draft:

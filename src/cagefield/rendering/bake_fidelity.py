@@ -1,4 +1,4 @@
-"""How closely a baked field shows what the field it was baked from shows."""
+"""Fidelity of a baked field: PSNR of its images against those of its source field."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def render_sampled(
 
 
 def _sampled_bounds(field: Field, edits: PointMap | None) -> Float32 | None:
-    """Box [2,3] of the field and of what the edits change; None when the field has no bounds."""
+    """Box [2,3] of the field and of the regions that edits change; None when the field has no bounds."""
     own = getattr(field, "bounds", None)
     if own is None:
         return None

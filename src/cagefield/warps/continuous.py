@@ -33,7 +33,8 @@ class ContinuousWarp:
         return _by_region(points, self.inner, self.outer, shell.to_canonical)
 
     def shell_points(self, samples: int, seed: int = 0) -> Array:
-        """Those of `samples` random points of the outer cage's frame that lie in V^o minus V, [N,3]."""
+        """Random points [N,3] in V^o minus V, N <= `samples`: drawn in the outer cage's frame, the others
+        rejected."""
         origin, frame = self.outer.frame
         points = origin + np.random.default_rng(seed).random((samples, 3)) @ frame.T
         points = points[self.outer.contains(points)]

@@ -1,4 +1,4 @@
-"""Discrete adjustment: only the inner region changes. Move, copy and delete, and what takes the place."""
+"""Discrete adjustment: only the inner region changes. Move, copy, delete and paste."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from cagefield.warps.interfaces import Mapped
 
 @dataclass(frozen=True)
 class DiscreteWarp:
-    """Move (V shows what was in V^c, the rest of V^c is empty), copy (V^c stays), delete (V^c is empty).
+    """Move (V shows the content of V^c, the rest of V^c is empty), copy (V^c stays), delete (V^c is empty).
 
     `inner` maps V onto V^c; None deletes, and then `source` is the cage that is emptied. `patched` is the
-    region, V^c and what lies around it, where a patch takes the place of the field (`edits.patch`). What V
-    shows is `pasted` where it comes from another scene, so that nothing of this one goes there.
+    region, V^c and its surroundings, where a patch takes the place of the field (`edits.patch`). The
+    content of V is `pasted` where it comes from another scene: nothing of this scene goes there.
     """
 
     source: Cage
@@ -48,7 +48,7 @@ class DiscreteWarp:
         """From V^c: into V, also for a copy (the map is single valued, and the original stays besides).
 
         Lost are the points of V outside V^c, which the moved content covers, and for a delete those of V^c. A
-        paste leaves all where they are: it is shown with what is there.
+        paste moves no point of this scene.
         """
         mapped = Mapped.identity(points)
         if self.inner is None:

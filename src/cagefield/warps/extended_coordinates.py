@@ -85,8 +85,8 @@ def straightened_slope(form: Array, xi: Array) -> Array:
 def straighten(form: Array, y: Array, start: Array | None = None, enough: float = 1e-14) -> Array:
     """xi [N,3] with y(xi) = y [N,3], by a damped Newton's method from `start` (else from y).
 
-    It ends where what is left is `enough`, as a share of 1 + |y|. What is stuck at a kink is tried again from
-    elsewhere.
+    It ends at a residual of `enough`, as a share of 1 + |y|. A point stuck at a kink is tried again from
+    another start.
     """
     target = np.ascontiguousarray(y.T)  # components first: numpy's inner loops are long
     xi = target.copy() if start is None else start.T.copy()
@@ -103,7 +103,7 @@ def straighten(form: Array, y: Array, start: Array | None = None, enough: float 
 
 
 def _newton(form: Array, xi: Array, target: Array, enough: float) -> Array:
-    """What is left [N] of y(xi) - target after taking xi [3,N] to the root near it, in place."""
+    """Residual norms [N] of y(xi) - target after moving xi [3,N] to the nearest root, in place."""
     form = form if form[4:].any() else form[:4]
     x, y, residual = xi, target, _residual(form, xi, target)
     size = np.abs(residual).max(axis=0)
@@ -154,7 +154,7 @@ def _residual(form: Array, xi: Array, y: Array) -> Array:
 
 
 def _factors(xi: Array, rows: int = 10) -> Array:
-    """What the first 4 or all 10 rows of a form are multiplied by at xi [3,N]."""
+    """Basis values [4,N] or [10,N] at xi [3,N], factors of the first 4 or all 10 rows of a form."""
     a, b, c = xi.clip(-1.0, 1.0)
     ab = a * b
     if rows == 4:

@@ -82,7 +82,7 @@ class FlowShell:
         return self.falloff.coefficients(float(np.abs(after - before).max()))
 
     def with_strain(self, strain: float) -> FlowShell:
-        """The shell with other steps, and what is known of its motion."""
+        """Shell with other step sizes and the same precomputed motion."""
         other = replace(self, strain=strain)
         known = ("motion", "coefficients", "_strained")
         other.__dict__.update({name: getattr(self, name) for name in known})

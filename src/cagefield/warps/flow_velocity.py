@@ -67,8 +67,9 @@ class FlowVelocity:
     def of_cage(self, x: Array, xi: Array, dxi: Array) -> tuple[Array, Array]:
         """(V [N,3], dV/dx [N,3,3]) at points x [N,3] with coordinates xi [N,3] and dxi/dx [N,3,3].
 
-        V = dc/dt + dF/dt F^-1 (x - c) + F dB/dt(clamp(xi)): that of the cage on its faces, and not of what
-        the coordinates around it do.
+        V = dc/dt + dF/dt F^-1 (x - c) + F dB/dt(clamp(xi)): the velocity of the cage on its faces,
+        independent of
+        the coordinates around it.
         """
         clamped = xi.clip(-1.0, 1.0)
         y = (x - self.inner.centre) @ self.inner.inverse.T

@@ -1,4 +1,4 @@
-"""What every map returns, and what a shell and a warp must offer."""
+"""Protocols of shells and warps, and the result type of every map."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Mapped:
 class Shell(Protocol):
     """A map of V^o minus V onto V^o minus V^c: equal to phi on the faces of V, the identity on those of V^o.
 
-    Points handed to it lie in the closed shell; what it does with others is not specified.
+    Arguments must lie in the closed shell; results for other points are unspecified.
     """
 
     def to_canonical(self, points: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ def inverted(
     """(x [N,3] that `to_canonical` takes to points [N,3], Jacobians dx/dpoint [N,3,3]).
 
     Newton's method from `start` [N,3], with steps shortened where they do not lead nearer, until it gives the
-    points back to 1e-13 of `size`, or to what rounding lets it. `to_canonical` returns points and Jacobians.
+    points back to 1e-13 of `size`, or to rounding. `to_canonical` returns points and Jacobians.
     """
     x = start.copy()
     back, J = to_canonical(x)

@@ -26,16 +26,17 @@ BENDS = [3, 5, 6, 7]
 AXES = [1, 2, 4]
 
 KEPT = 0.5
-"""A direction's least component along its face's normals, as a share of the most that it could be.
+"""A direction's least component along its face's normals, as a share of its largest possible value.
 
-Of cages with all corners moved to 95% of what is valid, 0.14% are refused with 0.3 to 0.7, and 3.4% with 1.
+Of cages with all corners moved to 95% of the valid distance, 0.14% are refused with 0.3 to 0.7, and 3.4%
+with 1.
 """
 
 
 def bends(C: Array, F: Array) -> Array:
     """The bends K [B,4,3] of cages with monomial coefficients C [B,8,3] and frames F [B,3,3].
 
-    Those that are rounding are 0.
+    Values at rounding level are set to 0.
     """
     K = C[:, BENDS] @ np.transpose(np.linalg.inv(F), (0, 2, 1))
     K[np.abs(K).max(axis=(1, 2)) < 1e-12] = 0.0
@@ -121,7 +122,7 @@ def bends_one_to_one(K: Array) -> Mask:
 
 
 def _are_one_to_one(form: Array) -> Mask:
-    """What `bends_one_to_one` says of forms [B,10,3], by all of the determinants."""
+    """Mask [B] of the injective forms [B,10,3], by all determinants; see `bends_one_to_one`."""
     K = form[:, :4]
     M = np.eye(3) + corner_slopes(K)
     e = np.eye(3) + np.swapaxes(form[:, _CORNER_TILTS], 2, 3)

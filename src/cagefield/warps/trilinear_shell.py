@@ -16,7 +16,7 @@ from cagefield.warps.hexahedron_map import map_hexahedron
 
 LEAST_RATIO = 1e-3
 """A shell whose determinant falls below this share of the canonical one counts as folded: the map to
-canonical space is then stretched a thousandfold and more, beyond what a float32 renderer can follow."""
+canonical space is then stretched a thousandfold and more, beyond the precision of a float32 renderer."""
 
 SIDES: tuple[str, ...] = ("+x", "-x", "+y", "-y", "+z", "-z")
 

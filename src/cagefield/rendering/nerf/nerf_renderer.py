@@ -118,7 +118,7 @@ def trace(
 def _traced(
     field: TorchNerf, rays: Rays, edits: Any, chunk: int, preserve_opacity: bool, normals: bool
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """What `trace` returns, and normals [N,3], or [N,0] where none are asked for."""
+    """Results of `trace`, and normals [N,3], or [N,0] unless requested."""
     mapped = None
     if edits is not None and len(edits.active):
         mapped = TensorMap(edits, field.device, preserve_opacity=preserve_opacity)

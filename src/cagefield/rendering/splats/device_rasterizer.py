@@ -1,7 +1,7 @@
-"""Splats rasterised on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
+"""Splat rasterizer on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
 
-What `splat_rasterizer` does on the CPU, with the same layouts of pictures and sums.
-Sorting is done on the host: depths, then the tiles that each splat touches, both stable.
+Layouts of images and sums equal those of `rasterizer` on the CPU. Sorting is done on the host: depths, then
+the tiles that each splat touches, both stable.
 """
 
 from __future__ import annotations

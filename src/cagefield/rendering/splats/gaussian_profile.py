@@ -42,7 +42,7 @@ def _profiles() -> tuple[Array, Array, Array]:
 
 
 def part_between(opacity: Array, low: Array, high: Array) -> tuple[Array, Array, Array, Array]:
-    """(x, r, opacity, across) [M] of splats for what is between low [M] and high [M] of others.
+    """(x, r, opacity, across) [M] of the parts of splats between low [M] and high [M].
 
     These have opacities [M]. A splat for a part is at x and of the width r along u, `across` in the other
     directions, in standard deviations of the whole. It has the integral, mean and variance of T over u of the

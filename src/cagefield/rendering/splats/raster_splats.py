@@ -1,10 +1,10 @@
-"""Splats in deformed space, as the rasteriser draws them: a SplatField's, or what edits make of them.
+"""Splats in deformed space, the input of the rasterizer: those of a SplatField, deformed by edits.
 
 Notation: J = d(deformed)/d(canonical) at a splat's mean, J = R S its polar decomposition, C its covariance.
 An edit takes the mean along, C to J C J^T, and colour is evaluated at R^T d.
 
 Opacity. A splat lets the ray through its mean lose the share o, whichever way the ray goes. With
-`preserve_opacity` a stretched density is multiplied by what the ray through it was stretched, so that ray
+`preserve_opacity` a stretched density is multiplied by the stretch of the ray through it, so that ray
 still loses o: a splat keeps its opacity, exactly. Without (the paper), the ray's optical depth grows as its
 way through the splat does. That depends on its direction, and a splat has one opacity: it gets the mean of
 it, o' = 1 - (1 - o)^(|det J|^(1/3)), which is exact where J scales all directions alike.
@@ -85,7 +85,7 @@ class DeformedSplats:
 
 
 NO_ROTATIONS: Float32 = np.empty((0, 3, 3), np.float32)
-"""What kernels take for rotations where no splat was turned."""
+"""Kernel argument for rotations where no splat is rotated."""
 NO_ROTATIONS.setflags(write=False)
 
 _of_fields: WeakKeyDictionary[SplatField, DeformedSplats] = WeakKeyDictionary()
@@ -157,7 +157,8 @@ def _deformed(
 def _carried(
     field: SplatField, moved: MovedSplats, preserve_opacity: bool
 ) -> tuple[Float32, Float32, Float32 | None, Float32]:
-    """(means [M,3], covariances [M,6], opacities [M], or None for their own, R [M,3,3]) of what moved."""
+    """(means [M,3], covariances [M,6], opacities [M], or None for their own, R [M,3,3]) of the moved
+    splats."""
     from cagefield.rendering.splats.kernels.deformation import deform
 
     count = len(moved.source)
@@ -173,7 +174,7 @@ def _carried(
 
 @dataclass(frozen=True, eq=False)
 class ChangedSplats:
-    """What edits change of a field of N splats: M splats that it does not have, and those that go.
+    """Difference between an edited and an unedited field of N splats: M new splats, and the hidden ones.
 
     N counts those that edits paste (`pasted_splats.with_pasted`), which are hidden where they are.
 
@@ -181,8 +182,8 @@ class ChangedSplats:
         hidden: [N], True where the field's splat is not shown as it is.
         sources: [M] int64, splats of the field that have the harmonics of the new ones.
         splats: the M new ones; their `sh` are those of their sources, times `gains`.
-        gains: [M,3], what the red, green and blue of their sources is multiplied by; None where that is 1.
-        rows: [M] int64, what they are made of: splats of the field, and, from N on, children of the split.
+        gains: [M,3], factors of their sources' red, green and blue; None where all are 1.
+        rows: [M] int64, their originals: splats of the field, and, from N on, children of the split.
         jacobian: [M,3,3], d(deformed)/d(canonical) at their means.
     """
 
@@ -263,7 +264,7 @@ class Places:
     def put(self, values: Float32, moved: Float32 | None, more: Float32 | None = None) -> Float32:
         """The values of the splats that are drawn, of the field's [N,...].
 
-        Those of moved ones are `moved` [M,...], or their own where it is None; `more` come after them.
+        Values of moved splats are `moved` [M,...], or their own where it is None; `more` come after them.
         """
         from cagefield.rendering.splats.kernels.deformation import gather
 

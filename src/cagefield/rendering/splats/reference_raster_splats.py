@@ -1,4 +1,4 @@
-"""What edits make of a field's splats, step by step in float64: the oracle of `deformed_splats`."""
+"""Splats of a field deformed by edits, step by step in float64: the oracle of `deformed_splats`."""
 
 from __future__ import annotations
 

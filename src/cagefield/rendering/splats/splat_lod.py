@@ -1,9 +1,9 @@
-"""Clusters of splats, for frames whose time grows with what is seen and not with what is in the file.
+"""Level of detail of splats: clusters, for frame times that grow with visible splats and not with the file.
 
 Splats are ordered along a Morton curve, the largest ones apart, and taken in clusters of CLUSTER. A camera
 draws the clusters that it may see: exactly the splats that it would draw without them. Where a group of a
-cluster's splats lies within a share of a pixel, a representative may stand for it (`detail`): so whatever the
-file holds, the number of what is drawn is bounded by the pixels.
+cluster's splats lies within a share of a pixel, a representative may stand for it (`detail`): so the number
+of drawn elements is bounded by the pixels, for any file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CLUSTER = 256
 """Splats of a cluster."""
 
 GROUPS = (8, 8)
-"""What is merged into one representative at each level: splats, then representatives."""
+"""Elements merged into one representative at each level: splats, then representatives."""
 
 LEAST = 100_000
 """Fewer splats are drawn without clusters: projecting them all costs less than 15 ms."""
@@ -35,7 +35,7 @@ LARGEST = (1 / 64, 1 / 4096)
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What clusters need to know of a picture: pinhole frusta have four planes, other lenses none.
+    """View of an image for culling clusters: pinhole frusta have four planes, other lenses none.
 
     origin [3] of the camera, W [3,3] world to camera, planes [P,3] and reaches [P] as `kernels.seen`, focal
     length in pixels, least depth.
@@ -64,7 +64,7 @@ class View:
         """The view of a camera's region: centre [2] and size in pixels of the region, `limits` of n.
 
         A splat at (x, y, z) with the variance s^2 at most reaches r (f sqrt(1 + n^2) s / z + sqrt(BLUR))
-        pixels from its mean, r <= FARTHEST. What is right of the left edge has f x + (c + r sqrt(BLUR)) z
+        pixels from its mean, r <= FARTHEST. Points right of the left edge have f x + (c + r sqrt(BLUR)) z
         >= -f sqrt(1 + n^2) r s; so for the other edges.
         """
         planes, reaches = [], []
@@ -88,7 +88,7 @@ class View:
 class Level:
     """Representatives of groups of splats, in the order of the clusters.
 
-    masses [M,2]: see `kernels.merge`; apart [clusters]: rms distance of what they stand for from them.
+    masses [M,2]: see `kernels.merge`; apart [clusters]: rms distance of the merged elements from them.
     """
 
     splats: DeformedSplats
@@ -133,9 +133,9 @@ class Clusters:
         return tuple(levels)
 
     def rows(self, view: View, detail: float) -> list[NDArray[np.int32]]:
-        """What a view may show: splats, and representatives of each level, by their numbers.
+        """Indices of the splats visible in a view, then of the representatives of each level.
 
-        A representative stands for what lies less than `detail` pixels from it; 0 takes splats alone.
+        A representative replaces elements less than `detail` pixels from it; 0 takes splats alone.
         """
         depths = np.empty(len(self.boxes))
         kernels.seen(self.boxes, view.origin, view.W, view.planes, view.reaches, view.near, depths)
@@ -177,7 +177,7 @@ def _ordered(splats: DeformedSplats) -> NDArray[np.int32]:
 def _merged(
     below: DeformedSplats, order: NDArray[np.int32], size: int, masses: Float32, clusters: int, per: int
 ) -> Level:
-    """The representatives of each `size` of what is below."""
+    """Representatives of each `size` elements of the level below."""
     count = -(-len(order) // size)
     turned = below.rotations is not None
     means, covariances = np.empty((count, 3), np.float32), np.empty((count, 6), np.float32)

@@ -1,15 +1,16 @@
-"""Where edits take the splats of a field: which stay, which move, which are copied and which are hidden.
+"""Motion of a field's splats by edits: splats that stay, move, are copied, or are hidden.
 
 A splat is where its mean is: it goes with its mean from one of an edit's regions (design: the four regions of
 an edit) as a whole. With V^c the canonical and V the deformed inner cage of a discrete edit:
 
 - in V^c: it goes to V. A copy leaves the original, where V does not cover it; a delete leaves nothing.
-- in V but not in V^c: hidden, for V shows what was in V^c.
+- in V but not in V^c: hidden, as V shows the content of V^c.
 - pasted: it goes to V; all others stay.
 
-With a patch, splats around V^c get new light, or go, and new ones fill what was uncovered: copies of others.
+With a patch, splats around V^c get new light, or go, and new ones, copies of others, fill the uncovered
+region.
 
-Of a stack, each edit takes what the ones before it made: originals and copies alike.
+Each edit of a stack takes the splats of the edits before it, originals and copies alike.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class MovedSplats:
         source: [M] int64, the numbers of the splats that are shown elsewhere, any number of times.
         points: [M,3], their means in deformed space.
         jacobian: [M,3,3], d(deformed)/d(canonical) there.
-        gains: [M,3], what their red, green and blue are multiplied by; None where that is 1 for all.
+        gains: [M,3], factors of their red, green and blue; None where all are 1.
     """
 
     left: Mask
@@ -84,7 +85,7 @@ class MovedSplats:
         return len(self.source) == np.count_nonzero(elsewhere) and np.array_equal(elsewhere, self.left)
 
     def without(self, gone: Mask) -> MovedSplats:
-        """The same, those that are True in `gone` [N] shown nowhere."""
+        """Moved splats without those that are True in `gone` [N]."""
         kept = ~gone[self.source]
         gains = None if self.gains is None else self.gains[kept]
         return MovedSplats(self.left | gone, self.source[kept], self.points[kept], self.jacobian[kept], gains)
@@ -92,7 +93,7 @@ class MovedSplats:
     def then(
         self, edit: Edit, field: SplatField, coarse: bool, proceed: Callable[[], None] | None
     ) -> MovedSplats:
-        """What one more edit makes of a field's. Raises `EditError` where it cannot be evaluated."""
+        """Moved splats after one more edit. Raises `EditError` where it cannot be evaluated."""
         moved, carried = self._moved(edit, field.means, coarse, proceed)
         if edit.source is not None:
             moved, carried = moved._with(edit, field)
@@ -101,7 +102,7 @@ class MovedSplats:
         return moved
 
     def _with(self, edit: Edit, field: SplatField) -> tuple[MovedSplats, Array]:
-        """(these and what an edit pastes, where those last rows [C,3] come from)."""
+        """(these and the pasted splats of an edit, source positions [C,3] of those last rows)."""
         rows = pasted_rows(field, edit)
         inside, points, jacobian = HexahedronMap(edit.deformed, edit.inner)(
             field.means[rows].astype(np.float64)
@@ -121,7 +122,7 @@ class MovedSplats:
     def _moved(
         self, edit: Edit, means: NDArray[np.float32], coarse: bool, proceed: Callable[[], None] | None
     ) -> tuple[MovedSplats, Array]:
-        """(what an edit's map makes of these, where those of its last rows [C,3] were that it took along)."""
+        """(these after an edit's map, source positions [C,3] of its last rows)."""
         from cagefield.rendering.splats.kernels.deformation import changes, in_boxes, times
 
         warp = edit.exact_warp
@@ -197,7 +198,7 @@ class MovedSplats:
 
 @dataclass(frozen=True)
 class _KnownStack:
-    """What a stack's active edits made of a field."""
+    """Moved splats of a field after a stack's active edits."""
 
     edits: tuple[Edit, ...]
     coarse: bool
@@ -218,7 +219,7 @@ def moved_splats(
 
     Raises `EditError` where an edit cannot be evaluated.
 
-    What the first of the edits made is kept between calls. `coarse` and `proceed` as for `to_deformed`.
+    Results of the first edits are cached between calls. `coarse` and `proceed` as for `to_deformed`.
     """
     active = edits.active
     known = known_stacks.setdefault(field, [])

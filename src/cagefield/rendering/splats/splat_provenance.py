@@ -1,6 +1,6 @@
-"""Splats that edits paste from other scenes, behind a field's own.
+"""Provenance of splats: those of the scene, and those that edits paste from other scenes.
 
-What is made of splats by edits is worked out on one SplatField: the scene's own splats first, then those of
+Edits of splats are evaluated on one SplatField: the scene's own splats first, then those of
 each paste, in the other scene's space. These are not shown where they are, but where their paste takes them.
 """
 
@@ -26,7 +26,7 @@ Pasted = tuple[SplatField, ...]
 
 @dataclass(frozen=True, eq=False)
 class _Origins:
-    """Where the splats of a field come from: number [N] of what is `pasted`, -1 for the scene's own.
+    """Origins of a field's splats: index [N] into `pasted`, -1 for the scene's own.
 
     `scene` is the scene's field, whose rows come first, None of splats that stand for others.
     """
@@ -41,9 +41,10 @@ _origins: WeakKeyDictionary[SplatField, _Origins] = WeakKeyDictionary()
 
 
 def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
-    """The field with what active edits paste behind its splats: itself where that is nothing, or is there.
+    """Field with the splats that active edits paste behind its own; itself without pastes, or with them
+    joined.
 
-    The same field for the same pastes, while it lives. Harmonics get the higher degree of both.
+    Equal pastes give the same object while it lives. Harmonics get the higher degree of both.
     """
     if field in _origins:
         return field
@@ -65,7 +66,7 @@ def with_pasted(field: SplatField, edits: EditStack) -> SplatField:
 def pasted_rows(field: SplatField, edit: Edit) -> NDArray[np.int64]:
     """The rows of a joined field that an edit pastes; none for an edit that does not.
 
-    Raises EditError for a paste without what it pastes.
+    Raises EditError for a paste without its content.
     """
     if edit.source is None:
         return np.zeros(0, np.int64)
@@ -101,7 +102,7 @@ def descend(field: SplatField, ancestor: SplatField, rows: NDArray[Any]) -> Spla
 
 
 def descend_from_all(field: SplatField, ancestors: Sequence[SplatField]) -> SplatField:
-    """The same for splats that stand for those of several fields, one after the other."""
+    """Field with the origins of the splats of several fields, one after the other."""
     known = [_origins[each] for each in ancestors if each in _origins]
     if known:
         _origins[field] = _Origins(np.concatenate([each.number for each in known]), known[0].pasted)

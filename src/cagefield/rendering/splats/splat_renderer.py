@@ -44,12 +44,12 @@ class SplatRenderer:
     On a GPU the splats stay there between frames; see `splat_device`.
 
     The splats are deformed once, when the renderer is made; frames cost the same with edits and without.
-    Pictures are within 50 dB and better of `splat_reference`. A fisheye lens shows what is less than 87
-    degrees off its axis.
+    Pictures are within 50 dB and better of `splat_reference`. A fisheye lens shows directions less than
+    87 degrees off its axis.
     """
 
     step = 1.0
-    """Splats have no samples; there for what a Renderer has."""
+    """Sampling distance of voxel renderers; without effect for splats."""
 
     def __init__(
         self,

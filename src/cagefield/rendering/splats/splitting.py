@@ -5,7 +5,7 @@ Notation: a splat is m + A z, z ~ N(0, 1) in three dimensions, A = Q diag(s). An
 F(m) + J A z, which is right as far as F is affine over it, and in one colour. Three things are not:
 
 - Bending. Along the axis a_i of A the second-order term of F at two standard deviations, against the length
-  of what the first-order term makes of them, is
+  of the first-order term, is
 
       b_ii = |F(m + 2 a_i) + F(m - 2 a_i) - 2 F(m)| / |F(m + 2 a_i) - F(m - 2 a_i)|,
 
@@ -17,11 +17,12 @@ F(m) + J A z, which is right as far as F is affine over it, and in one colour. T
   the convolution of N(0, r^2) and N(0, 1 - r^2), so children of the standard deviation r at distances of
   SPACING r, weighted by N(0, 1 - r^2), add up to it, but for a ripple of 2 exp(-2 (pi / SPACING)^2) = 0.1 %.
   With r = BEND / b_i they bend by BEND at most: b is proportional to the width. It is not where J jumps, on
-  the faces of cages, and what lies across these is split ROUNDS times. Opacities are such that the row lets
-  the ray through the middle of each child lose what the splat let it lose there. Optical depths add up, and
+  the faces of cages, and splats across these are split ROUNDS times. Opacities are such that
+  the ray through the middle of each child loses as much in the row as it lost in the splat there. Optical
+  depths add up, and
   are flatter than the splat's opacity where that is large: children as wide as the splat across the row would
   make it thicker, each round again. They are narrower, so that the depth on all the width is the splat's.
-- Cuts. A discrete edit takes what is inside a cage away. A splat through a face, at t standard deviations of
+- Cuts. A discrete edit takes the inside of a cage away. A splat through a face, at t standard deviations of
   its own across it, becomes the parts of it on both sides. A ray at u standard deviations from its middle has
   the optical depth T(u) = -log(1 - a exp(-u^2 / 2)), a the opacity. A child has the integral, mean and
   variance over u of T below or above t, and across u the width that gives it T's integral over that half of a
@@ -31,8 +32,8 @@ F(m) + J A z, which is right as far as F is affine over it, and in one colour. T
   r = SHADE / d, faint ones where it changes by more. It does not where a_i is shorter than half an edge of
   the light's grid.
 
-Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits what those
-before it left.
+Each child goes its own way then. Children are canonical splats; of edits in a stack, each splits the splats
+of those before it.
 
 Source: ours. For faint splats a cut has the moments of the truncated normal distribution: Johnson, Kotz and
 Balakrishnan, "Continuous Univariate Distributions" (1994), chapter 13.
@@ -84,10 +85,10 @@ LEAST_WIDTH = 0.35
 """Least r of one splitting."""
 
 ROUNDS = 3
-"""Times that what was split is looked through again."""
+"""Rounds in which split splats are examined again."""
 
 CUTS = 2
-"""Times that what lies across a cut, or a shadow's edge, is split."""
+"""Rounds in which splats across a cut, or a shadow's edge, are split."""
 
 REACH = 2.0
 """Standard deviations at which a splat ends, for cuts: 2 % of it may hang over."""
@@ -104,7 +105,7 @@ MORE = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """What was split of a field: `parents` [N] are True where `children` stand for a splat.
+    """Split splats of a field: `parents` [N] are True where `children` replace a splat.
 
     `sources` [C] are the numbers of the children's parents.
     """
@@ -126,11 +127,11 @@ def split_for_edits(field: SplatField, edits: EditStack) -> SplatField:
 def split_of(
     field: SplatField, edits: EditStack, *, proceed: Callable[[], None] | None = None
 ) -> Split | None:
-    """Which splats of a field one Gaussian each does not show under the edits, and their children, or None.
+    """Split of the splats that one Gaussian each cannot represent under the edits, or None.
 
-    Those that the edits paste are counted behind the field's (`pasted_splats.with_pasted`).
+    Pasted splats are counted behind the field's (`pasted_splats.with_pasted`).
 
-    Known of a field while it lives, for the edits asked for last.
+    Cached for a living field and its latest edits.
 
     Raises:
         EditError: an edit that cannot be evaluated.

@@ -1,7 +1,8 @@
-"""One edit of a stack that is replaced again and again, as by a drag, while the others stay.
+"""Occupancy during a drag: one edit of a stack is replaced again and again while the others stay.
 
-What the edits before it make of the field is worked out once, and so is where the edits after it take the
-points of a coarse pass. Then a refresh maps each corner by the one edit alone, however many others there are.
+The result of the edits before it is computed once, and so are the images of the points of a coarse pass
+under the edits after it. Then a refresh maps each corner by the one edit alone, however many others there
+are.
 """
 
 from __future__ import annotations

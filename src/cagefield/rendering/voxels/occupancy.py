@@ -80,12 +80,12 @@ def encode(masks: UInt8, leap: int = MAX_LEAP) -> NDArray[np.int32]:
 
 
 def _distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.int32]:
-    """Chebyshev distances to what is not empty, at most `most`."""
+    """Chebyshev distances to the nearest occupied cell, cells, at most `most`."""
     return np.minimum(ndimage.distance_transform_cdt(empty, metric="chessboard"), most).astype(np.int32)
 
 
 def _few_distances(empty: NDArray[np.bool_], most: int) -> NDArray[np.uint8]:
-    """The same by growing what is not empty, brick by brick: sooner for a `most` of a few."""
+    """Chebyshev distances as `_distances`, by dilation of the occupied cells; faster for a small `most`."""
     distance = empty.astype(np.uint8)
     near = ~empty
     for _ in range(1, most):

@@ -31,7 +31,7 @@ def nothing() -> None:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of another stack's occupancy: it holds outside the boxes [B,2,3], world units."""
+    """Occupancy of another stack that is valid outside the boxes [B,2,3], world units."""
 
     occupancy: Occupancy
     changed: NDArray[np.float64]
@@ -58,8 +58,8 @@ def deform(
 ) -> Occupancy:
     """The occupancy of a field seen through the edits. `jumps` says that an edit is discrete.
 
-    Only what `known` does not know is worked out. `coarse` takes the first pass alone, by whole
-    bricks: it holds what the fine one holds and more, for a small part of the time; with a `link`, the stack
+    Only the boxes outside of `known` are computed. `coarse` takes the first pass alone, by whole
+    bricks: a superset of the fine one, for a small part of the time; with a `link`, the stack
     has the edit of the link in place of another one, and nothing else is worked out. `proceed` is called
     between the passes, and may raise.
     """
@@ -134,7 +134,7 @@ def _near_blocks(
 
 
 def _where(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-    """(first [3], last + 1 [3]) of the box around what a mask holds; None where that is nothing."""
+    """(first [3], last + 1 [3]) of the bounding box of a mask; None for an empty mask."""
     bounds = []
     for axis in range(3):
         some = np.flatnonzero(mask.any(axis=tuple(other for other in range(3) if other != axis)))
@@ -173,7 +173,7 @@ def _paste(
 ) -> None:
     """Copy an occupancy's blocks, or masks into uint8, to an array that begins at the cell `first`.
 
-    `where`, of the array's shape, says what of it to copy.
+    `where`, of the array's shape, selects the copied part.
     """
     values = source.masks if held.dtype == np.uint8 else source.blocks
     per_brick = values.shape[0] // source.codes.shape[0]

@@ -75,7 +75,7 @@ class Renderer:
         coarse: bool = False,
         proceed: Callable[[], None] | None = None,
     ) -> Renderer:
-        """A renderer of the same field under other edits; what they share with these is kept.
+        """Renderer of the same field under other edits; shared results are reused.
 
         `coarse` finds the occupancy of the edited space by many cells at a time: ready sooner, same picture.
         `proceed` is called now and then, and gives the renderer up by raising.

@@ -1,13 +1,15 @@
 """The flow of a shell for many points with their Jacobians, in float32, for CPUs (Numba).
 
-The march of `flow_shell.FlowShell`, in Z, the affine coordinates of the outer cage; `flow_table` says what
-the table holds, and its knots say where the flow goes: from 0 to 1 it takes canonical points to deformed
+The march of `flow_shell.FlowShell`, in Z, the affine coordinates of the outer cage; `flow_table` has the
+layout of the table, and its knots give the direction of the flow: from 0 to 1 it takes canonical points to
+deformed
 space. D is dZ/dp of the way so far; with the velocity w V, dD/dt = w (dV/dZ) D + V (dw/dZ D).
 
-Points are taken `LANES` at a time: the innermost loops run over them, have no branches, and all that they
-work on lies in one buffer at constant offsets, so that compilers use vector instructions. Coordinates of bent
-cages are followed by Newton's method from those of the last stage, `newton_steps` a stage; what these do not
-suffice for is marked as lost.
+Points are taken `LANES` at a time: the innermost loops run over them, have no branches, and all their
+data lie in one buffer at constant offsets, so that compilers use vector instructions. Coordinates of bent
+cages are followed by Newton's method from those of the last stage, `newton_steps` a stage; points that need
+more
+are marked as lost.
 
 The oracle is `FlowShell.to_deformed`; of the velocity in it, `warps.flow_velocity`.
 """

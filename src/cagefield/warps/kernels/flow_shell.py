@@ -1,6 +1,7 @@
 """The flow shell for one sample, inside Quadrants kernels, in float32, from a table of the cage's motion.
 
-Everything is done in Z, the affine coordinates of the outer cage; `flow_table` says what the table holds. The
+Everything is done in Z, the affine coordinates of the outer cage; `flow_table` has the layout of the table.
+The
 oracle, and the mathematics, are in `flow_shell`.
 """
 

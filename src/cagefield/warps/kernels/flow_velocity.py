@@ -1,7 +1,8 @@
 """The velocity of the flow shell for one sample, inside Quadrants kernels, in float32.
 
-In Z, the affine coordinates of the outer cage, from a table of the cage's motion (`flow_table`). The same in
-plain numbers, for loops that compilers vectorise: `flow_velocity_simd`. The oracle of both, and the
+In Z, the affine coordinates of the outer cage, from a table of the cage's motion (`flow_table`).
+`flow_velocity_simd` has the
+same functions on plain numbers, for loops that compilers vectorize. The oracle of both, and the
 mathematics, are in `warps.flow_velocity`.
 """
 
@@ -103,7 +104,8 @@ def velocity(
 def straighten(y: vec3, start: vec3, lattice: qd.template(), K: qd.i32, precise: qd.template()):
     """xi with y(xi) = y for the form at a row of the table, to rounding or (not precise) to 1e-5.
 
-    Newton's method, its steps halved where they fail; what is stuck at a kink is tried again from elsewhere.
+    Newton's method, its steps halved where they fail; a point stuck at a kink is tried again from another
+    start.
     """
     xi = start
     enough = qd.static(3e-7 if precise else 1e-5) * (1.0 + qd.abs(y).max())

@@ -12,7 +12,7 @@ from cagefield.compute.quadrants import qd
 NEAR = 2e-5
 """Distances to the outer cage's faces, as shares of its half-width, are taken to be no less than this.
 
-Its eighth power, at the outer cage's edges, is what float32 still has room for.
+Its eighth power, at the outer cage's edges, is still a normal float32.
 """
 
 

@@ -4,10 +4,11 @@ Notation: at a pixel, splat k (near to far) has alpha a_k = o exp(-d^T Q d / 2),
 projected mean, d^T Q d = A (x + k y)^2 + D y^2. With T_k the product of (1 - a_j) over the nearer ones and
 w_k = a_k T_k, the pixel's colour is sum_k w_k c_k + T b, b the background.
 
-One flat loop over the pixels of the rows that a splat reaches is what vectorises: state lies in one buffer at
+One flat loop over the pixels of the rows that a splat reaches vectorizes: state lies in one buffer at
 constant offsets, exp is a polynomial, and there are selections in place of branches. A tile is left once all
-its pixels let less than T_MIN through. Gradients go front to back too: what is behind splat k is the pixel's
-colour less what has been passed. Each (tile, splat) pair writes its own sums; no two write to one place.
+its pixels let less than T_MIN through. Gradients go front to back too: the color behind splat k is the
+pixel's
+color less the accumulated one. Each (tile, splat) pair writes its own sums; no two write to one place.
 
 The oracle is `cagefield.rendering.splats.reference_rasterizer.blend`.
 

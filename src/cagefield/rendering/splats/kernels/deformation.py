@@ -23,8 +23,9 @@ BLOCK = 1024
 """Splats that a thread takes at a time."""
 
 ROUNDING = 2e-7
-"""Added to the variances, as a share of the largest one: more than what rounding to float32 may take from the
-smallest, so that the covariance of a flat splat stays positive."""
+"""Increment of the variances, as a share of the largest one: above the float32 rounding error of the
+smallest,
+so that the covariance of a flat splat stays positive."""
 
 
 @njit(parallel=True, **PLAIN)
@@ -63,7 +64,7 @@ def within_reach(points, numbers, log_scales, low, high, reach, least, stretch, 
 
 @njit(parallel=True, **PLAIN)
 def within_reach_at_rest(means, left, log_scales, low, high, reach, least, stretch, found):
-    """The same for splats in their own places [N], but for those that have left them."""
+    """Mark splats [N] within reach at their canonical positions, except those that have left them."""
     for n in prange(len(means)):
         x, y, z = float(means[n, 0]), float(means[n, 1]), float(means[n, 2])
         found[n] = not left[n] and reaches(x, y, z, log_scales, n, stretch, low, high, reach, least)
@@ -136,7 +137,7 @@ def polar_rotation(J, R):
 
 @njit(parallel=True, **PLAIN)
 def deform(source, jacobian, quaternions, log_scales, covariances, rotations, growth):
-    """Writes what J [M,3,3] makes of the splats with numbers `source` [M].
+    """Write the deformation by J [M,3,3] of the splats with indices `source` [M].
 
     covariances [M,6] float32 (xx, xy, xz, yy, yz, zz); rotations [M,3,3] float32, R; growth [M],
     |det J|^(1/3).

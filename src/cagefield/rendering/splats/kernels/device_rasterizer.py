@@ -1,4 +1,4 @@
-"""Splats onto a picture on Quadrants' devices: what `splat_projection` and `splat_blending` do, for GPUs.
+"""Splat projection and blending on Quadrants' devices, for GPUs; see `projection` and `blending`.
 
 Notation and layouts (packed splats, sums, tiles) as there. One thread has one splat, or one pixel; a pixel is
 left once it lets less than T_MIN through, and pixels add to a pair's sums atomically. Everything is float32:

@@ -95,7 +95,8 @@ def project(
     """Packs every disc that the picture can show, with its sorting key (depth z) and box of tiles.
 
     packed [N,16]: 0-1 mean (pixel centres at whole numbers), 2-4 A, k, D, 5 opacity, 6-8 colour, 9
-    half-height of what is above ALPHA_MIN, 10 depth z, 11-12 e, f, 13-15 normal. tangents [N,6]: a, b in the
+    half-height of the region above ALPHA_MIN, 10 depth z, 11-12 e, f, 13-15 normal. tangents [N,6]: a, b in
+    the
     world. The rest as `splat_projection.project`.
     """
     across = (size[0] + TILE - 1) // TILE

@@ -39,7 +39,8 @@ PINHOLE, OPENCV, FISHEYE = 0, 1, 2
 PACKED = 16
 """Floats a packed splat has, one cache line: 0-1 mean (pixel centres at whole numbers), 2-4 conic A, k, D
 (the quadratic form is A (x + k y)^2 + D y^2: no difference of large numbers far from the mean), 5 opacity,
-6-8 colour, 9 half-height of what is above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its slope
+6-8 colour, 9 half-height of the region above ALPHA_MIN, 10 distance along the ray at the mean, 11-12 its
+slope
 per pixel, 13-15 normal."""
 
 SLOPE_BLUR = 0.02

@@ -1,12 +1,12 @@
-"""Clusters of neighbouring splats: their boxes, which ones are in sight, what stands for a group (Numba).
+"""Level of detail of splats: clusters, their boxes and visibility, representatives of groups (Numba).
 
 Notation: C is a splat's covariance, o its opacity, A = sqrt(I2(C)) its area, with I2 the sum of the
-principal minors of C: the root of what the square of its projected area is on average, times sqrt(3). Its
+principal minors of C: the root of the mean square of its projected area, times sqrt(3). Its
 picture takes the optical depth 2 pi Li2(o) a from the light, a the area of its projection, Li2 the
 dilogarithm: the integral of -log(1 - o exp(-r^2 / 2)) over the plane.
 
 A group's representative keeps the moments of its splats, weighted by w = Li2(o) A: mean, covariance (with
-what the means are apart), colour, and its optical depth, as if all projected areas a were in the proportion
+the spread of the means), color, and its optical depth, as if all projected areas a were in the proportion
 of the areas A. Its opacity follows from the depth per screen area: see `splat_projection.project`.
 
 The oracle is in the tests: sums over the groups in float64, and every splat projected.
@@ -152,9 +152,9 @@ def merge(
     out_masses,
     out_apart,
 ):
-    """Writes what stands for each `size` splats of `order`.
+    """Write the representatives of each `size` consecutive splats of `order`.
 
-    masses [N,2] of what is merged: sum of w over its own area, sum of Li2(o), or no rows for splats.
+    masses [N,2] of the merged elements: sum of w over its own area, sum of Li2(o), or no rows for splats.
     out_apart [M]: rms distance of the means from the representative's.
     """
     terms = sh.shape[1]

@@ -70,7 +70,7 @@ def disc_overlaps(p, across, down):
 def bin_pairs(order, tiles, packed, discs, across, starts, ids, firsts, slots):
     """Pairs (tile, splat), near to far within each tile, by a counting sort; returns their number.
 
-    `discs`: what is packed are those of `splat_discs`.
+    `discs`: the packed elements are discs.
     `ids[starts[t]:starts[t+1]]` are the splats of tile t; `slots[firsts[q]:firsts[q+1]]` are the places in
     `ids` of the splat order[q].
     """

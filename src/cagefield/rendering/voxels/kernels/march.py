@@ -1,7 +1,7 @@
 """The fused renderer of a VoxelField: one march per ray, empty space leapt over, early stop.
 
 Samples lie at t_in + (k + 1/2) h along each ray, h = `step` voxels; leaps move by whole steps, so that the
-picture does not depend on what was skipped. In a contracted field the step is `step` voxels of contracted
+image does not depend on skipped space. In a contracted field the step is `step` voxels of contracted
 length, so it grows with distance; the march ends half a voxel before infinity.
 """
 
@@ -71,7 +71,8 @@ class TileArgs:
 
 @dataclass(frozen=True, eq=False)
 class MarchArgs:
-    """How rays are marched: step and nearest distance, in units of t, and what is worked out of a sample."""
+    """How rays are marched: step and nearest distance, in units of t, and the values computed for a
+    sample."""
 
     step: qd.f32
     near: qd.f32

@@ -1,4 +1,4 @@
-"""What of a canonical field lies within reach of a point, inside Quadrants kernels.
+"""Occupancy of a canonical field within reach of a point, inside Quadrants kernels.
 
 Points and reaches r are in grid coordinates; all of the box [point - r, point + r] is searched.
 """
