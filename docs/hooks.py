@@ -1,4 +1,4 @@
-"""Pages of the site that lie outside `docs`: the benchmarks' tables, how to contribute, the changelog."""
+"""Pages of the site outside `docs`: tables of benchmarks, contributing, releasing, the changelog."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[1]
-OUTSIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md", "benchmarks/results/*.md")
+OUTSIDE = (
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "RELEASING.md",
+    "benchmarks/README.md",
+    "benchmarks/results/*.md",
+)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import inspect
 import re
 from html import unescape
@@ -85,17 +86,27 @@ def test_formatter_leaves_markdown_alone() -> None:
 
 
 def resolved(name: str) -> object:
-    """Object of a dotted name: the longest importable module, then its attributes."""
+    """Object of a dotted name: the longest importable module, then its attributes.
+
+    Raises ModuleNotFoundError where the module needs a package that is not installed.
+    """
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
         try:
             found: object = importlib.import_module(".".join(parts[:count]))
-        except ModuleNotFoundError:
+        except ModuleNotFoundError as error:
+            if not (error.name or "").startswith("cagefield"):
+                raise
             continue
         for part in parts[count:]:
             found = getattr(found, part)
         return found
     raise ModuleNotFoundError(name)
+
+
+def lacks_torch(name: str) -> bool:
+    """Whether a name needs PyTorch (extra nerf) and PyTorch is not installed."""
+    return ".nerf." in name and importlib.util.find_spec("torch") is None
 
 
 def promised_names() -> list[str]:
@@ -108,6 +119,8 @@ def promised_names() -> list[str]:
 
 @pytest.mark.parametrize("name", promised_names())
 def test_promised_names_are_importable(name: str) -> None:
+    if lacks_torch(name):
+        pytest.skip("PyTorch is not installed (extra nerf)")
     found = resolved(name)
     assert inspect.isclass(found) or inspect.isfunction(found)
     assert found.__doc__, f"{name} has no docstring"
@@ -121,8 +134,10 @@ def test_package_of_a_reference_page_exports_its_names(page: Path) -> None:
         if package == "cagefield.compute":
             continue  # used by the name of its module: `devices.start`
         module = importlib.import_module(package)
+        assert leaf in dir(module), f"{package} does not list {leaf}"
+        if lacks_torch(name):
+            continue
         assert getattr(module, leaf, None) is resolved(name), f"{package} does not export {leaf}"
-        assert leaf in dir(module)
 
 
 def test_names_of_the_index_are_exports_of_cagefield() -> None:
@@ -141,4 +156,4 @@ def test_functions_of_python_page_are_exports() -> None:
     promised = set(re.findall(r"`(train_\w+)`", text.partition("## Training")[2]))
     assert promised == {"train_voxel", "train_splat", "train_nerf"}
     assert promised <= set(training.__all__)
-    assert all(inspect.isfunction(getattr(training, name)) for name in promised)
+    assert {inspect.isfunction(getattr(training, name)) for name in promised - {"train_nerf"}} == {True}
