@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import shutil
-import sqlite3
 import subprocess
 import sys
 import tracemalloc
@@ -20,10 +18,10 @@ import pytest
 from PIL import Image
 
 from cagefield.datasets import load_dataset
-from cagefield.datasets.raw_photos import RawPhoto, upright
+from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.datasets.sfm import colmap_process, features, sfm_workspace, structure_from_motion
 from cagefield.datasets.sfm.colmap_process import StoppedError
-from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.database_check import recorded_digest
 from cagefield.datasets.sfm.sfm_workspace import (
     plainly_named,
     prepare_work,
@@ -31,7 +29,7 @@ from cagefield.datasets.sfm.sfm_workspace import (
     work_folder,
     work_photos,
 )
-from cagefield.datasets.sfm.structure_from_motion import camera_guesses, make_poses
+from cagefield.datasets.sfm.structure_from_motion import make_poses
 from cagefield.errors import DatasetError
 from posed_photos import photos_alone
 
@@ -111,7 +109,8 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
 
         patch.setattr(structure_from_motion, "match", stops)
         with pytest.raises(
-            StoppedError, match=r"No space left.*is kept in .*data\.work, the same command continues$"
+            StoppedError,
+            match=r"No space left.*is kept in .*data\.work, the same command continues; if it stops there",
         ):
             make_poses(photos, target)
     assert not target.exists()
@@ -122,150 +121,93 @@ def test_a_stop_says_what_is_kept_and_the_same_command_continues(
 
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with `photos`, and in `data.work` what a run of them that was stopped at the matches left."""
-    return _stopped_at("match", tmp_path_factory.mktemp("stopped"))
-
-
-@pytest.fixture(scope="module")
-def matched(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same of a run that was stopped after the matches."""
-    return _stopped_at("reconstruct", tmp_path_factory.mktemp("matched"))
-
-
-def _stopped_at(step: str, folder: Path) -> Path:
+    """A folder with `photos`, and the `data.work` of a run of them that was stopped after the matches."""
+    folder = tmp_path_factory.mktemp("stopped")
     photos_alone(folder / "photos")
 
     def stops(*args: Any, **options: Any) -> None:
         raise OSError(errno.EIO, "Input/output error")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(structure_from_motion, step, stops)
+        patch.setattr(structure_from_motion, "reconstruct", stops)
         with pytest.raises(StoppedError):
             make_poses(folder / "photos", folder / "data")
     return folder
 
 
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        (lambda whole: whole[: len(whole) // 2], "malformed"),
-        (lambda whole: b"no database at all" * 999, "file is not a database"),
-        (lambda whole: b"", "it holds no photos"),
-        (lambda whole: whole[:50], ""),
-        (lambda whole: whole.replace(b"000001.png", b"000009.png"), "it is of other photos"),
-        (lambda whole: whole[:4096] + bytes(len(whole) - 4096), ""),
-    ],
-    ids=["cut off", "garbage", "empty", "head", "other photos", "zeros"],
-)
-def test_a_damaged_database_is_made_anew(
-    stopped: Path, tmp_path: Path, damage: Callable[[bytes], bytes], reason: str
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut off": lambda whole: whole[: len(whole) // 2],
+    "garbage": lambda whole: b"no database at all" * 999,
+    "empty": lambda whole: b"",
+    "head": lambda whole: whole[:50],
+    "other photos": lambda whole: whole.replace(b"000001.png", b"000009.png"),
+    "zeros": lambda whole: whole[:4096] + bytes(len(whole) - 4096),
+    "one bit": lambda whole: whole[:-1] + bytes([whole[-1] ^ 1]),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_database_that_is_damaged_after_a_stop_is_made_anew(
+    stopped: Path, tmp_path: Path, name: str
 ) -> None:
     folder = tmp_path / "run"
     shutil.copytree(stopped, folder)
     database = folder / "data.work" / "database.db"
-    database.write_bytes(damage(database.read_bytes()))
-    with pytest.warns(UserWarning, match=rf"database\.db is damaged \(.*{reason}.*; features and"):
+    database.write_bytes(DAMAGES[name](database.read_bytes()))
+    with pytest.warns(UserWarning, match=r"database\.db is damaged \(its digest is another\); features and"):
         assert make_poses(folder / "photos", folder / "data").placed == 4
     assert not database.parent.exists()
 
 
-def expected(folder: Path) -> tuple[list[Any], list[features.Photo]]:
-    """The cameras and the photos that the database of a stopped run must be of."""
-    names = sorted(file.name for file in (folder / "data.work" / "colmap").iterdir())
-    photos = [upright(file, file.name, folder) for file in sorted((folder / "photos").iterdir())]
-    cameras, shared = camera_guesses(photos)
-    return cameras, [features.Photo(*each) for each in zip(names, shared, strict=True)]
-
-
-WRONG = {
-    "descriptors of another length": (
-        "UPDATE descriptors SET cols = 64, data = substr(data, 1, 64 * rows)",
-        "descriptors are .* x 64 numbers in",
-    ),
-    "fewer descriptors": (
-        "UPDATE descriptors SET rows = 9, data = substr(data, 1, 9 * 128) WHERE image_id = 2",
-        "photo 2 has .* features, and 9 are described",
-    ),
-    "descriptors of another type": ("UPDATE descriptors SET type = 7", "features are of another type"),
-    "a number for an array": ("UPDATE descriptors SET data = 5", "numbers in 1 bytes"),
-    "less than it says": ("UPDATE keypoints SET rows = 1000000000", "keypoints are 1000000000 x"),
-    "less than nothing": ("UPDATE keypoints SET rows = -1", "keypoints are -1 x"),
-    "no places": ("UPDATE keypoints SET data = replace(hex(data), '', '')", "keypoints are no numbers"),
-    "features of nobody": ("UPDATE keypoints SET image_id = 77 WHERE image_id = 2", "of other photos"),
-    "no cameras": ("DELETE FROM cameras", "it is of other photos"),
-    "a camera without a width": ("UPDATE cameras SET width = 0", "it is of other photos"),
-    "a rig of nothing": ("UPDATE rigs SET ref_sensor_id = 77", "it is of other photos"),
-    "a frame of nothing": ("UPDATE frames SET rig_id = 77", "it is of other photos"),
-    "no frames": ("DROP TABLE frame_data", "no such table"),
-    "cameras that move together": ("INSERT INTO rig_sensors VALUES (1, 5, 0, NULL)", "that move together"),
-    "matches of nobody": (
-        "UPDATE two_view_geometries SET pair_id = pair_id + 50 * 2147483647 WHERE pair_id = 2147483649",
-        "it has matches of other photos",
-    ),
-    "wide matches": (
-        "UPDATE two_view_geometries SET cols = 1, rows = 2 * rows",
-        "two_view_geometries are .* x 1",
-    ),
-    "half a matrix": ("UPDATE two_view_geometries SET F = x'00'", "F of a pair is no matrix"),
-}
-"""SQL that damages a database, and what is said of it; without the check COLMAP's process ended at some."""
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_a_database_that_makes_no_sense_is_removed(matched: Path, tmp_path: Path, name: str) -> None:
-    database = tmp_path / "database.db"
-    shutil.copy(matched / "data.work" / "database.db", database)
-    sql, reason = WRONG[name]
-    with contextlib.closing(sqlite3.connect(database)) as opened:
-        opened.execute(sql)
-        opened.commit()
-    with pytest.warns(UserWarning, match=rf"database\.db is damaged \(.*{reason}.*; features and"):
-        check_database(database, *expected(matched))
-    assert not database.exists()
-
-
-def test_features_that_are_nowhere_and_matches_of_none(matched: Path, tmp_path: Path) -> None:
-    """Numbers that are none kept COLMAP busy for ever; it reads what matches point at without looking."""
-    for table, key, reason in (
-        ("keypoints", 2, "features of photo 2 have no places"),
-        ("two_view_geometries", 2147483649, "photos 1 and 2 match in features that are not there"),
-        ("matches", 2147483649, "photos 1 and 2 match in features that are not there"),
-    ):
-        database = tmp_path / f"{table}.db"
-        shutil.copy(matched / "data.work" / "database.db", database)
-        with contextlib.closing(sqlite3.connect(database)) as opened:
-            name = "image_id" if table == "keypoints" else "pair_id"
-            opened.execute(f"UPDATE {table} SET data = zeroblob(length(data)) WHERE {name} = {key}")
-            opened.commit()
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                check_database(database, *expected(matched))  # zeros make sense
-            length = opened.execute(f"SELECT length(data) FROM {table} WHERE {name} = {key}").fetchone()[0]
-            opened.execute(f"UPDATE {table} SET data = ? WHERE {name} = {key}", (b"\xff" * length,))
-            opened.commit()
-        with pytest.warns(UserWarning, match=reason):
-            check_database(database, *expected(matched))
-
-
-def test_a_database_of_wrong_matches_heals(matched: Path, tmp_path: Path) -> None:
-    """A run goes to its end where COLMAP's process ended."""
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("cut off", "malformed"),
+        ("garbage", "file is not a database"),
+        ("empty", "no such table"),
+        ("head", ""),
+        ("zeros", ""),
+    ],
+)
+def test_a_damaged_database_of_a_killed_run_is_made_anew(
+    stopped: Path, tmp_path: Path, name: str, reason: str
+) -> None:
+    """A kill leaves no digest: SQLite's own check decides."""
     folder = tmp_path / "run"
-    shutil.copytree(matched, folder)
-    with contextlib.closing(sqlite3.connect(folder / "data.work" / "database.db")) as opened:
-        opened.execute("UPDATE two_view_geometries SET cols = 0")
-        opened.commit()
-    with pytest.warns(UserWarning, match="two_view_geometries are .* x 0"):
+    shutil.copytree(stopped, folder)
+    database = folder / "data.work" / "database.db"
+    database.with_name("database.db.digest").unlink()
+    database.write_bytes(DAMAGES[name](database.read_bytes()))
+    with pytest.warns(UserWarning, match=rf"database\.db is damaged \(.*{reason}.*; features and"):
         assert make_poses(folder / "photos", folder / "data").placed == 4
 
 
-def test_a_database_that_is_whole_is_left(stopped: Path, tmp_path: Path) -> None:
-    database = tmp_path / "database.db"
-    shutil.copy(stopped / "data.work" / "database.db", database)
-    before = database.read_bytes()
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_database_that_is_whole_is_left(
+    stopped: Path, tmp_path: Path, killed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The next run finds the features and the matches of the last one, and makes no database."""
+    folder = tmp_path / "run"
+    shutil.copytree(stopped, folder)
+    if killed:
+        (folder / "data.work" / "database.db.digest").unlink()
+    monkeypatch.setattr(features, "create_database", None)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_database(database, *expected(stopped))
-    assert database.read_bytes() == before
+        assert make_poses(folder / "photos", folder / "data").placed == 4
+
+
+def test_a_run_that_is_killed_leaves_no_digest(tmp_path: Path) -> None:
+    """The digest of the last stop is of a database that goes on changing."""
+    database = tmp_path / "database.db"
+    database.write_bytes(b"features")
+    note = tmp_path / "database.db.digest"
+    with pytest.raises(KeyboardInterrupt), recorded_digest(database):
+        raise KeyboardInterrupt
+    assert note.is_file()
+    with recorded_digest(database):
+        assert not note.exists()
+    assert not note.exists()
 
 
 def test_a_database_that_may_not_be_written_says_what_helps(

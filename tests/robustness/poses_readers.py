@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import warnings
@@ -14,7 +15,7 @@ from reader_seeds import Reader
 
 from cagefield.datasets import raw_photos
 from cagefield.datasets.sfm import registration_report, sfm_workspace, sparse_points, structure_from_motion
-from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.database_check import check_database, recorded_digest
 from cagefield.datasets.sfm.features import Photo
 from cagefield.errors import CagefieldError
 from cagefield.images.video import encoder, is_ours
@@ -117,20 +118,26 @@ def _make_database(count: int, folder: Path) -> None:
             geometry.inlier_matches = pairs
             geometry.config = pycolmap.TwoViewGeometryConfiguration.CALIBRATED
             database.write_two_view_geometry(first, second, geometry)
+    with contextlib.suppress(InterruptedError), recorded_digest(folder / "database.db"):
+        raise InterruptedError
 
 
 def _read_database(folder: Path) -> None:
+    """A copy of the database: COLMAP writes into a database that it opens."""
     from cagefield.datasets.sfm import features
 
-    for journal in folder.glob("database.db-*"):
-        journal.unlink()
+    database = folder / "run" / "database.db"
+    shutil.rmtree(database.parent, ignore_errors=True)
+    database.parent.mkdir()
+    for name in ("database.db", "database.db.digest"):
+        shutil.copyfile(folder / name, database.parent / name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        check_database(folder / "database.db", *_cameras_and_photos())
-    if not (folder / "database.db").exists():
+        check_database(database)
+    if not database.exists():
         raise CagefieldError("it is damaged, and the features are found again")
-    features.likely_pairs(folder / "database.db", 3)
-    registration_report.verified_matches(folder / "database.db", 3)
+    features.likely_pairs(database, 3)
+    registration_report.verified_matches(database, 3)
 
 
 def _make_video(folder: Path) -> None:

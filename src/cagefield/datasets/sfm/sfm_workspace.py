@@ -28,6 +28,9 @@ from cagefield.files.atomic import replaced_file, replaced_folder
 from cagefield.files.safe_open import read_bytes
 from cagefield.files.stale_files import hidden_name, remove_leftovers
 
+DATABASE = "database.db"
+"""Name of COLMAP's database of features and matches in the work folder."""
+
 _VERSION = 1
 
 _PLAIN = rb"[ !#-\[\]-~]*"
@@ -111,7 +114,8 @@ def kept_work(work: Path) -> Iterator[None]:
             raise
         reason = line_of(error) if isinstance(error, OSError) else str(error)
         raise StoppedError(
-            f"{reason}; what is done so far is kept in {work}, the same command continues"
+            f"{reason}; what is done so far is kept in {work}, the same command continues; "
+            "if it stops there again, remove that folder"
         ) from error
 
 
@@ -184,7 +188,7 @@ def _is_within(name: str) -> bool:
 
 def _remove_features(work: Path) -> None:
     """Removes what was made of a list of photos: their copies for COLMAP, and its database."""
-    for file in work.glob("database.db*"):
+    for file in work.glob(f"{DATABASE}*"):
         file.unlink()
     for name in ("colmap", "masks"):
         shutil.rmtree(work / name, ignore_errors=True)

@@ -25,12 +25,13 @@ from cagefield.datasets.colmap.colmap_lenses import lens_views
 from cagefield.datasets.colmap.colmap_model import pose_of
 from cagefield.datasets.raw_photos import RawPhoto
 from cagefield.datasets.sfm import disambiguation, features, moving_features
-from cagefield.datasets.sfm.database_check import check_database
+from cagefield.datasets.sfm.database_check import check_database, recorded_digest
 from cagefield.datasets.sfm.features import OnProgress, Photo
 from cagefield.datasets.sfm.matching import match
 from cagefield.datasets.sfm.raw_masks import VALID_FOLDER
 from cagefield.datasets.sfm.registration_report import Matches, reasons_left_out, verified_matches, why_none
 from cagefield.datasets.sfm.sfm_workspace import (
+    DATABASE,
     kept_work,
     plainly_named,
     prepare_work,
@@ -108,7 +109,10 @@ def make_poses(
     recover_folder(target, lambda folder: (folder / RECORD).is_file())
     work = work_folder(target)
     with kept_work(work):
-        report = _made(source, target, record, frames, masks, seed, on_progress)
+        prepare_work(work, record)
+        check_database(work / DATABASE)
+        with recorded_digest(work / DATABASE):
+            report = _made(source, target, record, frames, masks, seed, on_progress)
     remove_work(work)
     features.share(on_progress, 0.0, 1.0)(1.0, f"{report.placed} of {report.total} photos")
     return report
@@ -124,18 +128,16 @@ def _made(
     on_progress: OnProgress | None,
 ) -> PosesReport:
     work = work_folder(target)
-    prepare_work(work, record)
     photos, unreadable = work_photos(source, work, frames, features.share(on_progress, 0.0, 0.1), masks)
     total = len(photos) + len(unreadable)
     if len(photos) < 3:
         reasons = "".join(f"; {name}: {reason}" for name, reason in list(unreadable.items())[:3])
         raise DatasetError(f"{source}: {len(photos)} photos can be read, at least 3 are needed{reasons}")
     names = plainly_named(photos, work)
-    database = work / "database.db"
-    cameras, shared = camera_guesses(photos)
-    listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
-    check_database(database, cameras, listed)
+    database = work / DATABASE
     if not database.is_file():
+        cameras, shared = camera_guesses(photos)
+        listed = [Photo(n, c) for n, c in zip(names, shared, strict=True)]
         features.create_database(database, cameras, listed)
     plain_masks = work / "masks"
     features.extract(
@@ -259,7 +261,7 @@ def unfolded_models(
     Photos in order are placed by their neighbours alone first; where that contradicts pairs further apart,
     these are left out, unless fewer photos, or with as many fewer points, come of it.
     """
-    count, database = len(matches.counts), work / "database.db"
+    count, database = len(matches.counts), work / DATABASE
     if not disambiguation.are_in_order(matches.counts):
         return _map(work, database, count, seed, on_progress), database
     far = disambiguation.far_pairs(matches.counts)
