@@ -70,7 +70,7 @@ def trained_problem(folder: Path, said: int) -> str | None:
 
 
 def pictures_problem(folder: Path, said: int) -> str | None:
-    """What is wrong with pictures over old ones of 4 x 4 pixels: all old, or all new and 32 pixels wide."""
+    """What is wrong with pictures over old ones of 4 x 4 pixels: each old, or new and 32 pixels wide."""
     from cagefield.images.image_files import read_image
 
     out = folder / "out"
@@ -83,9 +83,8 @@ def pictures_problem(folder: Path, said: int) -> str | None:
         sizes = {max(read_image(picture).shape[:2]) for picture in pictures}
     except Exception as error:
         return f"unreadable: {error}"
-    if sizes == {4} and said < 1:
-        return None
-    return None if sizes == {32} else f"lost: pictures {sorted(sizes)} pixels wide"
+    is_whole = sizes == {32} if said >= 1 else sizes <= {4, 32}
+    return None if is_whole else f"lost: pictures {sorted(sizes)} pixels wide"
 
 
 def video_problem(folder: Path, said: int) -> str | None:

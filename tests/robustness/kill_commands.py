@@ -216,9 +216,6 @@ def _poses_of_video(folder: Path, say: Say) -> None:
     say(1)
 
 
-_pictures = Command(_make_pictures, _render, pictures_problem)
-
-
 def _make_verified(folder: Path) -> None:
     make_scene("chair", folder / "photos", views=3, size=16, test_views=1)
     write_transforms(load_dataset(folder / "photos"), folder / "data")
@@ -250,7 +247,7 @@ COMMANDS: dict[str, Command] = {
 
 SLOW_COMMANDS: dict[str, Command] = {
     "train": Command(_make_photos, _train, trained_problem),
-    "render, pictures": _pictures,
+    "render, pictures": Command(_make_pictures, _render, pictures_problem),
     "render .mp4": Command(put_scene, _render_video, video_problem),
     "bake": Command(put_splats, _bake, trained_problem),
     "export --as mesh": Command(put_scene, _mesh, glb_problem("mesh.glb")),
@@ -260,7 +257,6 @@ SLOW_COMMANDS: dict[str, Command] = {
     "poses of a video": Command(_make_posed_video, _poses_of_video, poses_problem),
     "poses of a data set": _verifying,
     "poses of a data set, renames": renamed(_verifying, "data"),
-    "render, pictures, renames": renamed(_pictures, "out"),
     **SLOW_LINES,
 }
 """Others: seconds for each kill."""

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import write_points
+from kill_command import renamed
 from kill_points import Ended, Say, adopted, children, forked
 from kills import COMMANDS, SLOW_COMMANDS, Killed, calls_of, hidden, kill
 
@@ -128,19 +129,24 @@ def test_what_would_be_lost_is_seen(tmp_path: Path) -> None:
 
 
 def test_pictures_and_files_that_would_be_lost_are_seen(tmp_path: Path) -> None:
-    """Pictures of which some are new, an old file that is gone or cut off, a folder that nobody put aside."""
-    command, renamed = SLOW_COMMANDS["render, pictures"], SLOW_COMMANDS["render, pictures, renames"]
+    """Pictures neither old nor new, old ones at the end, files gone or cut off, a folder put aside."""
+    command = SLOW_COMMANDS["render, pictures"]
     command.make(tmp_path)
     assert command.check(tmp_path, 0) is None
     assert (command.check(tmp_path, 1) or "").startswith("lost: pictures")
     write_png(tmp_path / "out" / "0001.png", np.zeros((32, 32, 3), np.uint8))
-    assert command.check(tmp_path, 0) == "lost: pictures [4, 32] pixels wide"
+    assert command.check(tmp_path, 0) is None
+    assert command.check(tmp_path, 1) == "lost: pictures [4, 32] pixels wide"
+    write_png(tmp_path / "out" / "0002.png", np.zeros((16, 16, 3), np.uint8))
+    assert command.check(tmp_path, 0) == "lost: pictures [4, 16, 32] pixels wide"
+    write_png(tmp_path / "out" / "0002.png", np.zeros((4, 4, 3), np.uint8))
     aside = tmp_path / hidden_name(tmp_path / "out", "old").replace(f"-{os.getpid()}-", "-999999999-")
     (tmp_path / "out").rename(aside)
     assert command.check(tmp_path, 0) == "lost: the user's file"
-    assert renamed.check(tmp_path, 0) is None and renamed.check(tmp_path, 1) is not None
+    aside_too = renamed(command, "out")
+    assert aside_too.check(tmp_path, 0) is None and aside_too.check(tmp_path, 1) is not None
     shutil.rmtree(aside)
-    assert renamed.check(tmp_path, 0) == "lost: the folder"
+    assert aside_too.check(tmp_path, 0) == "lost: the folder"
     converted = COMMANDS["convert .sog"]
     (tmp_path / "b").mkdir()
     converted.make(tmp_path / "b")

@@ -14,9 +14,6 @@ from pathlib import Path
 from cagefield.files.rename_exchange import exchanged
 from cagefield.files.stale_files import hidden_name, is_hidden, put_aside, remove_leftovers
 
-MOST_LINKED = 100_000
-"""Files of a folder that another one takes over, at most: they get other names there."""
-
 
 def check_writable(path: Path, *, inside: bool = False) -> None:
     """Passes where a file or a folder may be made or replaced at `path`; its folder need not be there yet.
@@ -81,21 +78,16 @@ def _naming(path: Path, hidden: Path) -> Iterator[None]:
 
 @contextmanager
 def merged_folder(target: Path) -> Iterator[Path]:
-    """A folder to be filled with files that come into `target` together.
+    """A folder to be filled with files that go into `target` once all of them are written.
 
-    Where `target` holds something already, that is a hidden folder beside it, which takes its place with all
-    that it held under other names (`replaced_folder`); after a failure `target` is what it was. Where it must
-    stay the folder that it is (`_must_stay`), the hidden folder is in it, and its files take their places one
-    after another. Else it is `target` itself, not made yet or empty, and what has been written stays.
+    If `target` holds something, the files take their places one after another, each at once; after a failure
+    before that `target` is unchanged. Otherwise the folder is `target` itself, not made yet or empty, and
+    files stay there after a failure.
     """
     if not target.exists() or not any(target.iterdir()):
         yield target
         return
     target = target.resolve()
-    if not _must_stay(target):
-        with replaced_folder(target, None) as draft:
-            yield draft
-        return
     remove_leftovers(target, inside=True)
     draft = target / hidden_name(target, "new")
     with _naming(target, target):
@@ -109,49 +101,12 @@ def merged_folder(target: Path) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def _must_stay(folder: Path) -> bool:
-    """Whether no other folder can take a folder's place, with other names of the files in it.
-
-    Nothing may be made beside it, there are no links, somebody works in it, or it holds another file system,
-    what is another user's or may not be read or removed, or MOST_LINKED files and more.
-    """
-    if not os.access(folder.parent, os.W_OK | os.X_OK) or Path.cwd().is_relative_to(folder):
-        return True
-    if not _has_links(folder):
-        return True
-    count, device, may = 0, folder.parent.stat().st_dev, os.R_OK | os.W_OK | os.X_OK
-    users = {os.geteuid()} if hasattr(os, "geteuid") and os.geteuid() else None
-    for place, _, files in os.walk(folder):
-        if os.stat(place).st_dev != device or not os.access(place, may):
-            return True
-        count += len(files)
-        if count >= MOST_LINKED:
-            return True
-        if users and not users.issuperset(os.lstat(os.path.join(place, name)).st_uid for name in files):
-            return True
-    return False
-
-
-def _has_links(folder: Path) -> bool:
-    """Whether a file beside a folder can have two names."""
-    probe, other = (folder.with_name(hidden_name(folder, "part")) for _ in range(2))
-    try:
-        probe.touch(exist_ok=False)
-        os.link(probe, other)
-    except (OSError, NotImplementedError):
-        return False
-    finally:
-        for file in (probe, other):
-            file.unlink(missing_ok=True)
-    return True
-
-
 @contextmanager
-def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]:
+def replaced_folder(target: Path, own: Collection[str]) -> Iterator[Path]:
     """An empty folder beside `target` to be filled: takes its place on success, is removed on failure.
 
-    What `target` held under the names in `own`, None for those in the new folder, goes; other entries stand
-    in the new folder, which has its rights, when it takes its place. After a failure `target` is what it was.
+    Entries of `target` under the names in `own` go; other entries stand in the new folder, which has the
+    rights of `target`, when it takes its place. After a failure `target` is unchanged.
     Where the system can exchange two names at once there is a whole folder at `target` at every moment; else
     `recover_folder`, which whoever calls this has called, puts back what an end between two renames left. An
     OSError about the new folder, or about none (a full disk), names `target`. A `target` that is itself such
@@ -168,8 +123,6 @@ def replaced_folder(target: Path, own: Collection[str] | None) -> Iterator[Path]
     try:
         with _naming(target, draft):
             yield draft
-            if own is None:
-                own = {entry.name for entry in draft.iterdir()}
             others = _others(target, own)
             for entry in others:
                 _linked(entry, draft / entry.name)

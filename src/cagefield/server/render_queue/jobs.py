@@ -9,7 +9,6 @@ from pathlib import Path
 from cagefield.cameras.camera import Camera
 from cagefield.cameras.keyframes import Still, stills
 from cagefield.errors import CagefieldError
-from cagefield.files.atomic import recover_folder
 from cagefield.images.video import is_ours
 from cagefield.server.editor.document import Document
 from cagefield.server.editor.path_edits import blended
@@ -68,7 +67,6 @@ def test_views(
     """
     if not cameras:
         raise CagefieldError("the scene has no cameras to render from; record a camera path instead")
-    recover_folder(out, lambda folder: (folder / MARK).is_file())
     if out.exists() and not out.is_dir():
         raise CagefieldError(f"{out} is a file; give a folder for the pictures")
     if out.is_dir() and any(out.iterdir()):
