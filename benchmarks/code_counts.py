@@ -208,7 +208,7 @@ def counts(checkout: Path) -> list[tuple[str, str]]:
         ("docstring sentences", f"{total}"),
         (
             'docstring sentences with "what"',
-            f"{sum(what.values())} ({100 * sum(what.values()) / total:.1f} %)",
+            ('docstring sentences with "what"', f"{found.total()} ({share:.1f} %)"),
         ),
         (
             'docstring sentences that begin "What", "That", "Those", "The same"',
