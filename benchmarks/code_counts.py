@@ -206,10 +206,7 @@ def counts(checkout: Path) -> list[tuple[str, str]]:
         ("lines of `benchmarks`", f"{line_count(checkout / 'benchmarks', '*.py')}"),
         ("lines of `web`", f"{line_count(checkout / 'web', '*.ts')}"),
         ("docstring sentences", f"{total}"),
-        (
-            'docstring sentences with "what"',
-            ('docstring sentences with "what"', f"{found.total()} ({share:.1f} %)"),
-        ),
+        ('docstring sentences with "what"', f"{found.total()} ({share:.1f} %)"),
         (
             'docstring sentences that begin "What", "That", "Those", "The same"',
             f"{pronoun_starts(tree).total()}",

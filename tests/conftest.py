@@ -1,8 +1,13 @@
-"""What several test modules share."""
+"""Options, markers and fixtures that several test modules share.
+
+Markers by file: `browser`, `train` and `robust`, for `-m "not nightly and not browser and not train and not robust"`
+(the quick tier of contributors). `nightly` stands at the tests themselves.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -45,6 +50,23 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if config.getoption("--page-renderer"):
         editor_page.DRAWN_BY = "page"
+
+
+_MARKERS = {
+    "browser": r"test_(editor|page|field_page|exporting_page|exporting_splats)\w*\.py$",
+    "train": r"test_(training|cli_train|poses|pose_verification|folds|moving_features|repeated_views|matching"
+    r"|splat_fitting|captures|capture_variations|cli_export|resolution|free_space|nerf_scene|examples)\w*\.py$",
+    "robust": r"robustness/test_\w+\.py$|test_server_(access|floods|damage|vanishing)\w*\.py$",
+}
+"""Marker of the tests in files whose path matches."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Adds the markers of `_MARKERS`."""
+    for item in items:
+        for marker, pattern in _MARKERS.items():
+            if re.search(pattern, item.path.as_posix()):
+                item.add_marker(marker)
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,8 @@ from cagefield.errors import CagefieldError
 from cagefield.images.image_files import read_image
 from cagefield.training.voxels.voxel_config import VoxelConfig
 
+pytestmark = pytest.mark.nightly
+
 TINY = Settings(
     views=16,
     size=32,

@@ -21,6 +21,8 @@ from cagefield.scene.scene import Scene
 from cagefield.training.splats.splat_config import SplatConfig
 from splat_scenes import random_splats
 
+pytestmark = pytest.mark.nightly
+
 INNER = Cage.box((0, 0, 0), 0.9)
 CAMERA = Camera.look_at((2.6, -1.9, 1.4), (0, 0, 0), width=48, height=40, fov_x=0.75)
 EDITS = {

@@ -22,6 +22,8 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra ner
 from cagefield.rendering.nerf.nerf_renderer import render_nerf  # noqa: E402
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
 
+pytestmark = pytest.mark.nightly
+
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:

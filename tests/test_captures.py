@@ -60,6 +60,7 @@ def exact(further: float = 1.0, veil: float = 0.0, gain: float = 1.0) -> Learnt:
     return Learnt("exact", 7, 1.0, 1, show, before, edited)
 
 
+@pytest.mark.nightly
 def test_the_scene_itself_has_no_depth_error_and_no_fog(room):
     data = load_dataset(room)
     points = sighted_points(data)
@@ -262,6 +263,7 @@ def test_impossible_commands_are_refused(tmp_path, capsys, options, message):
     assert not out.exists()
 
 
+@pytest.mark.nightly
 def test_an_edit_that_is_right_loses_nothing_and_one_that_does_nothing_is_seen(room, monkeypatch):
     monkeypatch.setattr(room_edits, "_ROUNDS", 1)
     data = load_dataset(room)

@@ -15,6 +15,8 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets import View
 from cagefield.errors import CagefieldError
 
+pytestmark = pytest.mark.nightly
+
 WIDTH, HEIGHT = 61, 47
 
 

@@ -25,6 +25,8 @@ from cagefield.procedural.shapes import Box, Cylinder, Sphere
 from cagefield.procedural.textures import Plain
 from cagefield.rendering.reference_renderer import PointMap, intersect_box
 
+pytestmark = pytest.mark.nightly
+
 GREY = Plain((0.6, 0.5, 0.4))
 
 

@@ -32,6 +32,8 @@ from cagefield.edits.operations import MoveCorner, MoveEdge, MoveFace, Rotate, S
 from cagefield.errors import CagefieldError
 from scenes import TINY
 
+pytestmark = pytest.mark.nightly
+
 CONTINUOUS = [case for case in CASES if case.kind == "continuous"]
 
 

@@ -23,6 +23,8 @@ from cagefield.geometry.cage import Cage
 from cagefield.typing import Array
 from cagefield.warps.hexahedron_map import HexahedronMap
 
+pytestmark = pytest.mark.nightly
+
 INNER, OUTER = Cage.box((0, 0, 0), 0.6), Cage.box((0, 0, 0), 1.6)
 EDIT = Edit(INNER, OUTER)
 MOVED = EDIT.translate((0.1, 0.05, -0.05))

@@ -125,6 +125,7 @@ def test_perturbed_poses_are_adjusted_in_their_world_and_kept_for_next_time(capt
         verify_poses(wrong, cache=tmp_path)
 
 
+@pytest.mark.nightly
 def test_poses_of_other_photos_are_found_anew(capture):
     order = np.random.default_rng(2).permutation(len(capture.train))
     cameras = [capture.train[n].camera for n in order]
@@ -176,6 +177,7 @@ def test_scattered_focals_of_one_lens_are_shared_only_where_that_fits_as_well():
     assert not pose_verification._is_better(wrong, replace(right, median=4.0, capped=4.0), None)
 
 
+@pytest.mark.nightly
 def test_a_camera_for_each_photo_of_one_lens_becomes_one_camera(capture):
     """Focal lengths from .7 to 1.4 of the lens's, and distances that make up for them, as COLMAP has them."""
     rng = np.random.default_rng(5)

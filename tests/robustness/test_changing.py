@@ -224,6 +224,7 @@ def _field_of(worker: Worker, results: queue.Queue[Result]) -> object:
     return answer.value
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("becomes", ["another", "none", "the same"])
 def test_a_renderer_that_starts_again_shows_the_scene_that_was_opened(tmp_path: Path, becomes: str) -> None:
     """It read what was there then: another scene beneath the edits, and nobody was told."""

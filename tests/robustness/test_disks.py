@@ -67,6 +67,7 @@ def test_a_command_whose_writes_are_refused(source: Path, short: str) -> None:
     assert all(int(row[2]) > 2 and row[4:] == ["0"] * 4 for row in rows), done.stdout
 
 
+@pytest.mark.nightly
 def test_poses_on_a_full_disk(source: Path) -> None:
     """COLMAP's database fills the disk, over an old data set: that stays, and what is done is kept."""
     pytest.importorskip("pycolmap", reason="poses are found by pycolmap")

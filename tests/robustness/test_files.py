@@ -84,6 +84,7 @@ def test_archives_of_trainings_are_not_unpacked_beyond_their_size() -> None:
     assert (found.faults, found.tried) == ([], 3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["splat field", "training", "bmp", "poses.json"])
 def test_large_files_take_twice_as_much_at_most(name: str) -> None:
     """The benchmark does it for all that are large, and some hundred inputs: `files.py --large`."""

@@ -13,6 +13,8 @@ from floods import during, memory
 from editor_server import EditorServer, editor_server
 from scenes import ball_scene
 
+pytestmark = pytest.mark.nightly
+
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EditorServer]:

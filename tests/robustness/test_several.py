@@ -151,6 +151,7 @@ def test_a_second_server_says_who_has_the_scene_and_the_next_one_finds_all(scene
         assert "restored" in client.notice()["text"]
 
 
+@pytest.mark.nightly
 def test_a_page_that_was_away_for_an_hour(server: EditorServer, scene: Path) -> None:
     """It left amid a drag, and missed more changes than the history keeps; its edit is gone."""
     with page(server) as (away, _), page(server) as (there, _):

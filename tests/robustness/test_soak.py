@@ -8,10 +8,13 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import pytest
 from soak import Sample, Soak, sample
 
 from editor_server import EditorServer, editor_server
 from scenes import ball_scene
+
+pytestmark = pytest.mark.nightly
 
 
 def test_pages_leave_nothing_behind(tmp_path: Path) -> None:
