@@ -76,7 +76,9 @@ def trained_digger(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data = load_dataset(make_scene("digger", folder / "photos", views=20, size=80, test_views=1))
     result = train_voxel(
         data,
-        VoxelConfig(steps=240, resolution=64, batch_rays=2048, sh_degree=1, rate=(8.0, 2.0), smooth=2e-4),
+        VoxelConfig(
+            steps=240, resolution=64, batch_rays=2048, sh_degree=1, lr=(8.0, 2.0), laplacian_reg=2e-4
+        ),
     )
     Scene.trained(result, data).save(folder / "digger")
     return folder / "digger"

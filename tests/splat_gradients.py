@@ -17,7 +17,7 @@ from cagefield.rendering.splats.rasterizer import (
     tiled,
     world_to_camera,
 )
-from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS, chain
+from cagefield.training.splats.kernels.splat_backward import CURVATURES, GRADIENTS, backpropagate
 from splat_views import NEAR, single, splats_of
 
 Values = dict[str, NDArray]
@@ -42,7 +42,7 @@ def analytic(
     curvatures = np.zeros((len(splats), CURVATURES), np.float32)
     sums = seen.gradients(colour, slopes, stops)
     with kernels():
-        chain(
+        backpropagate(
             seen.order,
             seen.firsts,
             seen.slots,

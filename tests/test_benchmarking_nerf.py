@@ -31,7 +31,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_nerf_is_measured_by_its_exact_pictures(tmp_path: Path) -> None:
-    config = NerfConfig.small(width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop=3, steps=8)
+    config = NerfConfig.small(width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop_steps=3, steps=8)
     settings = Settings(8, 24, 2, config, exact_size=16, exact_views=1, discrete_views=1)
     bench = Workbench(settings, tmp_path)
     (score,) = measure(chosen(["microphone"], ["move_weight"]), bench)

@@ -25,7 +25,7 @@ from cagefield.images.image_files import read_image
 from cagefield.images.render_result import RenderResult
 from cagefield.procedural import capture, make_capture
 from cagefield.procedural.hand_held import picture
-from cagefield.training.evaluation import Evaluation, ViewFigures
+from cagefield.training.evaluation import Evaluation, ViewMetrics
 from commands import printed, refused
 
 
@@ -153,8 +153,8 @@ def test_unknown_fields_and_captures_without_held_out_photos_are_refused(room):
 def test_the_table_has_a_row_for_each_score_and_dashes_for_what_is_not_known():
     figures = DepthFigures(120, 0.0123, 0.2, 0.031)
     score = CaptureScore(
-        "beer", "splat", 62, 9, (360, 640), 300.4, 20000, Evaluation((ViewFigures("x", 29.0, 30.0, 0.9),)),
-        Evaluation((ViewFigures("b/y.jpg", 26.5, 27.5, 0.8), ViewFigures("b/z.jpg", 24.5, 25.5, 0.9))),
+        "beer", "splat", 62, 9, (360, 640), 300.4, 20000, Evaluation((ViewMetrics("x", 29.0, 30.0, 0.9),)),
+        Evaluation((ViewMetrics("b/y.jpg", 26.5, 27.5, 0.8), ViewMetrics("b/z.jpg", 24.5, 25.5, 0.9))),
         figures, DepthFigures(), 3, (4.125, 0.5), 3.21,
     )  # fmt: skip
     text = table([score], ["Machine: mine"]).markdown()

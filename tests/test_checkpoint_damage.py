@@ -71,7 +71,7 @@ COMMON = [
     (put("seconds", "3"), "seconds is 3"),
     (put("running_loss", -2.0), "running_loss is -2.0"),
     (put("gains", lambda gains: gains[:1]), "gains is float32"),
-    (put("gains", first(np.nan)), "gains holds what is no number"),
+    (put("gains", first(np.nan)), "gains holds NaN or infinity"),
 ]
 
 
@@ -80,14 +80,14 @@ COMMON = [
     [
         *COMMON,
         (put("density", lambda density: density.astype(np.float64)), "density is float64"),
-        (put("density", first(np.inf)), "density holds what is no number"),
+        (put("density", first(np.inf)), "density holds NaN or infinity"),
         (put("weight", lambda weight: weight[1:]), "weight is float32"),
         (put("vertices", first(-1)), "vertices outside of its grid"),
         (put("vertices", first(10**9)), "vertices outside of its grid"),
         (put("vertices", lambda vertices: first(vertices[1])(vertices)), "vertices that are there twice"),
         (put("resolution", np.array([2000, 2000, 2000])), r"a grid of \[2000, 2000, 2000\] vertices"),
         (put("bounds", lambda bounds: bounds[::-1]), "a grid of"),
-        (put("sh", lambda sh: np.repeat(sh, 3, axis=1)), "colours of 12 numbers in stage 0"),
+        (put("sh", lambda sh: np.repeat(sh, 3, axis=1)), "colors of 12 numbers in stage 0"),
         (put("patches", first(7)), "patches of no photo"),
         (put("position", 10**6), "position is 1000000"),
         (put("epoch", -1), "epoch is -1"),
@@ -109,7 +109,7 @@ def test_voxels(photos: Dataset, tmp_path: Path, damage: Any, message: str) -> N
         (lambda scalars, arrays: arrays.pop("running"), "it has no running"),
         (lambda scalars, arrays: arrays.update(more=np.zeros(3)), r"\d+ splats and 15 arrays"),
         (put("means", lambda means: means[1:]), "log_scales is float32"),
-        (put("means", first(np.nan)), "means holds what is no number"),
+        (put("means", first(np.nan)), "means holds NaN or infinity"),
         (put("queue", [7]), r"photos that come next: \[7\]"),
         (put("queue", [0] * 9), "photos that come next"),
         (put("random", {"bit_generator": "MT19937"}), "state must be for a PCG64"),

@@ -13,7 +13,7 @@ from cagefield.datasets import load_dataset
 from cagefield.datasets.raw_photos import find_raw_photos
 from cagefield.errors import DatasetError
 from cagefield.images.metrics import psnr, ssim
-from cagefield.training.voxels.ray_batches import Photos
+from cagefield.training.voxels.ray_batches import DevicePhotos
 from posed_photos import ring, save
 
 N, WIDTH, HEIGHT = 9, 24, 16
@@ -85,7 +85,7 @@ def test_missing_and_black_masks_are_named(tmp_path):
 def test_excluded_pixels_are_no_training_rays(tmp_path):
     data = load_dataset(_capture(tmp_path, "masks/{}.png"))
     devices.start("cpu")
-    photos = Photos.load(data.train)
+    photos = DevicePhotos.load(data.train)
     assert photos.valid is not None and photos.valid.mean() == 1 - 48 / (WIDTH * HEIGHT)
     tiles = photos.patches(4)
     assert len(tiles) == 7 * (24 - 3) and not ((tiles[:, 1] < 12) & (tiles[:, 2] < 4)).any()

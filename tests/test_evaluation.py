@@ -12,7 +12,13 @@ from PIL import Image
 
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import PhotoMask, View
-from cagefield.training.evaluation import Evaluation, ViewFigures, composited, evaluate_views, view_figures
+from cagefield.training.evaluation import (
+    Evaluation,
+    ViewMetrics,
+    composite_on_white,
+    evaluate_image,
+    evaluate_views,
+)
 
 
 def photo_view(folder: Path, name: str, pixels: np.ndarray, mask: np.ndarray | None = None) -> View:
@@ -27,9 +33,9 @@ def photo_view(folder: Path, name: str, pixels: np.ndarray, mask: np.ndarray | N
 
 def test_means_and_the_worst_view():
     views = (
-        ViewFigures("a", 30.0, 31.0, 0.9),
-        ViewFigures("b", 20.0, 26.0, float("nan")),
-        ViewFigures("c", 25.0, 25.5, 0.8),
+        ViewMetrics("a", 30.0, 31.0, 0.9),
+        ViewMetrics("b", 20.0, 26.0, float("nan")),
+        ViewMetrics("c", 25.0, 25.5, 0.8),
     )
     total = Evaluation(views)
     assert (total.psnr, total.corrected, total.ssim) == pytest.approx((25.0, 27.5, 0.85))
@@ -41,18 +47,18 @@ def test_means_and_the_worst_view():
 
 def test_a_picture_in_another_exposure_differs_by_that_alone():
     photo = np.random.default_rng(0).uniform(0.2, 0.8, (20, 24, 3))
-    figures = view_figures("a", photo - 0.1, photo)
+    figures = evaluate_image("a", photo - 0.1, photo)
     assert figures is not None and figures.psnr == pytest.approx(20.0) and figures.corrected > 100
     # rgb above 1 is shown as 1
-    assert view_figures("a", photo + 5, photo) == view_figures("a", np.ones_like(photo), photo)
-    assert view_figures("a", photo, photo, np.zeros((20, 24), bool)) is None
+    assert evaluate_image("a", photo + 5, photo) == evaluate_image("a", np.ones_like(photo), photo)
+    assert evaluate_image("a", photo, photo, np.zeros((20, 24), bool)) is None
 
 
 def test_cut_outs_are_composited_on_white():
     pixels = np.zeros((1, 3, 4), np.uint8)
     pixels[0, :, 0], pixels[0, :, 3] = 255, (0, 51, 255)
     expected = [[[1, 1, 1], [1, 0.8, 0.8], [1, 0, 0]]]
-    np.testing.assert_allclose(composited(pixels), expected, atol=1e-6)
+    np.testing.assert_allclose(composite_on_white(pixels), expected, atol=1e-6)
 
 
 def test_views_are_compared_without_excluded_pixels_over_their_own_background(tmp_path, monkeypatch):

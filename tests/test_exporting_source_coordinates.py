@@ -75,7 +75,7 @@ def test_far_reconstructions_get_an_offset():
 
 @pytest.mark.parametrize("mirror", [np.eye(3), np.diag([1.0, 1.0, -1.0])])
 def test_meshes_and_points_too(mirror):
-    from cagefield.training.splats.fit_splats import Surface
+    from cagefield.training.splats.fit_splats import SurfacePoints
 
     back = similarity(TURN @ mirror, 3.0)
     rgb = np.full((3, 3), 0.5, np.float32)
@@ -89,7 +89,7 @@ def test_meshes_and_points_too(mirror):
     # Faces stay counter-clockwise seen from where normals point to.
     np.testing.assert_allclose(np.cross(b - a, c - a) / 9.0, mesh.normals[0], atol=1e-5)
     np.testing.assert_allclose(mesh.normals[0], TURN @ mirror @ (0, 0, 1), atol=1e-6)
-    points, _ = points_in_source(Surface(corners.astype(float), normals, rgb), back)
+    points, _ = points_in_source(SurfacePoints(corners.astype(float), normals, rgb), back)
     np.testing.assert_allclose(points.positions, moved, atol=1e-12)
     np.testing.assert_allclose(points.normals[0], TURN @ mirror @ (0, 0, 1), atol=1e-6)
 

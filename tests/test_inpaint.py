@@ -1,4 +1,4 @@
-"""What no photo showed: found behind surfaces as the closed form says, filled as the surfaces around say."""
+"""Vertices that no photo shows: the closed form of their set, and inpainting from the surfaces around."""
 
 from __future__ import annotations
 
@@ -13,8 +13,15 @@ from cagefield.fields.frusta import in_frusta
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels.voxel_renderer import Renderer
 from cagefield.training.voxels import inpainting
-from cagefield.training.voxels.inpainting import ACROSS, DEPTH, OPAQUE, REACH, TOLERANCE, filled
-from cagefield.training.voxels.vertex_visibility import LEAST_TRANSMITTANCE, unseen_vertices
+from cagefield.training.voxels.inpainting import (
+    DIFFUSION_LENGTH_VOXELS,
+    FILL_DEPTH_VOXELS,
+    FILL_OPTICAL_DEPTH,
+    MAX_RELATIVE_RESIDUAL,
+    NORMAL_CONDUCTIVITY,
+    fill_unseen,
+)
+from cagefield.training.voxels.vertex_visibility import MIN_TRANSMITTANCE, invisible_vertices
 
 devices.start()
 
@@ -58,8 +65,8 @@ def test_behind_a_wall_photos_show_as_deep_as_its_light_comes(sigma: float) -> N
     # Head-on rays: T = exp(-sigma depth) falls under the least at depth = -ln(least) / sigma. The wall's
     # front is a ramp of one voxel beyond 0.5, which counts as half a voxel.
     camera = Camera.look_at((12.0, 0, 0), (0, 0, 0), width=160, height=160, fov_x=0.18, up=(0, 0, 1))
-    hidden = unseen_vertices(field_of(density, np.zeros((N, N, N, 3))), [camera])
-    shown_to = 0.5 + 0.5 * VOXEL + np.log(LEAST_TRANSMITTANCE) / sigma
+    hidden = invisible_vertices(field_of(density, np.zeros((N, N, N, 3))), [camera])
+    shown_to = 0.5 + 0.5 * VOXEL + np.log(MIN_TRANSMITTANCE) / sigma
     middle = hidden[:, N // 2, N // 2]
     x = np.linspace(-1, 1, N)
     # A cell that is crossed shows its 8 vertices: the edge is one voxel behind the closed form, at most two.
@@ -71,8 +78,8 @@ def test_all_is_unseen_from_a_camera_that_looks_away() -> None:
     density = np.ones((N, N, N), np.float32)
     away = Camera.look_at((3, 0, 0), (6, 0, 0), width=16, height=16, fov_x=0.5)
     field = field_of(density, np.zeros((N, N, N, 3)))
-    assert unseen_vertices(field, [away]).all()
-    assert not unseen_vertices(field, ring())[-1, N // 2].any()
+    assert invisible_vertices(field, [away]).all()
+    assert not invisible_vertices(field, ring())[-1, N // 2].any()
 
 
 @pytest.fixture(scope="module")
@@ -84,40 +91,40 @@ def ball() -> tuple[VoxelField, np.ndarray]:
     share = (p[..., :1] + 1) / 2
     colour = share * np.array([1.0, 0.0, -1.0]) + (1 - share) * np.array([-1.0, 0.0, 1.0])
     field = field_of(density, colour.astype(np.float32))
-    return field, unseen_vertices(field, ring())
+    return field, invisible_vertices(field, ring())
 
 
 def test_what_was_seen_stays_and_photos_show_the_same(ball) -> None:
     field, hidden = ball
-    after = filled(field, hidden)
+    after = fill_unseen(field, hidden)
     (before_density, before_colour), (density, colour) = dense(field), dense(after)
     np.testing.assert_array_equal(density[~hidden], before_density[~hidden])
     np.testing.assert_array_equal(colour[~hidden], before_colour[~hidden])
     for camera in ring(3):
         one, two = (np.asarray(Renderer(f).render(camera, background="white").rgb) for f in (field, after))
-        # What is filled lies behind what leaves less than LEAST_TRANSMITTANCE of the light.
-        assert np.abs(one - two).max() < LEAST_TRANSMITTANCE
+        # Inpainted vertices lie behind a transmittance of less than MIN_TRANSMITTANCE.
+        assert np.abs(one - two).max() < MIN_TRANSMITTANCE
         assert np.abs(one - two).mean() < 0.005
 
 
 def test_it_is_opaque_to_its_depth_and_no_deeper(ball) -> None:
     field, hidden = ball
-    density, _ = dense(filled(field, hidden))
+    density, _ = dense(fill_unseen(field, hidden))
     r = np.linalg.norm(grid(), axis=-1)
     inside = hidden & (r < 0.5)
     assert inside.any()
     # Rays end at 0.65, one voxel into the shell; the nearest vertex there may be a cell's diagonal off.
-    near = inside & (r > 0.65 - (DEPTH - 3) * VOXEL)
+    near = inside & (r > 0.65 - (FILL_DEPTH_VOXELS - 3) * VOXEL)
     assert near.any()
-    np.testing.assert_allclose(density[near], OPAQUE / VOXEL, rtol=1e-6)
-    far = inside & (r < 0.55 - (DEPTH + 1) * VOXEL)
+    np.testing.assert_allclose(density[near], FILL_OPTICAL_DEPTH / VOXEL, rtol=1e-6)
+    far = inside & (r < 0.55 - (FILL_DEPTH_VOXELS + 1) * VOXEL)
     assert far.any()
     assert (density[far] == 0).all()
 
 
 def test_colours_go_on_from_the_surfaces_and_stay_between_them(ball) -> None:
     field, hidden = ball
-    after = filled(field, hidden)
+    after = fill_unseen(field, hidden)
     density, colour = dense(after)
     new = hidden & (density > 0) & (np.linalg.norm(grid(), axis=-1) < 0.55)
     given = field.sh[:, 0]
@@ -138,11 +145,11 @@ def test_under_a_block_the_ground_goes_on() -> None:
     block = (np.abs(p[..., :2]).max(axis=-1) <= 0.3) & (p[..., 2] > -0.5) & (p[..., 2] <= 0.3)
     density = np.where(ground | block, 3.0 / VOXEL, 0.0).astype(np.float32)
     colour = np.where(ground[..., None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]).astype(np.float32)
-    hidden = unseen_vertices(field_of(density, colour), ring())
+    hidden = invisible_vertices(field_of(density, colour), ring())
     # What a training leaves where no photo looks.
     colour[hidden] = [-1.0, -1.0, 2.0]
     field = field_of(density, colour)
-    _, after = dense(filled(field, hidden))
+    _, after = dense(fill_unseen(field, hidden))
     k = int(np.argmin(np.abs(np.linspace(-1, 1, N) + 0.5))) - 1
     under = hidden[:, :, k] & (np.abs(p[:, :, k, :2]).max(axis=-1) < 0.25)
     assert under.any()
@@ -156,13 +163,13 @@ def test_colours_stay_between_the_surfaces_where_the_solver_runs_out_of_steps(
     ball, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     field, hidden = ball
-    whole = filled(field, hidden)
+    whole = fill_unseen(field, hidden)
     swept = inpainting.jacobi_sweeps
     calls = []
-    # Sweeps bring colours one voxel on each: DEPTH of them reach all that is filled of a ball.
-    monkeypatch.setattr(inpainting, "MOST_STEPS", DEPTH + 2)
+    # Each sweep carries colors one voxel on: FILL_DEPTH_VOXELS sweeps reach every inpainted vertex.
+    monkeypatch.setattr(inpainting, "MAX_SOLVER_STEPS", FILL_DEPTH_VOXELS + 2)
     monkeypatch.setattr(inpainting, "jacobi_sweeps", lambda *system: calls.append(1) or swept(*system))
-    short = filled(field, hidden)
+    short = fill_unseen(field, hidden)
     assert len(calls) == 3  # each of the three axes
     np.testing.assert_array_equal(short.vertices, whole.vertices)
     np.testing.assert_array_equal(short.density, whole.density)
@@ -179,8 +186,8 @@ def block(n: int = 16) -> tuple[sparse.csr_matrix, np.ndarray]:
     """The system (pull, diagonal) of a block that nothing holds but its sources: no eigenvalue is smaller."""
     number = np.arange(n**3).reshape(n, n, n)
     pull = sparse.csr_matrix((n**3, n**3))
-    for axis, share in enumerate(REACH**2 * np.array([1.0, 1.0, ACROSS])):
-        a, b = inpainting.links_of(number, number, axis)
+    for axis, share in enumerate(DIFFUSION_LENGTH_VOXELS**2 * np.array([1.0, 1.0, NORMAL_CONDUCTIVITY])):
+        a, b = inpainting.neighbor_pairs(number, number, axis)
         pull += sparse.csr_matrix((np.full(len(a), share), (a, b)), pull.shape)
     return pull, 1.0 + np.asarray(pull.sum(axis=1))[:, 0]
 
@@ -193,19 +200,21 @@ def test_the_bound_on_the_steps_holds_where_the_system_is_hardest(monkeypatch: p
     def never(*system):
         raise AssertionError("not solved within the bound")
 
-    monkeypatch.setattr(inpainting, "MOST_STEPS", 111)
+    monkeypatch.setattr(inpainting, "MAX_SOLVER_STEPS", 111)
     monkeypatch.setattr(inpainting, "jacobi_sweeps", never)
     found = inpainting.solve_diffusion(pull, diagonal, source)
     direct = spsolve((sparse.diags(diagonal) - pull).tocsc(), source[:, 0])
     # No eigenvalue is under 1, so the error is at most the residual.
-    assert np.linalg.norm(found - direct[:, None] * source[0]) < TOLERANCE * np.linalg.norm(source[0])
+    assert np.linalg.norm(found - direct[:, None] * source[0]) < MAX_RELATIVE_RESIDUAL * np.linalg.norm(
+        source[0]
+    )
 
 
 def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     pull, diagonal = block()
     source = np.zeros((len(diagonal), 2))
     source[0], source[-1] = (1.0, 1.0), (1.0, 0.0)  # weights, and weights times colours 1 and 0
-    monkeypatch.setattr(inpainting, "MOST_STEPS", 40)
+    monkeypatch.setattr(inpainting, "MAX_SOLVER_STEPS", 40)
     weight, colour = inpainting.solve_diffusion(pull, diagonal, source).T
     # The corners are 45 voxels apart; 40 steps of conjugate gradients stop short with a colour of 1.00005.
     assert (weight > 0).all()
@@ -215,9 +224,9 @@ def test_a_solution_cut_short_mixes_its_sources_and_nothing_else(monkeypatch: py
 
 def test_nothing_unseen_and_nothing_solid_leave_the_field_as_it_is(ball) -> None:
     field, _ = ball
-    assert filled(field, np.zeros(field.resolution, bool)) is field
+    assert fill_unseen(field, np.zeros(field.resolution, bool)) is field
     mist = field_of(np.full((N, N, N), 1e-4, np.float32), np.zeros((N, N, N, 3), np.float32))
-    assert filled(mist, np.ones((N, N, N), bool)) is mist
+    assert fill_unseen(mist, np.ones((N, N, N), bool)) is mist
 
 
 def test_as_many_cameras_as_asked_have_a_point_in_their_picture() -> None:

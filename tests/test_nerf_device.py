@@ -76,7 +76,7 @@ def test_networks_in_half_precision_learn_as_those_in_full(tmp_path) -> None:
     runs = {}
     for half in (False, True):
         config = NerfConfig.small(
-            width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop=3, steps=200, half=half
+            width=24, depth=3, samples=(12, 12), octaves=(4, 2), precrop_steps=3, steps=200, bfloat16=half
         )
         run = runs[half] = NerfRun(photos, config)
         kinds = set()

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from cagefield.cameras.camera import Camera
-from cagefield.training.splats.plane_sweep import CLEAR, Surfaces, find_surfaces, neighbours_of
+from cagefield.training.splats.plane_sweep import (
+    FREE_DISTANCE_SHARE,
+    SweptSurfaces,
+    choose_neighbors,
+    sweep_surfaces,
+)
 
 DISTANCE, NEAR = 4.0, 2.2
 LENSES = {
@@ -60,8 +65,10 @@ def found(views: list[Camera], images: list[np.ndarray], wanted: int = 100_000, 
     return surfaces.positions, surfaces.rgb
 
 
-def surfaces_of(views: list[Camera], images: list[np.ndarray], wanted: int = 100_000, **rest) -> Surfaces:
-    return find_surfaces(images, views, [NEAR] * len(views), [DISTANCE] * len(views), wanted, **rest)
+def surfaces_of(
+    views: list[Camera], images: list[np.ndarray], wanted: int = 100_000, **rest
+) -> SweptSurfaces:
+    return sweep_surfaces(images, views, [NEAR] * len(views), [DISTANCE] * len(views), wanted, **rest)
 
 
 @pytest.mark.parametrize("lens", LENSES)
@@ -92,20 +99,20 @@ def test_photos_without_texture_give_no_points():
     views = cameras()
     surfaces = surfaces_of(views, [photo(camera, plain=True) for camera in views])
     assert surfaces.positions.shape == (0, 3) and surfaces.rgb.shape == (0, 3)
-    assert surfaces.empty.shape == (len(views), 56, 72) and not surfaces.empty.any()
+    assert surfaces.free_distances.shape == (len(views), 56, 72) and not surfaces.free_distances.any()
 
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_rays_are_empty_until_shortly_before_what_photos_agree_on(lens):
     views = cameras(lens)
     surfaces = surfaces_of(views, [photo(camera) for camera in views])
-    for camera, empty in zip(views, surfaces.empty, strict=True):
+    for camera, empty in zip(views, surfaces.free_distances, strict=True):
         origins, toward = (values.astype(np.float64) for values in camera.rays())
         true = -origins[:, 2] / toward[:, 2] / np.linalg.norm(toward, axis=1)
         share = empty.ravel()[empty.ravel() > 0] / true[empty.ravel() > 0]
         assert len(share) > 0.3 * len(true)
         # A step of inverse depth, by which it ends sooner, is 0.04 of this depth.
-        assert np.quantile(share, 0.98) < 1.0 and 0.85 < np.median(share) < CLEAR
+        assert np.quantile(share, 0.98) < 1.0 and 0.85 < np.median(share) < FREE_DISTANCE_SHARE
 
 
 def test_photos_of_different_things_give_next_to_no_points():
@@ -144,7 +151,7 @@ def test_points_are_thinned_evenly_to_about_as_many_as_wanted():
 def test_neighbours_are_those_nearest_to_the_best_angle():
     degrees = (0, 1, 4, 8, 12, 20, 50)
     views = [Camera.look_at(eye(d), (0, 0, 0), up=(0, 1, 0), width=72, height=56, fov_x=0.7) for d in degrees]
-    chosen = neighbours_of(views, [DISTANCE] * len(views))
+    chosen = choose_neighbors(views, [DISTANCE] * len(views))
     # by |log(angle / 8 degrees)|; one degree is too little parallax, 50 are another look
     assert [degrees[n] for n in chosen[0]] == [8, 12, 4, 20]
     assert [degrees[n] for n in chosen[6] if n >= 0] == [20]
@@ -155,4 +162,4 @@ def test_cameras_that_are_much_farther_or_look_away_are_no_neighbours():
     places = [eye(0), eye(8), eye(8, distance=3 * DISTANCE)]
     views = [Camera.look_at(p, (0, 0, 0), up=(0, 1, 0), width=72, height=56, fov_x=0.7) for p in places]
     views.append(Camera.look_at(eye(-8), eye(-8, distance=9.0), up=(0, 1, 0), width=72, height=56, fov_x=0.7))
-    assert neighbours_of(views, [DISTANCE] * 4)[0].tolist() == [1, -1, -1, -1]
+    assert choose_neighbors(views, [DISTANCE] * 4)[0].tolist() == [1, -1, -1, -1]

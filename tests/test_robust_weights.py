@@ -23,7 +23,7 @@ def weights_of(difference: np.ndarray, valid: np.ndarray | None = None, visits: 
         robust.add(3, tiled(difference.astype(np.float32)), ONES, valid)
     robust.update_scale()
     found = np.ones((DOWN * ACROSS, TILE * TILE), np.float32)
-    robust.weigh(3, found)
+    robust.scale_weights(3, found)
     return untiled(found[:, None], *SIZE)[..., 0]
 
 
@@ -65,5 +65,5 @@ def test_the_scale_follows_the_usual_residual():
 def test_a_photo_that_was_not_seen_has_full_weights():
     robust = RobustWeights([(DOWN, ACROSS)])
     found = np.ones((DOWN * ACROSS, TILE * TILE), np.float32)
-    robust.weigh(0, found)
+    robust.scale_weights(0, found)
     assert found.min() == 1.0

@@ -18,7 +18,7 @@ from cagefield.procedural import make_scene
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.scene.scene_files import check_destination
 from cagefield.training.evaluation import Evaluation
-from cagefield.training.voxels.train_voxels import TrainResult
+from cagefield.training.result import TrainResult
 from scenes import ball_field, ball_scene, files_of
 
 
@@ -61,7 +61,8 @@ def test_gains_survive_saving_and_editing(tmp_path: Path) -> None:
 def test_a_trained_scene_has_the_gains_that_were_fitted(tmp_path: Path) -> None:
     dataset = load_dataset(make_scene("plant", tmp_path / "photos", views=3, size=16, test_views=1))
     gains = np.array([[0.9, 1.0, 1.1], [1.0, 1.0, 1.0], [1.1, 1.0, 0.9]], np.float32)
-    result = TrainResult(ball_field(), 1, 1.0, 0.0, Evaluation(), gains, True)
+    train_cameras = tuple(view.camera for view in dataset.train)
+    result = TrainResult(ball_field(), 1, 1.0, 0.0, Evaluation(), True, train_cameras, gains)
     scene = Scene.trained(result, dataset)
     np.testing.assert_array_equal(np.array(scene.gains, np.float32), gains)
     assert [len(scene.cameras[split]) for split in ("train", "test", "val")] == [3, 1, 1]

@@ -16,20 +16,20 @@ from cagefield.images.metrics import psnr
 from cagefield.images.render_result import RenderResult
 from cagefield.rendering.renderers import renderer_of
 from cagefield.training.splats.fit_splats import (
-    EMPTY_STEP,
-    FIRST_OPACITY,
-    SOLID,
-    STEP,
-    THICKNESS,
-    WIDTH,
-    Surface,
-    empty_distances,
+    FREE_BLOCK_PIXELS,
+    INITIAL_OPACITY,
+    MIN_DEPTH_STEP_PIXELS,
+    MIN_SURFACE_OPACITY,
+    THICKNESS_SPACINGS,
+    WIDTH_SPACINGS,
+    SurfacePoints,
+    build_surface_splats,
     fit_splats,
-    surface_seen,
-    surface_splats,
-    turns_to,
+    free_distances,
+    rotations_from_z,
+    sample_surface,
 )
-from cagefield.training.splats.plane_sweep import CLEAR
+from cagefield.training.splats.plane_sweep import FREE_DISTANCE_SHARE
 from cagefield.training.splats.splat_config import SplatConfig
 from scenes import ball_field
 
@@ -62,12 +62,12 @@ def test_turns_take_z_to_the_normal() -> None:
     normals = chance.normal(size=(200, 3))
     normals = np.concatenate([normals, np.eye(3), -np.eye(3), [[1e-9, 0.0, -1.0]]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    turned = rotation_matrices(turns_to(normals).astype(np.float64))[:, :, 2]
+    turned = rotation_matrices(rotations_from_z(normals).astype(np.float64))[:, :, 2]
     np.testing.assert_allclose(turned, normals, atol=2e-6)  # float32 quaternions
 
 
 def test_the_surface_that_cameras_see_is_the_balls() -> None:
-    surface = surface_seen(renderer_of(BALL), CAMERAS, 3000)
+    surface = sample_surface(renderer_of(BALL), CAMERAS, 3000)
     distance = np.linalg.norm(surface.positions, axis=1)
     # Density rises within the edge outside the last vertex; vertices end up to an edge within the radius.
     assert distance.min() > RADIUS - EDGE and distance.max() < RADIUS + EDGE
@@ -85,24 +85,26 @@ def test_the_surface_that_cameras_see_is_the_balls() -> None:
 def test_pixels_at_a_step_in_depth_are_on_no_surface() -> None:
     camera = Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0), width=8, height=8, fov_x=1.0)
     pixel = 2.0 / camera.fx
-    slope = 2.0 + np.arange(8) * (0.4 * STEP * pixel)
-    step = np.where(np.arange(8) < 4, 2.0, 2.0 + 2.0 * STEP * pixel)
-    assert len(Surface.seen_in(picture(slope[None], 1.0), camera)) == 64
+    slope = 2.0 + np.arange(8) * (0.4 * MIN_DEPTH_STEP_PIXELS * pixel)
+    step = np.where(np.arange(8) < 4, 2.0, 2.0 + 2.0 * MIN_DEPTH_STEP_PIXELS * pixel)
+    assert len(SurfacePoints.from_render(picture(slope[None], 1.0), camera)) == 64
     # A column on each side has the step among its neighbours.
-    assert len(Surface.seen_in(picture(step[None], 1.0), camera)) == 48
+    assert len(SurfacePoints.from_render(picture(step[None], 1.0), camera)) == 48
     # Next to nothing at all there is no step.
-    assert len(Surface.seen_in(picture(2.0, np.where(np.arange(8) < 4, 1.0, 0.0)[None]), camera)) == 32
-    assert len(Surface.seen_in(picture(2.0, SOLID - 0.01), camera)) == 0
+    assert (
+        len(SurfacePoints.from_render(picture(2.0, np.where(np.arange(8) < 4, 1.0, 0.0)[None]), camera)) == 32
+    )
+    assert len(SurfacePoints.from_render(picture(2.0, MIN_SURFACE_OPACITY - 0.01), camera)) == 0
 
 
 def test_a_surface_needs_normals_and_something_to_see() -> None:
     camera = CAMERAS[0]
     plain = RenderResult(np.zeros((48, 64, 3)), np.ones((48, 64)), np.ones((48, 64)))
     with pytest.raises(CagefieldError, match="render with normals=True"):
-        Surface.seen_in(plain, camera)
+        SurfacePoints.from_render(plain, camera)
     elsewhere = Camera.look_at((0, 0, 9), (0, 0, 12), up=(0, 1, 0), width=16, height=16, fov_x=0.5)
     with pytest.raises(CagefieldError, match="no camera shows a surface"):
-        surface_seen(renderer_of(BALL), [elsewhere], 100)
+        sample_surface(renderer_of(BALL), [elsewhere], 100)
 
 
 def test_first_splats_lie_flat_on_the_surface() -> None:
@@ -110,12 +112,14 @@ def test_first_splats_lie_flat_on_the_surface() -> None:
     positions = np.stack([*np.meshgrid(axis, axis), np.zeros((20, 20))], axis=-1).reshape(-1, 3)
     normals = np.tile(np.float32([0, 0, 1]), (400, 1))
     rgb = np.tile(np.float32([0.7, 0.3, 0.2]), (400, 1))
-    field = surface_splats(Surface(positions, normals, rgb), 1).to_field(True, BOX, False)
+    field = build_surface_splats(SurfacePoints(positions, normals, rgb), 1).to_field(True, BOX, False)
     inner = ((positions > 0.05) & (positions < 1.85))[:, :2].all(axis=1)
     # The three nearest on a grid are one spacing away, at its rims too.
-    expected = np.broadcast_to(0.1 * np.array([WIDTH, WIDTH, THICKNESS]), (int(inner.sum()), 3))
+    expected = np.broadcast_to(
+        0.1 * np.array([WIDTH_SPACINGS, WIDTH_SPACINGS, THICKNESS_SPACINGS]), (int(inner.sum()), 3)
+    )
     np.testing.assert_allclose(np.exp(field.log_scales[inner]), expected, rtol=1e-5)
-    np.testing.assert_allclose(field.opacities, FIRST_OPACITY, rtol=1e-5)
+    np.testing.assert_allclose(field.opacities, INITIAL_OPACITY, rtol=1e-5)
     np.testing.assert_allclose(0.5 + 0.28209479177387814 * field.sh[:, 0], rgb, atol=1e-6)
     assert (field.sh[:, 1:] == 0).all()
 
@@ -125,9 +129,12 @@ def test_empty_space_ends_before_the_nearest_solid_pixel_of_a_square() -> None:
     depth[1, 2] = 3.0
     opacity[2, 5] = 0.5
     opacity[:, 8:], depth[:, 8:] = 0.0, np.inf
-    distances, known = empty_distances(picture(depth, opacity, (9, 12)))
-    assert EMPTY_STEP == 4 and distances.shape == (2, 3)
-    np.testing.assert_allclose(distances, np.float32([[3 * CLEAR, 0, 0], [5 * CLEAR, 5 * CLEAR, 0]]))
+    distances, known = free_distances(picture(depth, opacity, (9, 12)))
+    assert FREE_BLOCK_PIXELS == 4 and distances.shape == (2, 3)
+    np.testing.assert_allclose(
+        distances,
+        np.float32([[3 * FREE_DISTANCE_SHARE, 0, 0], [5 * FREE_DISTANCE_SHARE, 5 * FREE_DISTANCE_SHARE, 0]]),
+    )
     np.testing.assert_array_equal(known, [[1, 0, 0], [1, 1, 0]])
 
 
@@ -154,7 +161,7 @@ def test_fitted_splats_look_like_the_field_from_cameras_that_were_held_out() -> 
     result = fit_splats(
         reference, CAMERAS, HELD_OUT, BOX, config, on_stage=lambda stage, done, note: told.append(stage)
     )
-    begun = surface_splats(surface_seen(reference, CAMERAS, 900), 0).to_field(True, BOX, False)
+    begun = build_surface_splats(sample_surface(reference, CAMERAS, 900), 0).to_field(True, BOX, False)
     before, after = score(begun, reference, HELD_OUT), score(result.field, reference, HELD_OUT)
     assert after > before + 3.0 and after > 30.0
     # Pictures have 8 bits, which is beyond what these splats show.

@@ -20,7 +20,7 @@ from cagefield.rendering.splats.rasterizer import (
     intrinsics,
     kernels,
 )
-from cagefield.training.splats.kernels.splat_backward import shapes
+from cagefield.training.splats.kernels.splat_backward import build_covariances
 from splat_gradients import Values, analytic, pictures, rounded, settled
 from splat_views import LENSES, NEAR, camera, covariances, parameters, splats_of, unit
 
@@ -160,7 +160,7 @@ def test_shapes_of_parameters() -> None:
     six, opacities = np.empty((50, 6), np.float32), np.empty(50, np.float32)
     single_values = {name: part.astype(np.float32) for name, part in values.items()}
     with kernels():
-        shapes(
+        build_covariances(
             single_values["log_scales"], single_values["quaternions"], single_values["logits"], six, opacities
         )
     want = covariances(values["quaternions"], values["log_scales"])

@@ -16,7 +16,7 @@ from cagefield.errors import CagefieldError
 from cagefield.procedural import make_scene
 from cagefield.training.progress import Snapshots
 from cagefield.training.voxels import batches
-from cagefield.training.voxels.inpainting import OPAQUE
+from cagefield.training.voxels.inpainting import FILL_OPTICAL_DEPTH
 from cagefield.training.voxels.train_voxels import train_voxel
 from cagefield.training.voxels.voxel_config import VoxelConfig
 
@@ -78,12 +78,12 @@ def test_a_gpu_with_a_ray_per_lane_learns_the_same(dataset, monkeypatch):
 
     Without smoothing, which is of what the first of a CPU's accumulators has met, and a GPU has one.
     """
-    few = replace(CONFIG, steps=20, smooth=0.0)
+    few = replace(CONFIG, steps=20, laplacian_reg=0.0)
     expected = train_voxel(dataset, few, evaluate=False).field
     for lanes in (1 << 15, 300):  # all rays at once, and in several turns
         with monkeypatch.context() as patched:
             patched.setattr(devices, "is_gpu", lambda: True)
-            patched.setattr(batches, "GPU_WORKERS", lanes)
+            patched.setattr(batches, "MAX_GPU_RAYS", lanes)
             found = train_voxel(dataset, few, evaluate=False).field
         np.testing.assert_array_equal(found.vertices, expected.vertices)
         np.testing.assert_allclose(found.density, expected.density, atol=1e-3, rtol=0.0)
@@ -138,7 +138,9 @@ def test_snapshots_are_the_field_on_the_way_and_take_no_training_time(dataset, t
         trained.field.density[kept], fields[150].density, rtol=0.0, atol=0.0 if REPRODUCIBLE else 1e-2
     )
     assert same.mean() > 0.7 and not same.all()
-    assert (trained.field.density[kept][~same] == np.float32(OPAQUE / trained.field.voxel_size.max())).all()
+    assert (
+        trained.field.density[kept][~same] == np.float32(FILL_OPTICAL_DEPTH / trained.field.voxel_size.max())
+    ).all()
     assert_same(result.field.density, trained.field.density)
     # A batch of 1,024 rays takes milliseconds; the second of sleep before it does not count.
     assert clock[91] - clock[90] < 0.5
@@ -154,9 +156,9 @@ def test_snapshots_by_the_clock_come_once_each(dataset):
     )
     assert len(seen) == 1 and seen[0] > 0
     times = Snapshots(lambda progress, field: None, steps=(3,), minutes=(0.5, 0.51))
-    assert times.due((2, 0.0), (3, 1.0)) and not times.due((3, 0.0), (4, 1.0))
-    assert times.due((4, 29.0), (5, 30.0)) and not times.due((5, 30.0), (6, 30.5))
-    assert times.due((6, 30.5), (7, 31.0)) and not times.due((7, 31.0), (8, 60.0))
+    assert times.is_due((2, 0.0), (3, 1.0)) and not times.is_due((3, 0.0), (4, 1.0))
+    assert times.is_due((4, 29.0), (5, 30.0)) and not times.is_due((5, 30.0), (6, 30.5))
+    assert times.is_due((6, 30.5), (7, 31.0)) and not times.is_due((7, 31.0), (8, 60.0))
 
 
 @pytest.mark.parametrize(

@@ -16,18 +16,18 @@ devices.start()
 from cagefield.rendering.voxels.device_grid import to_device  # noqa: E402
 from cagefield.rendering.voxels.kernels.grid import ivec3  # noqa: E402
 from cagefield.training.voxels.grid_state import GridState, cell_sizes  # noqa: E402
-from cagefield.training.voxels.kernels.accumulators import HEAD  # noqa: E402
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS  # noqa: E402
 from cagefield.training.voxels.kernels.gauss_newton_voxels import gauss_newton, laplacian  # noqa: E402
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs  # noqa: E402
 from cagefield.training.voxels.kernels.training_march import (  # noqa: E402
-    MOST_SAMPLES,
-    SAMPLE,
+    MAX_SAMPLES,
+    SAMPLE_FLOATS,
     BatchArgs,
     LossArgs,
     WorkerArgs,
     march_batch,
 )
-from cagefield.training.voxels.ray_batches import Photos  # noqa: E402
+from cagefield.training.voxels.ray_batches import DevicePhotos  # noqa: E402
 
 SIZE = 8
 N = 9
@@ -41,13 +41,13 @@ class FakeView(View):
         return rng.integers(0, 256, (SIZE, SIZE, 4), dtype=np.uint8)
 
 
-def photos(tmp_path) -> Photos:
+def photos(tmp_path) -> DevicePhotos:
     eyes = [(3.0, 0.4, 0.7), (-0.5, 2.8, 1.1), (0.3, -1.2, 2.9)]
     views = []
     for i, eye in enumerate(eyes):
         camera = Camera.look_at(eye, (0, 0, 0), width=SIZE, height=SIZE, fov_x=0.7)
         views.append(FakeView("v" * (i + 1), camera, tmp_path / "none.png"))
-    return Photos.load(views)
+    return DevicePhotos.load(views)
 
 
 def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
@@ -61,20 +61,20 @@ def state(degree: int, contracted: bool, workers: int = 2) -> GridState:
     return GridState.build(bounds, (N,) * 3, vertices, density, sh, contracted=contracted, threads=workers)
 
 
-def march(grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 0.0) -> np.ndarray:
+def march(grid: GridState, data: DevicePhotos, gains: np.ndarray, distortion: float = 0.0) -> np.ndarray:
     """Runs one batch of all pixels; returns the losses of the rays."""
     return marched(grid, data, gains, distortion)[0]
 
 
 def marched(
-    grid: GridState, data: Photos, gains: np.ndarray, distortion: float = 0.0
+    grid: GridState, data: DevicePhotos, gains: np.ndarray, distortion: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Runs one batch of all pixels; returns the losses [R] and the squared colours [R,3] of the rays."""
     patches = data.patches(4)
     rays = len(patches) * 16
     losses, sums = to_device(np.zeros(rays, np.float32)), to_device(np.zeros(6 * rays, np.float32))
     penalties = to_device(np.zeros(rays, np.float32))
-    scratch = to_device(np.zeros(grid.workers * MOST_SAMPLES * SAMPLE, np.float32))
+    scratch = to_device(np.zeros(grid.workers * MAX_SAMPLES * SAMPLE_FLOATS, np.float32))
     grid.accumulator.fill(0.0)
     step = 0.7 if grid.contracted else 0.7 / float(np.max(grid.args.scale))
     march_batch(
@@ -100,12 +100,12 @@ def test_gradients_match_finite_differences(tmp_path, degree, contracted):
     data, grid = photos(tmp_path), state(degree, contracted)
     gains = np.array([[1.0, 1.1, 0.9], [0.95, 1.0, 1.2], [1.0, 1.0, 1.0]])
     march(grid, data, gains, 0.5)
-    stride = HEAD + 3 * grid.terms
+    stride = HEADER_FLOATS + 3 * grid.terms
     records = grid.accumulator.to_numpy().reshape(grid.workers, grid.slots, stride).sum(axis=0)
     rng = np.random.default_rng(0)
     seen = np.flatnonzero(records[:, 2] > 1e-3)
     checked = {"density": grid.density.to_numpy(), "sh": grid.sh.to_numpy()}
-    for name, column in (("density", 0), ("sh", HEAD)):
+    for name, column in (("density", 0), ("sh", HEADER_FLOATS)):
         values = checked[name]
         array = getattr(grid, name)
         errors, sizes = [], []
@@ -113,7 +113,7 @@ def test_gradients_match_finite_differences(tmp_path, degree, contracted):
             at, gradient = slot, records[slot, column]
             if name == "sh":
                 term = rng.integers(3 * grid.terms)
-                at, gradient = slot * 3 * grid.terms + term, records[slot, HEAD + term]
+                at, gradient = slot * 3 * grid.terms + term, records[slot, HEADER_FLOATS + term]
             # Float32 sums of some hundred squared errors carry about 1e-6; the step keeps truncation and
             # rounding both near 1e-3 of a typical gradient.
             h = 0.02 / grid.cell.to_numpy()[slot] if name == "density" else 0.02
@@ -177,7 +177,7 @@ def test_workers_only_split_the_sum(tmp_path):
         march(grid, data, np.ones((3, 3)))
         sums.append(grid.accumulator.to_numpy().reshape(workers, grid.slots, -1))
     # Column 3 is a maximum, the others are sums; only their order differs.
-    for column, merge in ((slice(0, 3), np.sum), (slice(HEAD, None), np.sum), (3, np.max)):
+    for column, merge in ((slice(0, 3), np.sum), (slice(HEADER_FLOATS, None), np.sum), (3, np.max)):
         np.testing.assert_allclose(
             merge(sums[0][..., column], axis=0), merge(sums[1][..., column], axis=0), rtol=2e-4, atol=1e-5
         )
@@ -212,7 +212,7 @@ def test_gauss_newton_step_is_gradient_over_damped_curvature(tmp_path):
     touched = r[:, 2] > 0
     change = np.clip(0.5 * r[:, 0] / (r[:, 1] + 0.01 * h**2), -0.3 / h, 0.3 / h) * touched
     np.testing.assert_allclose(density, before_density - change, rtol=1e-4, atol=1e-5)
-    slope = r[:, HEAD:].reshape(before_sh.shape)
+    slope = r[:, HEADER_FLOATS:].reshape(before_sh.shape)
     slope[:, 1:] += 0.05 * r[:, 2, None, None] * before_sh[:, 1:]
     expected = before_sh - 0.25 * slope / (r[:, 2, None, None] + 0.01) * touched[:, None, None]
     np.testing.assert_allclose(sh, expected, rtol=1e-4, atol=1e-5)

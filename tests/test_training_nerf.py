@@ -17,7 +17,7 @@ from commands import printed, refused
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
-from cagefield.training.nerf.nerf_run import NerfRun, initial_network  # noqa: E402
+from cagefield.training.nerf.nerf_run import NerfRun, build_initial_network  # noqa: E402
 from cagefield.training.nerf.train_nerf import evaluate_nerf, train_nerf  # noqa: E402
 
 
@@ -34,8 +34,15 @@ QUICK = ("--field", "nerf", "--preset", "small", "--steps", 60, "--resolution", 
 
 
 def tiny(**options) -> NerfConfig:
-    small = {"width": 24, "depth": 3, "samples": (12, 12), "batch_rays": 64, "octaves": (4, 2), "precrop": 3}
-    return SMALL(**{**small, "shown_samples": None, **options})
+    small = {
+        "width": 24,
+        "depth": 3,
+        "samples": (12, 12),
+        "batch_rays": 64,
+        "octaves": (4, 2),
+        "precrop_steps": 3,
+    }
+    return SMALL(**{**small, "render_samples": None, **options})
 
 
 def test_it_learns(photos) -> None:
@@ -126,10 +133,10 @@ def test_targets_are_the_photos_colours_on_white(photos) -> None:
 def test_presets_have_the_papers_networks_and_small_ones() -> None:
     chance = np.random.default_rng(0)
     box = np.array([[-1.0] * 3, [1.0] * 3])
-    paper = initial_network(NerfConfig(), chance, box)
+    paper = build_initial_network(NerfConfig(), chance, box)
     assert str(paper) == "8 x 256, 10 + 4 octaves" and paper.skips.index(True) == 5
     assert sum(layer.weight.size + layer.bias.size for _, layer in paper.layers()) == 595_844
-    assert str(initial_network(NerfConfig.small(), chance, box)) == "4 x 128, 8 + 3 octaves"
+    assert str(build_initial_network(NerfConfig.small(), chance, box)) == "4 x 128, 8 + 3 octaves"
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -137,7 +144,7 @@ def test_presets_have_the_papers_networks_and_small_ones() -> None:
 def test_an_untrained_network_is_thin_fog_so_that_it_can_learn(config, seed) -> None:
     box = np.array([[-3.0, 0.0, 1.0], [1.0, 1.0, 2.0]])
     chance = np.random.default_rng(seed)
-    field = NerfField(initial_network(config, chance, box), None, box, 1.0, 2.0)
+    field = NerfField(build_initial_network(config, chance, box), None, box, 1.0, 2.0)
     points = chance.uniform(*box, (2000, 3))
     sigma, _ = field(points, np.broadcast_to([0.0, 0.0, 1.0], points.shape))
     # as PyTorch draws biases, two networks of five are empty everywhere and have no gradient at all
@@ -160,7 +167,7 @@ def test_both_networks_learn(photos, seed) -> None:
 
 def test_pictures_may_have_more_samples_than_the_training(photos, tmp_path) -> None:
     dataset = load_dataset(photos)
-    run = NerfRun(dataset, tiny(steps=1, shown_samples=(20, 10)))
+    run = NerfRun(dataset, tiny(steps=1, render_samples=(20, 10)))
     assert run.torch.field.samples == (12, 12) and run.field().samples == (20, 10)
     run.store(tmp_path / "state")
     other = NerfRun(dataset, tiny(steps=1))
@@ -182,7 +189,7 @@ def test_a_field_without_fine_samples_has_one_network(photos) -> None:
         ({"batch_rays": 0}, "batch_rays is 0"),
         ({"octaves": (-1, 4)}, r"octaves are \(-1, 4\); each must be from 0 to 16"),
         ({"minutes": -1.0}, "minutes is -1.0; it must be above 0"),
-        ({"rate": 2.0}, "rate is 2.0; it must be between 0 and 1"),
+        ({"lr": 2.0}, "lr is 2.0; it must be between 0 and 1"),
     ],
 )
 def test_impossible_options_are_refused(options, message) -> None:
@@ -192,7 +199,7 @@ def test_impossible_options_are_refused(options, message) -> None:
 
 def test_no_views_have_no_psnr(photos) -> None:
     field = train_nerf(load_dataset(photos), tiny(steps=1)).field
-    assert np.isnan(evaluate_nerf(field, ()))
+    assert np.isnan(evaluate_nerf(field, ()).psnr)
 
 
 def test_the_command_writes_a_scene_with_both_fields(photos, tmp_path, capsys, monkeypatch) -> None:

@@ -20,8 +20,8 @@ from posed_photos import room_capture
 torch = pytest.importorskip("torch", reason="PyTorch is not installed (extra nerf)")
 
 from cagefield.training.nerf.nerf_config import NerfConfig  # noqa: E402
-from cagefield.training.nerf.nerf_run import PHOTOS, NerfRun  # noqa: E402
-from cagefield.training.nerf.nerf_space import space_of  # noqa: E402
+from cagefield.training.nerf.nerf_run import PHOTOS_PER_BATCH, NerfRun  # noqa: E402
+from cagefield.training.nerf.nerf_space import build_sampling_space  # noqa: E402
 from cagefield.training.nerf.train_nerf import train_nerf  # noqa: E402
 
 SMALL = NerfConfig.small
@@ -38,7 +38,14 @@ def around(tmp_path_factory) -> Path:
 
 
 def tiny(**options) -> NerfConfig:
-    small = {"width": 32, "depth": 3, "samples": (16, 16), "batch_rays": 96, "octaves": (4, 1), "precrop": 0}
+    small = {
+        "width": 32,
+        "depth": 3,
+        "samples": (16, 16),
+        "batch_rays": 96,
+        "octaves": (4, 1),
+        "precrop_steps": 0,
+    }
     return SMALL(**{**small, **options})
 
 
@@ -76,7 +83,7 @@ def test_moving_a_capture_changes_no_picture(forward) -> None:
 
 def test_a_forward_facing_capture_is_trained_in_ndc(forward) -> None:
     dataset = load_dataset(forward)
-    space = space_of(dataset)
+    space = build_sampling_space(dataset)
     camera = dataset.train[0].camera
     assert space.ndc == pytest.approx((camera.width / (2 * camera.fx), camera.height / (2 * camera.fy)))
     assert (space.near, space.far, space.lindisp) == (0.0, 1.0, False)
@@ -86,7 +93,7 @@ def test_a_forward_facing_capture_is_trained_in_ndc(forward) -> None:
     np.testing.assert_allclose(ahead / np.linalg.norm(ahead), [0, 0, -1], atol=1e-12)
     # the nearest bound at 4/3, so that the near plane z = -1 has a margin
     assert space.dataset.depths is not None and space.dataset.depths[0] == pytest.approx(4 / 3)
-    assert space_of(dataset, ndc=False).ndc is None
+    assert build_sampling_space(dataset, ndc=False).ndc is None
 
 
 def test_the_box_of_ndc_contracts_space_to_them() -> None:
@@ -104,20 +111,20 @@ def test_the_box_of_ndc_contracts_space_to_them() -> None:
 
 def test_other_captures_are_sampled_in_depth(around) -> None:
     dataset = load_dataset(around)
-    space = space_of(dataset)
+    space = build_sampling_space(dataset)
     assert space.ndc is None and space.lindisp
     np.testing.assert_allclose(space.dataset.bounds, [[-1] * 3, [1] * 3])
     scale = 2.0 / (dataset.bounds[1] - dataset.bounds[0]).max()
     np.testing.assert_allclose((space.near, space.far), (0.9 * 3.5 * scale, 14.0 * scale))
     assert "even in 1/depth" in str(space)
     # without stated depths, multiples of the cameras' distance from the ball, 5
-    unknown = space_of(unstated(dataset))
+    unknown = build_sampling_space(unstated(dataset))
     np.testing.assert_allclose((unknown.near, unknown.far), (0.2 * 5 * scale, 20 * 5 * scale), rtol=0.02)
 
 
 def test_bounded_scenes_stay_as_they_are(tmp_path) -> None:
     dataset = load_dataset(make_scene("plant", tmp_path / "p", views=3, size=16, test_views=1))
-    space = space_of(dataset)
+    space = build_sampling_space(dataset)
     assert space.dataset is dataset and space.ndc is None and not space.lindisp
     box = dataset.bounds
     points = np.random.default_rng(0).uniform(box[0], box[1], (500, 3))
@@ -132,18 +139,20 @@ def test_ndc_are_refused_where_they_do_not_suit(forward, around, tmp_path) -> No
     with pytest.raises(CagefieldError, match=r"cannot be trained in NDC: camera .* looks aside"):
         train_nerf(load_dataset(around), tiny(ndc=True))
     with pytest.raises(CagefieldError, match="nothing is known of its depth"):
-        space_of(unstated(dataset), ndc=True)
+        build_sampling_space(unstated(dataset), ndc=True)
     bounded = load_dataset(make_scene("plant", tmp_path / "p", views=2, size=16, test_views=1))
     with pytest.raises(CagefieldError, match="it is bounded, and NDC are for forward-facing captures"):
-        space_of(bounded, ndc=True)
+        build_sampling_space(bounded, ndc=True)
     with pytest.raises(CagefieldError, match="stands beyond the nearest depth"):
-        space_of(dataclasses.replace(dataset, depths=(0.1, 14.0)), ndc=True)
+        build_sampling_space(dataclasses.replace(dataset, depths=(0.1, 14.0)), ndc=True)
     turned = [
         dataclasses.replace(v, camera=v.camera.with_c2w(v.camera.c2w @ np.diag([-1.0, 1, -1, 1])))
         for v in dataset.train[::2]
     ]
     with pytest.raises(CagefieldError, match="its cameras look all around"):
-        space_of(dataclasses.replace(dataset, train=(*dataset.train[1::2], *turned), test=()), ndc=True)
+        build_sampling_space(
+            dataclasses.replace(dataset, train=(*dataset.train[1::2], *turned), test=()), ndc=True
+        )
 
 
 @pytest.mark.parametrize(("kind", "gain"), [("forward", 2.0), ("around", 0.5)])
@@ -157,7 +166,7 @@ def test_it_learns(kind, gain, request) -> None:
 def test_captures_are_trained_with_noise_on_the_density(forward, tmp_path) -> None:
     """Without it a network whose density starts below its ReLU stays empty: black is what it shows."""
     assert NerfRun(load_dataset(forward), tiny()).jitter.noise == 1.0
-    assert NerfRun(load_dataset(forward), tiny(noise=0.25)).jitter.noise == 0.25
+    assert NerfRun(load_dataset(forward), tiny(raw_noise_std=0.25)).jitter.noise == 0.25
     bounded = make_scene("plant", tmp_path / "p", views=2, size=16, test_views=1)
     assert NerfRun(load_dataset(bounded), tiny()).jitter.noise == 0.0
 
@@ -166,7 +175,7 @@ def test_a_batch_of_a_capture_holds_rays_of_several_photos(forward) -> None:
     run = NerfRun(load_dataset(forward), tiny(batch_rays=33))
     rays, target = run.next_batch()
     assert len(rays.origins) == len(target) == 33
-    assert 3 <= len(np.unique(rays.origins.numpy(), axis=0)) <= PHOTOS
+    assert 3 <= len(np.unique(rays.origins.numpy(), axis=0)) <= PHOTOS_PER_BATCH
 
 
 @pytest.mark.parametrize("kind", ["forward", "around"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cagefield.scene.scene import Scene
-from cagefield.training.splats.pose_optimization import PoseRefinement, moved, pose_sums
+from cagefield.training.splats.pose_optimization import PoseRefinement, move_camera, pose_sums
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.train_splats import train_splat
@@ -32,7 +32,7 @@ def test_a_pose_s_gradient_is_that_of_finite_differences(antialiased):
     got, curvature = pose_sums(view.origin, state, order)
 
     def loss(motion):
-        picture = pictures(moved(view, motion), background, antialiased)(values)
+        picture = pictures(move_camera(view, motion), background, antialiased)(values)
         return 0.5 * ((picture - target) ** 2).sum()
 
     step = 1e-6
@@ -43,7 +43,7 @@ def test_a_pose_s_gradient_is_that_of_finite_differences(antialiased):
 
 def test_a_camera_is_moved_in_the_world_s_axes():
     view = camera()
-    turned = moved(view, np.array([0.1, -0.2, 0.3, 0, 0, np.pi / 2]))
+    turned = move_camera(view, np.array([0.1, -0.2, 0.3, 0, 0, np.pi / 2]))
     np.testing.assert_allclose(turned.origin, view.origin + np.array([0.1, -0.2, 0.3]), atol=1e-12)
     quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     np.testing.assert_allclose(turned.c2w[:3, :3], quarter @ view.c2w[:3, :3], atol=1e-12)
@@ -52,7 +52,7 @@ def test_a_camera_is_moved_in_the_world_s_axes():
 def test_the_mean_motion_is_taken_out():
     poses = PoseRefinement(3, 1.0)
     poses.motions[:] = np.arange(18).reshape(3, 6)
-    poses.centre()
+    poses.remove_mean_motion()
     np.testing.assert_array_equal(poses.motions.mean(axis=0), 0)
     np.testing.assert_array_equal(poses.motions[2] - poses.motions[0], np.full(6, 12))
 
@@ -65,7 +65,9 @@ def rough(tmp_path_factory):
     chance = np.random.default_rng(2)
     photos = write_views(folder / "train", cameras, photos_of(ball, cameras))
     off = [
-        replace(view, camera=moved(view.camera, 0.01 * chance.normal(size=6) * [1, 1, 1, 0.5, 0.5, 0.5]))
+        replace(
+            view, camera=move_camera(view.camera, 0.01 * chance.normal(size=6) * [1, 1, 1, 0.5, 0.5, 0.5])
+        )
         for view in photos
     ]
     test = write_views(folder / "test", held_out, photos_of(ball, held_out))

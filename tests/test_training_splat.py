@@ -17,8 +17,12 @@ from cagefield.images.metrics import psnr
 from cagefield.rendering.splats.splat_renderer import SplatRenderer
 from cagefield.training.checkpoint import write_checkpoint
 from cagefield.training.evaluation import evaluate_views
-from cagefield.training.splats.densification import fading, split
-from cagefield.training.splats.initialization import first_splats, spread, swept_points
+from cagefield.training.splats.densification import prune_mask, split_splats
+from cagefield.training.splats.initialization import (
+    infer_free_distances,
+    initialize_splats,
+    sweep_surface_points,
+)
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_run import SplatRun
 from cagefield.training.splats.splat_state import SplatState
@@ -241,7 +245,7 @@ def test_the_two_halves_of_a_splat_look_as_it_did(opacity, tolerance):
     state = state_of([opacity], np.log([0.22, 0.08, 0.05]))
     before = SplatRenderer(state.to_field(False, BOX, False)).render(camera).opacity
     state.momentum[:], state.running[:] = 3.0, 4.0
-    split(state, np.array([0]))
+    split_splats(state, np.array([0]))
     assert len(state) == 2
     np.testing.assert_allclose(state.means.mean(axis=0), 0.0, atol=1e-6)
     after = SplatRenderer(state.to_field(False, BOX, False)).render(camera).opacity
@@ -254,18 +258,18 @@ def test_the_two_halves_of_a_splat_look_as_it_did(opacity, tolerance):
 
 def test_no_row_to_split_changes_nothing():
     state = state_of([0.5, 0.5], np.log(0.1))
-    split(state, np.zeros(0, np.int64))
+    split_splats(state, np.zeros(0, np.int64))
     assert len(state) == 2
 
 
 def test_splats_that_show_nothing_or_are_huge_are_taken_out():
     state = state_of([0.5, 0.004, 0.02, 0.5], np.log(0.1))
     state.log_scales[3, 1] = np.log(50.0)
-    assert fading(state, 0.01, 20.0).tolist() == [False, True, False, True]
+    assert prune_mask(state, 0.01, 20.0).tolist() == [False, True, False, True]
     # A line without width; a disc without thickness stays.
     state.log_scales[0] = np.log([1e-4, 0.1, 1e-4])
     state.log_scales[2] = np.log([1e-4, 0.1, 0.1])
-    assert fading(state, 0.01, 20.0).tolist() == [True, True, False, True]
+    assert prune_mask(state, 0.01, 20.0).tolist() == [True, True, False, True]
 
 
 def test_all_of_a_splat_goes_with_its_row():
@@ -285,7 +289,7 @@ def test_all_of_a_splat_goes_with_its_row():
 def test_without_points_surfaces_are_found_from_random_ones(capture):
     config = SplatConfig(splats=600)
     dataset = replace(capture, points=None)
-    state, _ = first_splats(dataset, load_views(dataset.train), config, 600)
+    state, _ = initialize_splats(dataset, load_views(dataset.train), config, 600)
     assert 100 < len(state) <= 600
     # The ball has radius 0.5; random points fill the box.
     radius = np.linalg.norm(state.means, axis=1)
@@ -302,9 +306,9 @@ def test_no_fog_stays_where_space_is_known_to_be_empty(capture):
         np.concatenate([capture.points.rgb, np.full((150, 3), 128, np.uint8)]),
     )
     dataset, fog = replace(capture, points=points), []
-    for veil in (0.0, 0.1):
-        run = SplatRun(dataset, SplatConfig(steps=200, splats=800, sh_degree=1, veil=veil))
-        for view, empty in zip(run.views, run.empty, strict=True):
+    for penalty in (0.0, 0.1):
+        run = SplatRun(dataset, SplatConfig(steps=200, splats=800, sh_degree=1, empty_space_penalty=penalty))
+        for view, empty in zip(run.views, run.free_distances, strict=True):
             empty[0, 20:-20, 20:-20] = np.linalg.norm(view.cameras[0].origin) - 0.6
             empty[1, 20:-20, 20:-20] = 1.0
         while run.done < 1.0:
@@ -324,7 +328,7 @@ def test_what_points_say_of_empty_space_is_known_in_the_photos_that_see_them(cap
     few = replace(
         capture, train=capture.train[:2], points=SparsePoints(one, np.zeros((1, 3), np.uint8), names)
     )
-    _, (here, elsewhere) = first_splats(few, load_views(few.train), CONFIG, 600)
+    _, (here, elsewhere) = initialize_splats(few, load_views(few.train), CONFIG, 600)
     camera = few.train[0].camera
     (x, y), distance = camera.project(one)[0][0], np.linalg.norm(one - camera.origin)
     row, column = int(y * here.shape[1] / camera.height), int(x * here.shape[2] / camera.width)
@@ -335,14 +339,14 @@ def test_what_points_say_of_empty_space_is_known_in_the_photos_that_see_them(cap
 def test_what_is_known_of_a_pixel_speaks_for_those_around_it_with_care():
     distances = np.zeros((40, 60), np.float32)
     distances[5, 5], distances[5, 9] = 2.0, 1.0
-    spread_out, sure = spread(distances)
+    spread_out, sure = infer_free_distances(distances)
     # The nearest square that has anything known, and the least there.
     assert (spread_out[5, 5], sure[5, 5]) == (2.0, 1.0) and (spread_out[5, 9], sure[5, 9]) == (1.0, 1.0)
     np.testing.assert_allclose((spread_out[5, 4], spread_out[5, 7], spread_out[6, 10]), (1.7, 0.85, 0.85))
     assert 0 < sure[5, 4] < 1 and sure[5, 4] == sure[6, 10]
     # Too far away to say anything.
     assert spread_out[35, 55] == 0 and sure[35, 55] == 0
-    assert not spread(np.zeros((8, 8), np.float32)).any()
+    assert not infer_free_distances(np.zeros((8, 8), np.float32)).any()
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -360,8 +364,8 @@ def test_points_that_are_all_the_same_do_no_harm(capture):
     assert len(run.state) == 1
     twice = SparsePoints(np.tile(capture.points.positions, (2, 1)), np.tile(capture.points.rgb, (2, 1)))
     # Two photos: no points are added by sweeping.
-    once, _ = first_splats(replace(few, points=capture.points), load_views(few.train), CONFIG, 600)
-    again, _ = first_splats(replace(few, points=twice), load_views(few.train), CONFIG, 600)
+    once, _ = initialize_splats(replace(few, points=capture.points), load_views(few.train), CONFIG, 600)
+    again, _ = initialize_splats(replace(few, points=twice), load_views(few.train), CONFIG, 600)
     assert len(once) == len(capture.points)
     np.testing.assert_array_equal(again.means, once.means)
     np.testing.assert_array_equal(again.log_scales, once.log_scales)
@@ -374,9 +378,9 @@ def test_photos_of_another_size_and_distance_do_not_mislead_the_sweep(ball, capt
     alike = capture.train[:14]
     mixed = (alike[0], others[0], *alike[1:8], others[1], *alike[8:])
     positions = capture.points.positions
-    expected, colours, _ = swept_points(load_views(alike), positions, 300, 0)
+    expected, colours, _ = sweep_surface_points(load_views(alike), positions, 300, 0)
     assert len(expected) > 50 and abs(np.median(np.linalg.norm(expected, axis=1)) - 0.5) < 0.08
-    got, rgb, empty = swept_points(load_views(mixed), positions, 300, 0)
+    got, rgb, empty = sweep_surface_points(load_views(mixed), positions, 300, 0)
     assert [bool(one.any()) for one in empty] == [n not in (1, 9) for n in range(len(mixed))]
     np.testing.assert_array_equal(got, expected)
     np.testing.assert_array_equal(rgb, colours)
@@ -416,7 +420,7 @@ def test_photos_with_and_without_alpha_are_trained_on_together(ball, tmp_path):
 def test_an_unbounded_capture_begins_with_at_most_as_many_splats_as_it_may_have(capture):
     dataset = replace(capture, unbounded=True)
     for most in (100, 250):
-        state, _ = first_splats(dataset, load_views(dataset.train), SplatConfig(splats=most), most)
+        state, _ = initialize_splats(dataset, load_views(dataset.train), SplatConfig(splats=most), most)
         far = np.linalg.norm(state.means, axis=1) > 10
         assert len(state) <= most and far.any() and not far.all()
     ran(dataset, 5)

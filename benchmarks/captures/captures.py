@@ -28,7 +28,13 @@ from cagefield.files.npz import read_array
 from cagefield.images.image_files import side_by_side, write_png
 from cagefield.images.metrics import color_corrected
 from cagefield.images.render_result import RenderResult
-from cagefield.training.evaluation import Evaluation, ViewFigures, collected, composited, view_figures
+from cagefield.training.evaluation import (
+    Evaluation,
+    ViewMetrics,
+    collect_metrics,
+    composite_on_white,
+    evaluate_image,
+)
 from cagefield.typing import Array, Float32
 
 NEARER, FOGGY = 0.8, 0.1
@@ -93,8 +99,8 @@ def measure(dataset: Dataset, learnt: Learnt, points: SparsePoints | None = None
     if not dataset.test:
         raise CagefieldError(f"data set {dataset.name} has no held-out photos; choose another --holdout")
     some = dataset.train[:: -(-len(dataset.train) // TRAIN_VIEWS)]
-    train = collected([_figures_of(view, learnt.show(view.camera)) for view in some])
-    test: list[ViewFigures | None] = []
+    train = collect_metrics([_figures_of(view, learnt.show(view.camera)) for view in some])
+    test: list[ViewMetrics | None] = []
     at_points, true = [], []
     for view in dataset.test:
         frame = learnt.show(view.camera)
@@ -114,7 +120,7 @@ def measure(dataset: Dataset, learnt: Learnt, points: SparsePoints | None = None
         learnt.seconds,
         learnt.elements,
         train,
-        collected(test),
+        collect_metrics(test),
         _figures(at_points),
         _figures(true),
         left_out_photos(dataset),
@@ -192,8 +198,8 @@ def true_depth(dataset: Dataset, view: View) -> Float32 | None:
     return some
 
 
-def _figures_of(view: View, frame: RenderResult) -> ViewFigures | None:
-    return view_figures(view.name, frame.rgb, composited(view.load()), view.valid_pixels())
+def _figures_of(view: View, frame: RenderResult) -> ViewMetrics | None:
+    return evaluate_image(view.name, frame.rgb, composite_on_white(view.load()), view.valid_pixels())
 
 
 def _point_rays(view: View, points: SparsePoints) -> tuple[NDArray[np.int64], Array]:
@@ -300,7 +306,7 @@ def write_pictures(
     """
     written = []
     for view in dataset.test[:: -(-len(dataset.test) // views)]:
-        photo, frame = composited(view.load()), learnt.show(view.camera)
+        photo, frame = composite_on_white(view.load()), learnt.show(view.camera)
         picture = color_corrected(np.clip(frame.rgb, 0, 1), photo, view.valid_pixels())
         difference = 1 - np.minimum(times * np.abs(picture - photo).max(-1, keepdims=True), 1)
         known = true_depth(dataset, view)

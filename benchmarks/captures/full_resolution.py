@@ -25,7 +25,7 @@ from cagefield.datasets import View, load_dataset
 from cagefield.errors import CagefieldError
 from cagefield.images.metrics import color_corrected, gradient_ratio
 from cagefield.scene.scene import Scene
-from cagefield.training.evaluation import Evaluation, ViewFigures, composited, view_figures
+from cagefield.training.evaluation import Evaluation, ViewMetrics, composite_on_white, evaluate_image
 from cagefield.typing import Float32
 
 Show = Callable[[Camera], Float32]
@@ -42,7 +42,7 @@ class FullSizeFigures:
     lpips      of the color-corrected rendering; NaN where LPIPS is not installed
     """
 
-    figures: ViewFigures
+    figures: ViewMetrics
     size: tuple[int, int]
     trained_size: tuple[int, int]
     sharpness: float
@@ -90,9 +90,9 @@ def measure(
             "data set and the --holdout that the scene was trained with"
         )
     for trained, view in zip(cameras, views, strict=True):
-        photo, valid = composited(view.load()), view.valid_pixels()
+        photo, valid = composite_on_white(view.load()), view.valid_pixels()
         picture = np.clip(show(full_camera(trained, view)), 0, 1)
-        figures = view_figures(view.name, picture, photo, valid)
+        figures = evaluate_image(view.name, picture, photo, valid)
         if figures is None:
             continue
         fitted = color_corrected(picture, photo, valid)

@@ -14,7 +14,8 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.training.evaluation import evaluate_views
 from cagefield.training.progress import Progress, Snapshots
-from cagefield.training.voxels.train_voxels import TrainResult, train_voxel
+from cagefield.training.result import TrainResult
+from cagefield.training.voxels.train_voxels import train_voxel
 from cagefield.training.voxels.voxel_config import VoxelConfig
 
 SHARES = (0.03, 0.06, 0.12, 0.25, 0.4, 0.55, 0.7, 0.85)
@@ -40,7 +41,7 @@ class Curve:
     """The points of one training, the last on all test views; `result` is that of the whole training."""
 
     points: tuple[Point, ...]
-    result: TrainResult
+    result: TrainResult[VoxelField]
 
     def csv(self) -> str:
         """The points as comma-separated values with a header."""

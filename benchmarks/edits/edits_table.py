@@ -160,7 +160,7 @@ def _described(config: VoxelConfig | NerfConfig | SplatConfig) -> str:
 
 def _shown(config: NerfConfig) -> str:
     """How many samples the pictures have, if others than the training."""
-    shown = config.shown_samples
+    shown = config.render_samples
     return "" if shown is None else f" ({shown[0]} + {shown[1]} in pictures)"
 
 

@@ -26,11 +26,12 @@ from cagefield.errors import CagefieldError, line_of
 
 if TYPE_CHECKING:
     from cagefield.datasets import Dataset
+    from cagefield.fields.splat_field import SplatField
+    from cagefield.fields.voxel_field import VoxelField
     from cagefield.scene.scene import Scene
     from cagefield.training.nerf.nerf_config import NerfConfig
+    from cagefield.training.result import TrainResult
     from cagefield.training.splats.splat_config import SplatConfig
-    from cagefield.training.splats.train_splats import SplatTrainResult
-    from cagefield.training.voxels.train_voxels import TrainResult
     from cagefield.training.voxels.voxel_config import VoxelConfig
 
 FieldKind = Literal["auto", "splat", "voxel", "nerf"]
@@ -239,7 +240,7 @@ def nerf_config(training: TrainingOptions, preset: Preset, ndc: Ndc = "auto") ->
 
 def train_scene(
     dataset: Dataset, config: VoxelConfig, checkpoint: Path | None = None, *, resume: bool = False
-) -> tuple[Scene, TrainResult]:
+) -> tuple[Scene, TrainResult[VoxelField]]:
     """The trained scene, with a progress bar on stderr, and the figures of the training."""
     from cagefield.scene.scene import Scene
     from cagefield.training.voxels.train_voxels import train_voxel
@@ -257,7 +258,7 @@ def train_scene(
 
 def train_splats(
     dataset: Dataset, config: SplatConfig, checkpoint: Path | None = None, *, resume: bool = False
-) -> tuple[Scene, SplatTrainResult]:
+) -> tuple[Scene, TrainResult[SplatField]]:
     """The trained scene of splats, with progress bars on stderr, and the figures of the training."""
     from cagefield.scene.scene import Scene
     from cagefield.training.splats.train_splats import train_splat
@@ -278,7 +279,7 @@ def train_splats(
     return Scene.trained(result, dataset), result
 
 
-def summary(result: TrainResult | SplatTrainResult) -> str:
+def summary(result: TrainResult[VoxelField | SplatField]) -> str:
     """One line of figures: time, steps, voxels or splats, PSNR raw and color-corrected, SSIM, worst view."""
     from cagefield.fields.voxel_field import VoxelField
 

@@ -30,8 +30,8 @@ from cagefield.scene.scene import Scene
 from cagefield.training.splats.splat_config import SplatConfig
 
 if TYPE_CHECKING:
-    from cagefield.training.splats.fit_splats import Surface
-    from cagefield.training.splats.train_splats import SplatTrainResult
+    from cagefield.training.result import TrainResult
+    from cagefield.training.splats.fit_splats import SurfacePoints
 
 MOST_SPLATS = 300_000
 """Splats that are fitted at most, unless more are asked for."""
@@ -59,16 +59,16 @@ def baked(scene: Scene) -> SplatField:
 
 def fitted_splats(
     scene: Scene, config: SplatConfig, on_stage: OnStage = lambda stage, done, note: None
-) -> SplatTrainResult:
+) -> TrainResult[SplatField]:
     """Splats fitted to an edited scene of voxels, and how well cameras that they were not fitted to see them.
 
     Raises CagefieldError where nothing of the field can be seen.
     """
     from cagefield.training.splats.fit_splats import fit_splats
-    from cagefield.training.splats.splat_run import most_splats
+    from cagefield.training.splats.splat_run import max_splats
 
     cameras, held_out = fitting_cameras(scene)
-    config = replace(config, splats=config.splats or min(MOST_SPLATS, most_splats(cameras, config)))
+    config = replace(config, splats=config.splats or min(MOST_SPLATS, max_splats(cameras, config)))
     return fit_splats(
         scene.renderer,
         cameras,
@@ -165,13 +165,12 @@ def scene_mesh(
     return mesh_of(voxels)
 
 
-def scene_points(scene: Scene, count: int, on_stage: OnStage) -> Surface:
-    """At most `count` points of an edited scene's surface, drawn evenly from the surface that its cameras
-    see."""
-    from cagefield.training.splats.fit_splats import surface_seen
+def scene_points(scene: Scene, count: int, on_stage: OnStage) -> SurfacePoints:
+    """At most `count` points of an edited scene's surface, drawn evenly from what its cameras see."""
+    from cagefield.training.splats.fit_splats import sample_surface
 
     cameras, _ = fitting_cameras(scene)
-    return surface_seen(scene.renderer, cameras, count, on_stage=on_stage)
+    return sample_surface(scene.renderer, cameras, count, on_stage=on_stage)
 
 
 def cages_of(selection: str, edits: EditStack) -> tuple[Cage, ...]:

@@ -21,7 +21,7 @@ from cagefield.formats.splats.transform import transformed
 from cagefield.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from cagefield.training.splats.fit_splats import Surface
+    from cagefield.training.splats.fit_splats import SurfacePoints
 
 FloatArray = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def mesh_in_source(mesh: Mesh, back: FloatArray) -> tuple[Mesh, Offset]:
     return moved, offset
 
 
-def points_in_source(points: Surface, back: FloatArray) -> tuple[Surface, Offset]:
+def points_in_source(points: SurfacePoints, back: FloatArray) -> tuple[SurfacePoints, Offset]:
     """(the points under a similarity [4,4] less an offset, the offset)."""
     positions, offset = _near_origin(_moved(points.positions, back))
     return replace(points, positions=positions, normals=_turned(points.normals, back)), offset

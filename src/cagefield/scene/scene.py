@@ -75,13 +75,13 @@ if TYPE_CHECKING:
     from cagefield.rendering.renderers import AnyRenderer
 
     class Trained(Protocol):
-        """Result of a trainer: the field, and the gains [train views,3] of the photos."""
+        """Trained field, with the exposure gains [V,3] of the training photos, None without."""
 
         @property
         def field(self) -> VoxelField | SplatField: ...
 
         @property
-        def gains(self) -> NDArray[np.float32]: ...
+        def gains(self) -> NDArray[np.float32] | None: ...
 
 
 MAX_CONDITION = 1e9
@@ -146,7 +146,7 @@ class Scene:
             field,
             cameras=cameras,
             background=background_rgb(getattr(result, "background", white)),
-            gains=() if (result.gains == 1.0).all() else result.gains.tolist(),
+            gains=() if result.gains is None or (result.gains == 1.0).all() else result.gains.tolist(),
             source_to_world=dataset.source_to_world,
         )
 

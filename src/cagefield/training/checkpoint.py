@@ -1,7 +1,8 @@
-"""The state of a VoxelField's training in a file: numbers and arrays by name, and what they belong to."""
+"""Checkpoint files: named scalars and arrays, and the signature of the training they belong to."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,17 +20,22 @@ from cagefield.files.npz import read_arrays
 def write_checkpoint(
     path: Path, signature: str, scalars: Mapping[str, Any], arrays: Mapping[str, Any]
 ) -> None:
-    """Writes them atomically; `signature` says which training they belong to."""
+    """Write a checkpoint atomically; `signature` identifies the training."""
     contents: dict[str, Any] = {"scalars": json.dumps(scalars), "config": signature, **arrays}
     with replaced_file(path) as draft, open(draft, "wb") as file:
         np.savez(file, **contents)
 
 
+def signature_options(config: Any, keys: Mapping[str, str]) -> dict[str, Any]:
+    """Options of a configuration dataclass by their keys in signatures; `keys` has those that differ."""
+    return {keys.get(name, name): value for name, value in dataclasses.asdict(config).items()}
+
+
 def read_checkpoint(path: Path, signature: str) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """(scalars, arrays) of a file that `write_checkpoint` wrote with the same signature.
+    """(scalars, arrays) of a file that `write_checkpoint` wrote with this signature.
 
     Raises:
-        CagefieldError: no such file, a damaged one, or one of another training.
+        CagefieldError: missing file, damaged file, or checkpoint of another training.
     """
     try:
         arrays = read_arrays(path)

@@ -1,4 +1,4 @@
-"""Whether what a checkpoint holds can be what a training wrote: damage is refused before it is taken."""
+"""Checks of a checkpoint's contents against the forms that a training writes."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 from cagefield.errors import CagefieldError
 
-_MOST = 2**53
-"""Above all counts: whole numbers that a float holds."""
+MAX_COUNT = 2**53
+"""Largest count; every whole number up to it is exact as a float."""
 
-Form = tuple[str, tuple[int | str, ...]]
-"""(dtype's name, lengths); a length that is a letter is the same in all arrays of a checkpoint."""
+ArrayForm = tuple[str, tuple[int | str, ...]]
+"""(name of the dtype, lengths); a letter stands for one length that several arrays share."""
 
 
 @contextmanager
-def refusing_damage(path: Path) -> Iterator[None]:
-    """What does not fit together within is CagefieldError: one line that says to start anew."""
+def reject_damage(path: Path) -> Iterator[None]:
+    """Turn errors of inconsistent contents into one-line CagefieldErrors that say to start anew."""
     try:
         yield
     except (KeyError, ValueError, TypeError, IndexError, OverflowError, AttributeError) as error:
@@ -32,8 +32,8 @@ def refusing_damage(path: Path) -> Iterator[None]:
         raise CagefieldError(f"{path}: a damaged checkpoint ({reason:.120}); start anew") from error
 
 
-def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form]) -> dict[str, int]:
-    """The length of each letter in `forms`. Raises ValueError for one of another form."""
+def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, ArrayForm]) -> dict[str, int]:
+    """Length of each letter in `forms`. Raises ValueError for an array of another form."""
     lengths: dict[str, int] = {}
     for name, (dtype, shape) in forms.items():
         if name not in arrays:
@@ -49,14 +49,14 @@ def check_arrays(arrays: Mapping[str, NDArray[Any]], forms: Mapping[str, Form]) 
 
 
 def check_finite(arrays: Mapping[str, NDArray[Any]], names: tuple[str, ...]) -> None:
-    """Passes where these arrays hold numbers. Raises ValueError."""
+    """Check that the named arrays are finite. Raises ValueError."""
     for name in names:
         if not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} holds what is no number")
+            raise ValueError(f"{name} holds NaN or infinity")
 
 
 def check_counts(values: Mapping[str, Any], **most: int) -> None:
-    """Passes where these are whole numbers from 0 to `most`. Raises ValueError."""
+    """Check that the named values are whole numbers from 0 to `most`. Raises ValueError."""
     for name, highest in most.items():
         value = values[name]
         if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value <= highest:
@@ -64,8 +64,8 @@ def check_counts(values: Mapping[str, Any], **most: int) -> None:
 
 
 def check_run(values: Mapping[str, Any], loss: str) -> None:
-    """Passes where step, seconds and the loss of that name can be a run's. Raises ValueError."""
-    check_counts(values, step=_MOST)
+    """Check the step, the seconds and the value named `loss` of a run. Raises ValueError."""
+    check_counts(values, step=MAX_COUNT)
     for name, value in (("seconds", values["seconds"]), (loss, values[loss])):
         if not isinstance(value, (int, float)) or value < 0 or math.isinf(value):
             raise ValueError(f"{name} is {value!s:.20}, not a number from 0")

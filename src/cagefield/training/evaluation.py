@@ -1,4 +1,4 @@
-"""Figures of pictures of a field against photos: PSNR raw and color-corrected, SSIM, and the worst view."""
+"""Metrics of rendered images against photos: raw and color-corrected PSNR, SSIM, and the worst view."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cagefield.typing import AnyArray, Float32
 
 
 @dataclass(frozen=True)
-class ViewFigures:
-    """Figures of a picture against the photo of a view, over the photo's valid pixels.
+class ViewMetrics:
+    """Metrics of a rendered image against a view's photo, over the photo's valid pixels.
 
-    psnr       of the picture as it is, in dB
-    corrected  of the picture after the affine fit of each color channel to the photo, in dB
-    ssim       of the picture as it is; NaN for photos smaller than SSIM's window
+    psnr       of the image, in dB
+    corrected  PSNR after an affine fit of each color channel to the photo, in dB
+    ssim       of the image; NaN for photos smaller than SSIM's window
     """
 
     name: str
@@ -33,9 +33,9 @@ class ViewFigures:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Figures of several views; means are NaN where no view has a figure."""
+    """Metrics of several views; a mean over no values is NaN."""
 
-    views: tuple[ViewFigures, ...] = ()
+    views: tuple[ViewMetrics, ...] = ()
 
     @property
     def psnr(self) -> float:
@@ -49,12 +49,12 @@ class Evaluation:
 
     @property
     def ssim(self) -> float:
-        """Mean SSIM over the views that its window fits in."""
+        """Mean SSIM over the views that are at least as large as its window."""
         return _mean([view.ssim for view in self.views if view.ssim == view.ssim])
 
     @property
-    def worst(self) -> ViewFigures | None:
-        """The view of the lowest raw PSNR, None where there are no views."""
+    def worst(self) -> ViewMetrics | None:
+        """View of the lowest raw PSNR; None without views."""
         return min(self.views, key=lambda view: view.psnr, default=None)
 
     def __str__(self) -> str:
@@ -70,7 +70,7 @@ def _mean(values: Sequence[float]) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-def composited(pixels: NDArray[np.uint8]) -> Float32:
+def composite_on_white(pixels: NDArray[np.uint8]) -> Float32:
     """Colors [H,W,3] in [0,1] of a photo's 8-bit pixels; a cut-out [H,W,4] is composited on white."""
     photo = pixels.astype(np.float32) / np.float32(255)
     if photo.shape[2] == 4:
@@ -78,28 +78,28 @@ def composited(pixels: NDArray[np.uint8]) -> Float32:
     return photo
 
 
-def view_figures(
-    name: str, picture: AnyArray, photo: AnyArray, valid: NDArray[np.bool_] | None = None
-) -> ViewFigures | None:
-    """Figures of a picture [H,W,3] of [0,1] against a photo; None where no pixel [H,W] is valid."""
+def evaluate_image(
+    name: str, image: AnyArray, photo: AnyArray, valid: NDArray[np.bool_] | None = None
+) -> ViewMetrics | None:
+    """Metrics of an image [H,W,3] in [0,1] against a photo; None where no pixel [H,W] is valid."""
     if valid is not None and not valid.any():
         return None
-    picture = np.clip(picture, 0, 1)
+    image = np.clip(image, 0, 1)
     fits = min(photo.shape[:2]) >= WINDOW
-    return ViewFigures(
+    return ViewMetrics(
         name,
-        psnr(picture, photo, valid),
-        psnr(color_corrected(picture, photo, valid), photo, valid),
-        ssim(picture, photo, valid) if fits else float("nan"),
+        psnr(image, photo, valid),
+        psnr(color_corrected(image, photo, valid), photo, valid),
+        ssim(image, photo, valid) if fits else float("nan"),
     )
 
 
-def collected(figures: Sequence[ViewFigures | None]) -> Evaluation:
-    """The views that have figures; a warning counts those whose masks leave no pixel."""
-    known = tuple(view for view in figures if view is not None)
-    if len(known) < len(figures):
+def collect_metrics(metrics: Sequence[ViewMetrics | None]) -> Evaluation:
+    """Evaluation of the views that have metrics; a warning counts views whose masks leave no pixel."""
+    known = tuple(view for view in metrics if view is not None)
+    if len(known) < len(metrics):
         warnings.warn(
-            f"{len(figures) - len(known)} of {len(figures)} photos are left out of the figures, "
+            f"{len(metrics) - len(known)} of {len(metrics)} photos are left out of the figures, "
             "their masks leave no pixel",
             stacklevel=3,
         )
@@ -107,14 +107,16 @@ def collected(figures: Sequence[ViewFigures | None]) -> Evaluation:
 
 
 def evaluate_views(field: VoxelField | SplatField, views: Sequence[View]) -> Evaluation:
-    """Figures of the field's pictures against photos; alpha is composited on white."""
+    """Metrics of the field's images against the views' photos; alpha is composited on white."""
     from cagefield.rendering.renderers import renderer_of
 
     renderer = renderer_of(field)
-    figures: list[ViewFigures | None] = []
+    metrics: list[ViewMetrics | None] = []
     for view in views:
         pixels = view.load()
-        frame = renderer.render(view.camera, background="white" if pixels.shape[2] == 4 else "black")
-        if frame is not None:
-            figures.append(view_figures(view.name, frame.rgb, composited(pixels), view.valid_pixels()))
-    return collected(figures)
+        image = renderer.render(view.camera, background="white" if pixels.shape[2] == 4 else "black")
+        if image is not None:
+            metrics.append(
+                evaluate_image(view.name, image.rgb, composite_on_white(pixels), view.valid_pixels())
+            )
+    return collect_metrics(metrics)

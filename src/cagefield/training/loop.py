@@ -1,4 +1,4 @@
-"""The loop of a training: steps until the run is done or Ctrl-C is pressed, and its checkpoints."""
+"""Training loop: steps until the run is done or Ctrl-C is pressed, with checkpoints."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from typing import Any, Protocol
 
 from cagefield.errors import CagefieldError, line_of
 
-CHECKPOINT_SECONDS = 60.0
-"""Seconds of training between two checkpoints, at most."""
+MAX_CHECKPOINT_INTERVAL_SECONDS = 60.0
+"""Maximum training time between two checkpoints."""
 
-FIRST_CHECKPOINT = 5.0
-"""Seconds to the first one; as many to the next, then twice as many each time."""
+FIRST_CHECKPOINT_SECONDS = 5.0
+"""Training time to the first checkpoint; each later one doubles the total."""
 
 
 class Run(Protocol):
-    """The state of a training run."""
+    """State of a training run."""
 
     step: int
     seconds: float
@@ -31,16 +31,16 @@ class Run(Protocol):
         """Progress, 0 to 1."""
 
     def advance(self) -> None:
-        """One step."""
+        """Take one step."""
 
     def progress(self) -> Any:
-        """Where the run stands, to be told."""
+        """Progress report of the run."""
 
     def store(self, path: Path) -> None:
-        """Writes the state, whole or not at all."""
+        """Write the state, whole or not at all."""
 
     def restore(self, path: Path) -> None:
-        """Takes the state from a file."""
+        """Restore the state from a file."""
 
 
 def run_to_end(
@@ -51,17 +51,16 @@ def run_to_end(
     on_progress: Callable[[Any], None] | None,
     after_step: Callable[[tuple[int, float]], None] = lambda before: None,
 ) -> bool:
-    """True when the run was finished, False when Ctrl-C ended it early.
+    """True for a finished run, False for one that Ctrl-C ended early.
 
-    Its state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at its end,
-    early or not; `resume` continues from there: a run that was finished is so at once. Where it cannot be
-    written (a full disk) a warning says so,
-    the last one is kept, and the run goes on.
+    The state is written to `checkpoint` after 5, 10, 20 and 40 seconds, then every minute, and at the end,
+    early or not. `resume` continues from the checkpoint; a finished run takes no further step. Where the
+    checkpoint cannot be written (a full disk), a warning says so, the previous one stays, and the run
+    continues.
     `after_step` is called after each step and its report, with the (step, seconds) before it.
 
     Raises:
-        CagefieldError: no folder for the checkpoint, nothing to resume from, or nothing that `restore` can
-            read.
+        CagefieldError: the checkpoint's folder is missing, or `restore` finds no readable checkpoint.
     """
     checkpoint = None if checkpoint is None else Path(checkpoint)
     if resume:
@@ -78,22 +77,22 @@ def run_to_end(
             if on_progress is not None:
                 on_progress(run.progress())
             after_step(before)
-            if checkpoint is not None and run.seconds - saved > _until_next(saved):
+            if checkpoint is not None and run.seconds - saved > _checkpoint_interval_seconds(saved):
                 saved = run.seconds
-                if _stored(run, checkpoint):
+                if _store_or_warn(run, checkpoint):
                     stored = run.step
         if checkpoint is not None and run.step != stored:
-            _stored(run, checkpoint)
+            _store_or_warn(run, checkpoint)
     return run.done >= 1.0
 
 
-def _until_next(saved: float) -> float:
-    """Seconds of training to the next checkpoint: a kill costs half of a short training, or a minute."""
-    return min(CHECKPOINT_SECONDS, max(FIRST_CHECKPOINT, saved))
+def _checkpoint_interval_seconds(saved: float) -> float:
+    """Training time to the next checkpoint: a kill costs at most half of a short run, or a minute."""
+    return min(MAX_CHECKPOINT_INTERVAL_SECONDS, max(FIRST_CHECKPOINT_SECONDS, saved))
 
 
-def _stored(run: Run, checkpoint: Path) -> bool:
-    """Whether the run's state could be written; where not, a warning says what is there to go on from."""
+def _store_or_warn(run: Run, checkpoint: Path) -> bool:
+    """Write the run's state; False, with a warning about the previous checkpoint, where that fails."""
     try:
         run.store(checkpoint)
     except OSError as error:
@@ -110,7 +109,7 @@ def _stored(run: Run, checkpoint: Path) -> bool:
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[Callable[[], bool]]:
-    """Turns Ctrl-C into a flag that is checked between steps (in the main thread)."""
+    """Replace Ctrl-C by a flag that is checked between steps (in the main thread)."""
     pressed = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield pressed.is_set

@@ -1,4 +1,4 @@
-"""What a training tells while it runs: where it stands, and its field at chosen times."""
+"""Progress reports of a training, and snapshots of its field at chosen times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cagefield.fields.voxel_field import VoxelField
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, rays/s, seconds."""
+    """Progress of a run: `done` in [0,1], running mean squared error and its PSNR, rays/s, seconds."""
 
     done: float
     step: int
@@ -24,7 +24,7 @@ class Progress:
     voxels: int
 
     def __str__(self) -> str:
-        """Loss, PSNR, speed and size of the grid."""
+        """Loss, PSNR, speed and grid size."""
         return (
             f"loss {self.loss:.5f}, PSNR {self.psnr:.1f} dB, {self.rays_per_second / 1e3:.0f} k rays/s, "
             f"{self.resolution}^3 grid"
@@ -33,10 +33,10 @@ class Progress:
 
 @dataclass(frozen=True)
 class Snapshots:
-    """Calls of `on_field` with the field as it is after so many steps, or so many minutes of training.
+    """Calls of `on_field` with the field after given steps and minutes of training.
 
-    What `on_field` does is no training and does not count as such. Where several times fall in one step it is
-    called once; a resumed run does not go back to times before its checkpoint.
+    Time spent in `on_field` does not count as training. Several times within one step give one call; a
+    resumed run skips the times before its checkpoint.
 
     Raises:
         CagefieldError: a step below 1, minutes that are not above 0.
@@ -54,7 +54,7 @@ class Snapshots:
             if not minutes > 0:
                 raise CagefieldError(f"a snapshot is asked for after {minutes} minutes; it must be above 0")
 
-    def due(self, before: tuple[int, float], now: tuple[int, float]) -> bool:
+    def is_due(self, before: tuple[int, float], now: tuple[int, float]) -> bool:
         """Whether a time lies after `before` and not after `now`, each (step, seconds)."""
         return any(before[0] < step <= now[0] for step in self.steps) or any(
             before[1] < 60.0 * minutes <= now[1] for minutes in self.minutes

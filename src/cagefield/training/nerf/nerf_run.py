@@ -1,4 +1,4 @@
-"""The state of one training of a NerfField, from batch to batch."""
+"""State of a NerfField's training run."""
 
 from __future__ import annotations
 
@@ -23,30 +23,31 @@ from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.files.atomic import replaced_file
 from cagefield.formats.torch_files import read_tensors_of
 from cagefield.rendering.nerf.nerf_renderer import Jitter, Rays, march
+from cagefield.training.checkpoint import signature_options
 from cagefield.training.checkpoint_checks import check_run
-from cagefield.training.evaluation import composited
-from cagefield.training.nerf.nerf_config import NerfConfig
-from cagefield.training.nerf.nerf_space import space_of
+from cagefield.training.evaluation import composite_on_white
+from cagefield.training.nerf.nerf_config import CHECKPOINT_KEYS, NerfConfig
+from cagefield.training.nerf.nerf_space import build_sampling_space
 
-SKIP = 5
-"""The trunk layer that sees the position's encoding again."""
+SKIP_LAYER = 5
+"""Trunk layer whose input includes the encoded position again."""
 
-GAIN = 0.1
-"""The learning rate falls to this share over `decay` steps."""
+FINAL_LR_SHARE = 0.1
+"""Learning rate after `lr_decay_steps` steps, as a share of the initial one."""
 
-FOG = 0.5
-"""Optical depth of an untrained field across its box: where its density is 0 nothing can be learnt."""
+INITIAL_OPTICAL_DEPTH = 0.5
+"""Optical depth of an untrained field across its box; zero density has no gradient."""
 
-FOG_POINTS = 4096
-"""Points at which its density is asked for."""
+DENSITY_SAMPLES = 4096
+"""Number of points at which the untrained density is sampled."""
 
-PHOTOS = 8
-"""Photos whose rays a batch of an unbounded capture holds."""
+PHOTOS_PER_BATCH = 8
+"""Maximum number of photos per batch of an unbounded capture."""
 
 
 @dataclass(frozen=True)
 class NerfProgress:
-    """Where a run stands: `done` in [0,1], step, running PSNR of the fine picture, rays/s, seconds."""
+    """Progress of a run: `done` in [0,1], step, running PSNR of the fine network, rays/s, seconds."""
 
     done: float
     step: int
@@ -59,23 +60,23 @@ class NerfProgress:
 
 
 class NerfRun:
-    """A training run; see `loop.Run`."""
+    """Training run of a NerfField; a `loop.Run`."""
 
     def __init__(self, dataset: Dataset, config: NerfConfig) -> None:
-        self.config, self.space = config, space_of(dataset, config.ndc)
+        self.config, self.space = config, build_sampling_space(dataset, config.ndc)
         self.dataset = dataset = self.space.dataset
         self.device = torch_device()
-        self.half = config.half
-        if self.half is None:
-            self.half = self.device.type == "cuda" and torch.cuda.is_bf16_supported()
+        self.bfloat16 = config.bfloat16
+        if self.bfloat16 is None:
+            self.bfloat16 = self.device.type == "cuda" and torch.cuda.is_bf16_supported()
         torch.manual_seed(config.seed)
-        chance = np.random.default_rng(config.seed)
-        noise = (1.0 if dataset.unbounded else 0.0) if config.noise is None else config.noise
+        rng = np.random.default_rng(config.seed)
+        noise = (1.0 if dataset.unbounded else 0.0) if config.raw_noise_std is None else config.raw_noise_std
         self.jitter = Jitter(noise)
         own_box = dataset.bounds if self.space.ndc is None else np.array([[-1.0] * 3, [1.0] * 3])
         self.start = NerfField(
-            initial_network(config, chance, own_box),
-            initial_network(config, chance, own_box) if config.samples[1] else None,
+            build_initial_network(config, rng, own_box),
+            build_initial_network(config, rng, own_box) if config.samples[1] else None,
             dataset.bounds,
             self.space.near,
             self.space.far,
@@ -85,9 +86,11 @@ class NerfRun:
             bounded=not dataset.unbounded,
         )
         self.torch = TorchNerf(self.start, self.device, trainable=True)
-        self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.rate)
-        self.photos = [torch.from_numpy(composited(view.load())).to(self.device) for view in dataset.train]
-        self.drawn = [_drawn_pixels(view) for view in dataset.train]
+        self.optimizer = torch.optim.Adam(self.torch.parameters, lr=config.lr)
+        self.photos = [
+            torch.from_numpy(composite_on_white(view.load())).to(self.device) for view in dataset.train
+        ]
+        self.pixel_indices = [_valid_pixel_indices(view) for view in dataset.train]
         self.white = dataset.train[0].load().shape[2] == 4
         self.step, self.seconds, self.loss = 0, 0.0, float("nan")
 
@@ -99,18 +102,18 @@ class NerfRun:
         return min(1.0, self.step / self.config.steps)
 
     def advance(self) -> None:
-        """One step."""
+        """Take one step."""
         began = time.perf_counter()
         config = self.config
-        passed = self.done if config.decay is None else self.step / config.decay
+        passed = self.done if config.lr_decay_steps is None else self.step / config.lr_decay_steps
         for group in self.optimizer.param_groups:
-            group["lr"] = config.rate * GAIN**passed
+            group["lr"] = config.lr * FINAL_LR_SHARE**passed
         rays, target = self.next_batch()
-        with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.half):
+        with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.bfloat16):
             coarse, fine = march(self.torch, rays, jitter=self.jitter)
-        behind = 1.0 if self.white else 0.0
+        background = 1.0 if self.white else 0.0
         errors = [
-            ((sums.premultiplied + behind * (1.0 - sums.opacity[:, None]) - target) ** 2).mean()
+            ((sums.premultiplied + background * (1.0 - sums.opacity[:, None]) - target) ** 2).mean()
             for sums in (coarse, fine)
         ]
         self.optimizer.zero_grad(set_to_none=True)
@@ -123,52 +126,52 @@ class NerfRun:
         self.seconds += time.perf_counter() - began
 
     def next_batch(self) -> tuple[Rays, Tensor]:
-        """Random rays of one photo or a few, and the photos' colours [N,3] there."""
-        chance = np.random.default_rng((self.config.seed, self.step))
+        """Random rays [N] of one or several photos, and the photos' colors [N,3]."""
+        rng = np.random.default_rng((self.config.seed, self.step))
         count, unbounded = self.config.batch_rays, self.dataset.unbounded
-        photos = min(PHOTOS, count) if unbounded else 1
-        middle = not unbounded and self.step < self.config.precrop
-        parts = [self._rays(chance, len(rows), middle) for rows in np.array_split(np.arange(count), photos)]
+        photos = min(PHOTOS_PER_BATCH, count) if unbounded else 1
+        middle = not unbounded and self.step < self.config.precrop_steps
+        parts = [self._rays(rng, len(rows), middle) for rows in np.array_split(np.arange(count), photos)]
         rays, targets = zip(*parts, strict=True)
         return Rays(*(torch.cat(column) for column in zip(*rays, strict=True))), torch.cat(targets)
 
-    def _rays(self, chance: np.random.Generator, count: int, middle: bool) -> tuple[Rays, Tensor]:
-        """`count` rays of a random photo, or of its middle half, and the photo's colours there."""
-        number = int(chance.integers(len(self.photos)))
+    def _rays(self, rng: np.random.Generator, count: int, middle: bool) -> tuple[Rays, Tensor]:
+        """`count` rays of a random photo, or of its middle half, and the photo's colors [count,3]."""
+        number = int(rng.integers(len(self.photos)))
         camera: Camera = self.dataset.train[number].camera
         columns, rows = camera.width, camera.height
         low_i, low_j = (columns // 4, rows // 4) if middle else (0, 0)
-        drawn = self.drawn[number]
-        if drawn is None:
-            i = chance.integers(low_i, columns - low_i, count)
-            j = chance.integers(low_j, rows - low_j, count)
+        pixel_indices = self.pixel_indices[number]
+        if pixel_indices is None:
+            i = rng.integers(low_i, columns - low_i, count)
+            j = rng.integers(low_j, rows - low_j, count)
         else:
-            within = (np.abs(drawn - (0.5 * columns, 0.5 * rows)) <= (0.25 * columns, 0.25 * rows)).all(
-                axis=1
-            )
-            some = drawn[within] if middle and within.any() else drawn
-            i, j = some[chance.integers(0, len(some), count)].T
+            within = (
+                np.abs(pixel_indices - (0.5 * columns, 0.5 * rows)) <= (0.25 * columns, 0.25 * rows)
+            ).all(axis=1)
+            some = pixel_indices[within] if middle and within.any() else pixel_indices
+            i, j = some[rng.integers(0, len(some), count)].T
         target = self.photos[number][torch.from_numpy(j).to(self.device), torch.from_numpy(i).to(self.device)]
         return Rays.of(camera, self.device, np.stack([i, j], axis=1)), target
 
     def progress(self) -> NerfProgress:
-        """Where the run stands."""
+        """Progress report of the run."""
         psnr = -10.0 * np.log10(max(self.loss, 1e-10)) if self.loss == self.loss else float("nan")
         rate = self.step * self.config.batch_rays / max(self.seconds, 1e-9)
         return NerfProgress(self.done, self.step, float(psnr), rate, self.seconds)
 
     def field(self) -> NerfField:
-        """The field as it is now."""
+        """Current field."""
         fine = None if self.torch.fine is None else _as_mlp(self.torch.fine)
         return dataclasses.replace(
             self.start,
             coarse=_as_mlp(self.torch.coarse),
             fine=fine,
-            samples=self.config.shown_samples or self.config.samples,
+            samples=self.config.render_samples or self.config.samples,
         )
 
     def store(self, path: Path) -> None:
-        """Writes the state of the run to `path`, whole or not at all."""
+        """Write the state of the run to `path`, whole or not at all."""
         state = {
             "config": repr(self._options()),
             "step": self.step,
@@ -180,7 +183,7 @@ class NerfRun:
         with replaced_file(path) as draft, draft.open("wb") as out:
             try:
                 torch.save(state, out)
-            except RuntimeError as error:  # torch's word for a write that failed
+            except RuntimeError as error:  # PyTorch reports a failed write as a RuntimeError
                 raise (
                     error.__context__
                     if isinstance(error.__context__, OSError)
@@ -188,9 +191,9 @@ class NerfRun:
                 ) from None
 
     def restore(self, path: Path) -> None:
-        """Continues from the state in `path`."""
+        """Restore the state in `path`."""
         try:
-            state = _state_in(path)
+            state = _read_state(path)
             if state["config"] != repr(self._options()):
                 raise CagefieldError(
                     f"{path} was written with other options or photos; give the same ones, or start anew"
@@ -198,7 +201,7 @@ class NerfRun:
             with torch.no_grad():
                 for own, values in zip(self.torch.parameters, state["parameters"], strict=True):
                     own.copy_(values)
-            # Rates are the run's own; the rest is sums of the gradients, by parameter.
+            # Learning rates come from this run; the saved state has the moments of the gradients.
             settings = self.optimizer.state_dict()
             self.optimizer.load_state_dict({**settings, "state": state["optimizer"]["state"]})
             for parameter, sums in self.optimizer.state.items():
@@ -215,7 +218,7 @@ class NerfRun:
         torch.manual_seed(self.config.seed + self.step)
 
     def _check_sums(self, parameter: Tensor, sums: dict[str, Any]) -> None:
-        """Passes where these can be Adam's of a parameter. Raises ValueError."""
+        """Check that `sums` can be Adam's state of the parameter. Raises ValueError."""
         moments = [sums["exp_avg"], sums["exp_avg_sq"]]
         fits = all(isinstance(each, Tensor) and each.shape == parameter.shape for each in moments)
         step = sums["step"]
@@ -223,55 +226,55 @@ class NerfRun:
             raise ValueError("sums of gradients of other networks")
 
     def _options(self) -> dict[str, Any]:
-        """What a resumed run must have in common with the one it continues."""
-        options = dataclasses.asdict(self.config)
+        """Options and photos that a checkpoint must share with this run."""
+        options = signature_options(self.config, CHECKPOINT_KEYS)
         for name in ("steps", "minutes", "decay", "shown_samples"):
             del options[name]
         return {**options, "views": [view.name for view in self.dataset.train]}
 
 
-def _state_in(path: Path) -> dict[str, Any]:
-    """What `NerfRun.store` wrote, on the CPU. Raises ValueError for a file that is damaged."""
+def _read_state(path: Path) -> dict[str, Any]:
+    """Contents of a file written by `NerfRun.store`, on the CPU. Raises ValueError for a damaged file."""
     try:
         return read_tensors_of(path)
     except FieldError as error:
         raise ValueError(str(error).removeprefix(f"{path}: ")) from error
 
 
-def initial_network(config: NerfConfig, chance: np.random.Generator, box: NDArray[Any]) -> Mlp:
-    """An untrained network: uniform weights and biases within 1/sqrt(inputs), as PyTorch's layers start.
+def build_initial_network(config: NerfConfig, rng: np.random.Generator, box: NDArray[Any]) -> Mlp:
+    """Untrained network with weights and biases uniform within 1/sqrt(inputs), as PyTorch initializes layers.
 
-    The density's bias is then moved so that the network's box [2,3], in its own space, is filled with thin
-    fog. As drawn, two networks of five are empty everywhere, and have no gradient that could change that.
+    The bias of the density is then shifted so that thin fog of INITIAL_OPTICAL_DEPTH fills the box [2,3].
+    Without the shift, two networks of five are empty everywhere, and zero density has no gradient.
     """
     encoded, seen = 3 + 6 * config.octaves[0], 3 + 6 * config.octaves[1]
 
     def linear(outputs: int, inputs: int) -> Linear:
         limit = inputs**-0.5
-        weight = chance.uniform(-limit, limit, (outputs, inputs))
-        return Linear(weight.astype(np.float32), chance.uniform(-limit, limit, outputs).astype(np.float32))
+        weight = rng.uniform(-limit, limit, (outputs, inputs))
+        return Linear(weight.astype(np.float32), rng.uniform(-limit, limit, outputs).astype(np.float32))
 
     width = config.width
     trunk = [linear(width, encoded)]
     for index in range(1, config.depth):
-        trunk.append(linear(width, width + (encoded if index == SKIP else 0)))
-    drawn = Mlp(
+        trunk.append(linear(width, width + (encoded if index == SKIP_LAYER else 0)))
+    pixel_indices = Mlp(
         trunk=tuple(trunk),
         density=linear(1, width),
         rgb=linear(3, width // 2),
         feature=linear(width, width),
         view=(linear(width // 2, width + seen),),
     )
-    positions = torch.from_numpy(chance.uniform(box[0], box[1], (FOG_POINTS, 3)).astype(np.float32))
+    positions = torch.from_numpy(rng.uniform(box[0], box[1], (DENSITY_SAMPLES, 3)).astype(np.float32))
     with torch.no_grad():
-        median = TorchMlp(drawn, positions.device).trunk(positions)[0].median()
-    fog = FOG / float(np.mean(box[1] - box[0]))
-    weight, bias = drawn.density.weight, drawn.density.bias
-    return dataclasses.replace(drawn, density=Linear(weight, bias + np.float32(fog - float(median))))
+        median = TorchMlp(pixel_indices, positions.device).trunk(positions)[0].median()
+    fog = INITIAL_OPTICAL_DEPTH / float(np.mean(box[1] - box[0]))
+    weight, bias = pixel_indices.density.weight, pixel_indices.density.bias
+    return dataclasses.replace(pixel_indices, density=Linear(weight, bias + np.float32(fog - float(median))))
 
 
-def _drawn_pixels(view: View) -> NDArray[np.int64] | None:
-    """(column, row) [N,2] of the pixels that the mask of a photo leaves; None where they are all."""
+def _valid_pixel_indices(view: View) -> NDArray[np.int64] | None:
+    """(column, row) [N,2] of a photo's valid pixels; None where every pixel is valid."""
     valid = view.valid_pixels()
     return None if valid is None else np.argwhere(valid)[:, ::-1]
 

@@ -1,12 +1,13 @@
 """Training of a NerfField with nerf-pytorch's recipe.
 
-Each step takes random rays of the training photos (in the first `precrop` steps from their middles), renders
-them with stratified samples, and descends on |C_coarse - C|^2 + |C_fine - C|^2 with Adam; the learning rate
-falls to a tenth over `decay` steps. Photos with alpha are composited on white. A batch's rays are of one
-photo, as nerf-pytorch's are for Blender scenes, or, of an unbounded capture, of PHOTOS photos; such a capture
-is moved to a world of its own first (see `training.nerf.nerf_space`), and its `precrop` is left out.
+Each step takes random rays of the training photos (in the first `precrop_steps` steps from the photos' middle
+halves), renders the rays with stratified samples, and minimizes |C_coarse - C|^2 + |C_fine - C|^2 with Adam;
+the learning rate falls to a tenth over `lr_decay_steps` steps. Photos with alpha are composited on white. The
+rays of a batch come from one photo, as in nerf-pytorch for Blender scenes, or, for an unbounded capture, from
+up to PHOTOS_PER_BATCH photos. An unbounded capture is first moved to a normalized world
+(`training.nerf.nerf_space`) and has no precrop.
 
-On CUDA the networks run in bfloat16 where the device has it; weights, encodings and sums stay in float32.
+On a CUDA device with bfloat16 the networks run in bfloat16; weights, encodings and sums stay float32.
 
 Source: Mildenhall et al., "NeRF" (2020), section 5.3 and the authors' code.
 """
@@ -22,27 +23,19 @@ import numpy as np
 from cagefield.datasets.views import Dataset, View
 from cagefield.fields.nerf_field import NerfField
 from cagefield.rendering.nerf.nerf_renderer import Rays, trace
-from cagefield.training.evaluation import composited
+from cagefield.training.evaluation import Evaluation, ViewMetrics, composite_on_white
 from cagefield.training.loop import run_to_end
 from cagefield.training.nerf.nerf_config import NerfConfig
 from cagefield.training.nerf.nerf_run import NerfProgress, NerfRun
-from cagefield.training.nerf.nerf_space import Space
+from cagefield.training.nerf.nerf_space import SamplingSpace
+from cagefield.training.result import TrainResult
 
 
-@dataclass(frozen=True, eq=False)
-class NerfResult:
-    """A trained field and its figures; PSNRs are means over views, NaN where there are none.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NerfResult(TrainResult[NerfField]):
+    """A trained NerfField with its sampling space, whose data set has the cameras in the field's world."""
 
-    `space` holds the data set as the field's world has it, and says how rays were sampled.
-    """
-
-    field: NerfField
-    space: Space
-    steps: int
-    seconds: float
-    train_psnr: float
-    test_psnr: float
-    finished: bool
+    space: SamplingSpace
 
 
 def train_nerf(
@@ -53,14 +46,14 @@ def train_nerf(
     resume: bool = False,
     on_progress: Callable[[NerfProgress], None] | None = None,
 ) -> NerfResult:
-    """The NerfField trained on a data set's photos.
+    """NerfField trained on a data set's photos, with its metrics.
 
-    With `checkpoint` the state is written there every minute and at the end of the run, which may be early
-    (Ctrl-C; `finished` is then False); `resume` continues it, and takes no step where it was finished.
+    With `checkpoint` the state of the run is written every minute and at the end, which Ctrl-C brings early
+    (`finished` is then False). `resume` continues the checkpoint; a finished one takes no further step.
 
     Raises:
-        CagefieldError: NDC that do not suit the capture, or a checkpoint that has no folder, cannot be read
-            or has other options.
+        CagefieldError: NDC for a capture that is not forward-facing, or a checkpoint without folder,
+            unreadable, or of other options.
     """
     run = NerfRun(dataset, config or NerfConfig())
     finished = run_to_end(run, checkpoint=checkpoint, resume=resume, on_progress=on_progress)
@@ -69,25 +62,38 @@ def train_nerf(
         evaluate_nerf(field, views[:: max(1, len(views) // 4)][:4])
         for views in (run.dataset.train, run.dataset.test)
     )
-    return NerfResult(field, run.space, run.step, run.seconds, train, test, finished)
+    return NerfResult(
+        field=field,
+        space=run.space,
+        steps=run.step,
+        seconds=run.seconds,
+        train_psnr=train.psnr,
+        test=test,
+        finished=finished,
+        cameras=tuple(view.camera for view in run.dataset.train),
+    )
 
 
-def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500) -> float:
-    """Mean PSNR in dB over views, on about so many pixels of each; alpha is composited on white."""
-    scores = []
+def evaluate_nerf(field: NerfField, views: tuple[View, ...], pixels: int = 2500) -> Evaluation:
+    """Raw PSNRs of views, on about `pixels` pixels of each; alpha is composited on white.
+
+    A subset of pixels has neither a color-corrected PSNR nor an SSIM: both are NaN.
+    """
+    metrics = []
     for view in views:
-        colours, camera = composited(view.load()), view.camera
+        photo, camera = composite_on_white(view.load()), view.camera
         step = max(1, round((camera.width * camera.height / pixels) ** 0.5))
         j, i = np.meshgrid(np.arange(0, camera.height, step), np.arange(0, camera.width, step), indexing="ij")
-        chosen = np.stack([i.ravel(), j.ravel()], axis=1)
+        indices = np.stack([i.ravel(), j.ravel()], axis=1)
         valid = view.valid_pixels()
         if valid is not None:
-            chosen = chosen[valid[chosen[:, 1], chosen[:, 0]]]
-        if not len(chosen):
+            indices = indices[valid[indices[:, 1], indices[:, 0]]]
+        if not len(indices):
             continue
-        rgb, opacity, _ = trace(field.torch, Rays.of(camera, field.torch.device, chosen))
-        behind = 1.0 if view.load().shape[2] == 4 else 0.0
-        picture = rgb.cpu().numpy() + behind * (1.0 - opacity.cpu().numpy()[:, None])
-        error = np.mean((np.clip(picture, 0, 1) - colours[chosen[:, 1], chosen[:, 0]]) ** 2)
-        scores.append(-10.0 * np.log10(max(float(error), 1e-10)))
-    return float(np.mean(scores)) if scores else float("nan")
+        rgb, opacity, _ = trace(field.torch, Rays.of(camera, field.torch.device, indices))
+        background = 1.0 if view.load().shape[2] == 4 else 0.0
+        image = rgb.cpu().numpy() + background * (1.0 - opacity.cpu().numpy()[:, None])
+        error = np.mean((np.clip(image, 0, 1) - photo[indices[:, 1], indices[:, 0]]) ** 2)
+        psnr = -10.0 * float(np.log10(max(float(error), 1e-10)))
+        metrics.append(ViewMetrics(view.name, psnr, float("nan"), float("nan")))
+    return Evaluation(tuple(metrics))

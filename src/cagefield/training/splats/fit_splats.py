@@ -1,10 +1,8 @@
-"""Splats fitted to any field that has a renderer, its edits in them: trained on the renderer's own pictures.
+"""Splats fitted to any renderable field, including its edits: trained on the renderer's images.
 
-The splats begin on the field's surface: at pixels of the rendered pictures, at their depths, flat along the
-gradient of the density (the pictures' normals), in the colour that the field's harmonics show there. The
-pictures then take the place of photos in the training (`training.splats.train_splats`), and their depths say
-exactly what
-lies empty before the surface.
+The initial splats lie on the field's surface: at pixels of the rendered images, at their depths, flat along
+the density gradient (the rendered normals), in the rendered color. The images then replace photos in the
+training (`training.splats.train_splats`), and their depths give the exact free space in front of the surface.
 """
 
 from __future__ import annotations
@@ -20,37 +18,42 @@ from scipy.spatial.transform import Rotation
 from cagefield.cameras.camera import Camera
 from cagefield.datasets.views import Dataset, View
 from cagefield.errors import CagefieldError
+from cagefield.fields.splat_field import SplatField
 from cagefield.files.temporary_folders import TemporaryFolder
 from cagefield.images.image_files import write_png
 from cagefield.images.render_result import Background, RenderResult
-from cagefield.training.splats.initialization import Seeds, neighbour_distance
-from cagefield.training.splats.plane_sweep import CLEAR
+from cagefield.training.result import TrainResult
+from cagefield.training.splats.initialization import InitialSplats, neighbor_spacing
+from cagefield.training.splats.plane_sweep import FREE_DISTANCE_SHARE
 from cagefield.training.splats.splat_config import SplatConfig
-from cagefield.training.splats.splat_run import most_splats
+from cagefield.training.splats.splat_run import max_splats
 from cagefield.training.splats.splat_state import SplatState
-from cagefield.training.splats.train_splats import SplatTrainResult, train_splat
+from cagefield.training.splats.train_splats import train_splat
 from cagefield.typing import Array, Float32
 
-SOLID = 0.9
-"""Opacity of a pixel whose depth is that of a surface, and no mean of several."""
+MIN_SURFACE_OPACITY = 0.9
+"""Minimum opacity of a pixel whose depth belongs to one surface."""
 
-SEED_SHARE = 0.6
-"""Splats to begin with, in shares of the most that there may be; the others come where error is left."""
+INITIAL_SPLAT_SHARE = 0.6
+"""Initial number of splats, as a share of the maximum; densification adds the others."""
 
-WIDTH, THICKNESS = 0.7, 0.15
-"""Sigmas of a first splat along and across the surface, in distances to its neighbours."""
+WIDTH_SPACINGS, THICKNESS_SPACINGS = 0.7, 0.15
+"""Initial sigmas along and across the surface, in distances to the neighboring splats."""
 
-STEP = 8.0
-"""Pixels of depth from a pixel to its neighbours that are a step, and no slope."""
+MIN_DEPTH_STEP_PIXELS = 8.0
+"""Minimum depth difference between neighboring pixels at a depth discontinuity, in pixel footprints."""
 
-FIRST_OPACITY = 0.7
-EMPTY_STEP = 4  # pixels along a side that share a distance up to which there is nothing
+INITIAL_OPACITY = 0.7
+"""Opacity of an initial splat."""
+
+FREE_BLOCK_PIXELS = 4
+"""Side of a pixel block that shares one free distance."""
 
 OnStage = Callable[[str, float, str], None]
 
 
 class _Renderer(Protocol):
-    """What draws the field: `rendering.voxels.voxel_renderer.Renderer`, or another with its `render`."""
+    """Renderer of a field, such as `rendering.voxels.voxel_renderer`'s."""
 
     def render(
         self, camera: Camera, *, background: Background = "white", normals: bool = False
@@ -58,10 +61,10 @@ class _Renderer(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """M points of a field's surface, as pictures show it.
+class SurfacePoints:
+    """M points of a field's surface in rendered images.
 
-    positions [M,3] world units; normals [M,3] unit, towards the camera's side; rgb [M,3] in [0,1].
+    positions [M,3] world units; normals [M,3] unit, towards the camera; rgb [M,3] in [0,1].
     """
 
     positions: Array
@@ -72,22 +75,22 @@ class Surface:
         return len(self.positions)
 
     @classmethod
-    def seen_in(cls, picture: RenderResult, camera: Camera) -> Surface:
-        """The points at a picture's solid pixels; its normals must have been rendered."""
-        if picture.normals is None:
-            raise CagefieldError("a surface needs pictures with normals; render with normals=True")
-        length = np.linalg.norm(picture.normals, axis=-1)
-        solid = (picture.opacity > SOLID) & np.isfinite(picture.depth) & (length > 0.5)
-        solid &= ~_is_step(picture.depth, solid, camera)
+    def from_render(cls, image: RenderResult, camera: Camera) -> SurfacePoints:
+        """Surface points at an image's opaque pixels. Raises CagefieldError for an image without normals."""
+        if image.normals is None:
+            raise CagefieldError("a surface needs images with normals; render with normals=True")
+        length = np.linalg.norm(image.normals, axis=-1)
+        solid = (image.opacity > MIN_SURFACE_OPACITY) & np.isfinite(image.depth) & (length > 0.5)
+        solid &= ~_depth_step_mask(image.depth, solid, camera)
         rows, columns = np.nonzero(solid)
         origins, directions = camera.rays(np.stack([columns, rows], axis=1))
-        distances = picture.depth[solid].astype(np.float64)[:, None]
-        premultiplied = picture.over(None).rgb[solid]
-        return cls(origins + distances * directions, picture.normals[solid], premultiplied)
+        distances = image.depth[solid].astype(np.float64)[:, None]
+        premultiplied = image.over(None).rgb[solid]
+        return cls(origins + distances * directions, image.normals[solid], premultiplied)
 
     @classmethod
-    def joined(cls, parts: Sequence[Surface]) -> Surface:
-        """All parts' points. Raises CagefieldError where there are none."""
+    def concatenate(cls, parts: Sequence[SurfacePoints]) -> SurfacePoints:
+        """Points of all parts. Raises CagefieldError where there are none."""
         if not any(len(part) for part in parts):
             raise CagefieldError("no camera shows a surface of the field; look at it with `cagefield render`")
         return cls(
@@ -96,9 +99,9 @@ class Surface:
             np.concatenate([part.rgb for part in parts]),
         )
 
-    def take(self, rows: NDArray[np.int64]) -> Surface:
-        """The points of these rows."""
-        return Surface(self.positions[rows], self.normals[rows], self.rgb[rows])
+    def take(self, rows: NDArray[np.int64]) -> SurfacePoints:
+        """Points of the given rows."""
+        return SurfacePoints(self.positions[rows], self.normals[rows], self.rgb[rows])
 
 
 def fit_splats(
@@ -110,31 +113,30 @@ def fit_splats(
     *,
     unbounded: bool = False,
     on_stage: OnStage = lambda stage, done, note: None,
-) -> SplatTrainResult:
-    """Splats that look from the cameras as the renderer's pictures do, and their figures from `held_out`.
+) -> TrainResult[SplatField]:
+    """Splats trained on the renderer's images from `cameras`, and their metrics from `held_out`.
 
-    `bounds` [2,3] is the box of what is fitted. Of an `unbounded` field the pictures are taken over black,
-    as photos without alpha; of others without any background. `on_stage` is told what is done, how far that
-    is, and a note.
+    `bounds` [2,3] is the box of the fitted content. Images of an `unbounded` field have a black background,
+    as photos without alpha; others have none. `on_stage` gets a stage's name, its progress, and a note.
 
     Raises:
         CagefieldError: no cameras, or none that shows a surface.
     """
-    behind: Background = "black" if unbounded else None
+    background: Background = "black" if unbounded else None
     every = [*cameras, *held_out]
     with TemporaryFolder("fit") as folder:
-        chance = np.random.default_rng(config.seed)
-        parts, empty, views = list[Surface](), list[Float32](), list[View]()
-        wanted = int(SEED_SHARE * most_splats(cameras, config)) if cameras else 0
-        for number, picture in enumerate(_pictures(renderer, every, behind, on_stage)):
-            file = folder / f"{number:05d}.png"
-            write_png(file, picture.rgba8() if behind is None else picture.rgb8())
-            views.append(View(file.stem, every[number], file))
+        rng = np.random.default_rng(config.seed)
+        parts, empty, views = list[SurfacePoints](), list[Float32](), list[View]()
+        wanted = int(INITIAL_SPLAT_SHARE * max_splats(cameras, config)) if cameras else 0
+        for number, image in enumerate(_render_images(renderer, every, background, on_stage)):
+            path = folder / f"{number:05d}.png"
+            write_png(path, image.rgba8() if background is None else image.rgb8())
+            views.append(View(path.stem, every[number], path))
             if number < len(cameras):
-                seen = Surface.seen_in(picture, every[number])
-                parts.append(_some(seen, _share(wanted, len(cameras)), chance))
-                empty.append(empty_distances(picture))
-        surface = _some(Surface.joined(parts), wanted, chance)
+                points = SurfacePoints.from_render(image, every[number])
+                parts.append(_subsample(points, _points_per_camera(wanted, len(cameras)), rng))
+                empty.append(free_distances(image))
+        surface = _subsample(SurfacePoints.concatenate(parts), wanted, rng)
         dataset = Dataset(
             name="rendered",
             path=folder,
@@ -148,72 +150,72 @@ def fit_splats(
         return train_splat(
             dataset,
             replace(config, exposure=False),
-            seeds=Seeds(surface_splats(surface, config.sh_degree), empty),
+            seeds=InitialSplats(build_surface_splats(surface, config.sh_degree), empty),
             on_progress=lambda progress: on_stage("Fitting", getattr(progress, "done", 0.0), str(progress)),
         )
 
 
-def surface_seen(
+def sample_surface(
     renderer: _Renderer,
     cameras: Sequence[Camera],
     count: int,
     *,
     seed: int = 0,
     on_stage: OnStage = lambda stage, done, note: None,
-) -> Surface:
-    """At most `count` points of the surface that the cameras see, drawn by chance from their pixels.
+) -> SurfacePoints:
+    """At most `count` points of the surface visible from the cameras, sampled at random from their pixels.
 
-    Raises CagefieldError where they show none.
+    Raises CagefieldError where the cameras show no surface.
     """
-    chance = np.random.default_rng(seed)
-    share = _share(count, len(cameras))
+    rng = np.random.default_rng(seed)
+    share = _points_per_camera(count, len(cameras))
     parts = [
-        _some(Surface.seen_in(picture, camera), share, chance)
-        for camera, picture in zip(cameras, _pictures(renderer, cameras, None, on_stage), strict=True)
+        _subsample(SurfacePoints.from_render(image, camera), share, rng)
+        for camera, image in zip(cameras, _render_images(renderer, cameras, None, on_stage), strict=True)
     ]
-    return _some(Surface.joined(parts), count, chance)
+    return _subsample(SurfacePoints.concatenate(parts), count, rng)
 
 
-def _pictures(
-    renderer: _Renderer, cameras: Sequence[Camera], behind: Background, on_stage: OnStage
+def _render_images(
+    renderer: _Renderer, cameras: Sequence[Camera], background: Background, on_stage: OnStage
 ) -> Iterator[RenderResult]:
-    """The renderer's pictures with their normals, one after the other."""
+    """Yield the renderer's images with normals, one per camera."""
     for number, camera in enumerate(cameras, start=1):
-        picture = renderer.render(camera, background=behind, normals=True)
-        if picture is None:
-            raise CagefieldError("a picture of the field was given up; try again")
-        on_stage("Rendering", number / len(cameras), f"picture {number} of {len(cameras)}")
-        yield picture
+        image = renderer.render(camera, background=background, normals=True)
+        if image is None:
+            raise CagefieldError("a image of the field was given up; try again")
+        on_stage("Rendering", number / len(cameras), f"image {number} of {len(cameras)}")
+        yield image
 
 
-def _is_step(depth: Float32, solid: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
-    """True [H,W] beside a step in depth: there a pixel's mean lies between two surfaces, and on none."""
+def _depth_step_mask(depth: Float32, solid: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
+    """Mask [H,W] of pixels beside a depth discontinuity, whose mean depth lies on no surface."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
     far = maximum_filter(np.where(solid, depth, -np.inf), 3)
     near = minimum_filter(np.where(solid, depth, np.inf), 3)
     with np.errstate(invalid="ignore"):
-        return np.asarray(far - near > STEP * near / camera.fx)
+        return np.asarray(far - near > MIN_DEPTH_STEP_PIXELS * near / camera.fx)
 
 
-def _share(count: int, cameras: int) -> int:
-    """Points to take from each of the cameras: those that see little leave room for those that see much."""
+def _points_per_camera(count: int, cameras: int) -> int:
+    """Points to take from each camera: an excess, so that cameras with many points make up for others."""
     return 4 * count // cameras + 1
 
 
-def surface_splats(surface: Surface, sh_degree: int) -> SplatState:
-    """Flat splats on a surface's points, their third axes along its normals."""
-    width = neighbour_distance(surface.positions)
-    state = SplatState.new(surface.positions, width, surface.rgb, FIRST_OPACITY, sh_degree)
-    state.log_scales += np.log(np.array([WIDTH, WIDTH, THICKNESS], np.float32))
-    state.quaternions[:] = turns_to(surface.normals)
+def build_surface_splats(surface: SurfacePoints, sh_degree: int) -> SplatState:
+    """Flat splats at surface points, with the third axis along the normal."""
+    width = neighbor_spacing(surface.positions)
+    state = SplatState.new(surface.positions, width, surface.rgb, INITIAL_OPACITY, sh_degree)
+    state.log_scales += np.log(np.array([WIDTH_SPACINGS, WIDTH_SPACINGS, THICKNESS_SPACINGS], np.float32))
+    state.quaternions[:] = rotations_from_z(surface.normals)
     return state
 
 
-def turns_to(normals: NDArray[np.floating]) -> Float32:
-    """Quaternions [N,4] (w, x, y, z) of the least turns that take the axis z to unit normals [N,3].
+def rotations_from_z(normals: NDArray[np.floating]) -> Float32:
+    """Quaternions [N,4] (w, x, y, z) of the smallest rotations from the z axis to unit normals [N,3].
 
-    That is (1 + n_z, z × n), normalised; half a turn about x where n is -z.
+    The quaternion is (1 + n_z, z x n), normalized; half a turn about x where n is -z.
     """
     n = np.asarray(normals, np.float64)
     q = np.stack([1.0 + n[:, 2], -n[:, 1], n[:, 0], np.zeros(len(n))], axis=1)
@@ -221,24 +223,24 @@ def turns_to(normals: NDArray[np.floating]) -> Float32:
     return np.roll(Rotation.from_quat(np.roll(q, -1, axis=1)).as_quat(), 1, axis=1).astype(np.float32)
 
 
-def empty_distances(picture: RenderResult) -> Float32:
-    """[2,h,w]: distances along the rays up to which a picture shows nothing, and 1 where that is known.
+def free_distances(image: RenderResult) -> Float32:
+    """Free space [2,h,w] of an image: free distance along the rays, and its confidence 0 or 1.
 
-    For squares of EMPTY_STEP pixels, each with the least distance of its pixels: those that show anything are
-    known where all of them are solid.
+    Values are per block of FREE_BLOCK_PIXELS pixels, with the least distance of the block. Blocks with
+    content are known where all their pixels are opaque.
     """
-    height, width = (side // EMPTY_STEP * EMPTY_STEP for side in picture.opacity.shape)
+    height, width = (side // FREE_BLOCK_PIXELS * FREE_BLOCK_PIXELS for side in image.opacity.shape)
     if not height or not width:
         return np.zeros((2, 1, 1), np.float32)
-    shape = (height // EMPTY_STEP, EMPTY_STEP, width // EMPTY_STEP, EMPTY_STEP)
-    opacity = picture.opacity[:height, :width].reshape(shape)
-    depth = picture.depth[:height, :width].reshape(shape).min(axis=(1, 3))
-    known = (opacity.min(axis=(1, 3)) > SOLID) & np.isfinite(depth)
-    return np.stack([np.where(known, CLEAR * depth, 0.0), known]).astype(np.float32)
+    shape = (height // FREE_BLOCK_PIXELS, FREE_BLOCK_PIXELS, width // FREE_BLOCK_PIXELS, FREE_BLOCK_PIXELS)
+    opacity = image.opacity[:height, :width].reshape(shape)
+    depth = image.depth[:height, :width].reshape(shape).min(axis=(1, 3))
+    known = (opacity.min(axis=(1, 3)) > MIN_SURFACE_OPACITY) & np.isfinite(depth)
+    return np.stack([np.where(known, FREE_DISTANCE_SHARE * depth, 0.0), known]).astype(np.float32)
 
 
-def _some(surface: Surface, count: int, chance: np.random.Generator) -> Surface:
-    """At most `count` points, drawn by chance."""
+def _subsample(surface: SurfacePoints, count: int, rng: np.random.Generator) -> SurfacePoints:
+    """At most `count` points, sampled at random."""
     if len(surface) <= count:
         return surface
-    return surface.take(np.sort(chance.choice(len(surface), count, replace=False)))
+    return surface.take(np.sort(rng.choice(len(surface), count, replace=False)))

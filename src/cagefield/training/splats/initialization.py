@@ -1,8 +1,8 @@
-"""The splats that a training begins with: round ones at sparse points and on surfaces, and a far background.
+"""Initial splats of a training: isotropic splats at sparse points and on surfaces, and a far background.
 
-Where axes are chosen they are the first camera's: a turned world gets the same splats, turned. Sizes are the
-root mean square distance to the three nearest neighbours; background splats lie on a sphere far around the
-cameras and have the colour that the photos show in their direction. And what the photos know of empty space.
+Local axes are the first camera's, so a rotated world gets equally rotated splats. Sigmas are the root mean
+square distance to the three nearest neighbors. Background splats lie on a sphere far around the cameras, in
+the color of the photos in their direction. The module also collects the photos' knowledge of free space.
 """
 
 from __future__ import annotations
@@ -17,96 +17,102 @@ from cagefield.cameras.camera import Camera
 from cagefield.datasets.sfm.sparse_points import random_points
 from cagefield.datasets.views import Dataset, SparsePoints
 from cagefield.rendering.splats.rasterizer import untiled
-from cagefield.training.splats.plane_sweep import CLEAR, find_surfaces
+from cagefield.training.splats.plane_sweep import FREE_DISTANCE_SHARE, sweep_surfaces
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.training_views import TrainingView
 from cagefield.typing import Array
 
-FAR = 10.0
-"""Radius of the background's sphere, in median distances of the cameras from the centre of interest."""
+BACKGROUND_RADIUS_DISTANCES = 10.0
+"""Radius of the background sphere, in median distances of the cameras from the center of interest."""
 
-FIRST_OPACITY = 0.5
+INITIAL_OPACITY = 0.5
+"""Opacity of an initial splat."""
 
-SURFACE_SHARE = 0.5
-"""Surface points that a training begins with, in shares of the most splats that it may have."""
+SURFACE_SPLAT_SHARE = 0.5
+"""Initial surface splats, as a share of the maximum number of splats."""
 
-REACH = 0.25
-"""Share of a photo's longer side within which known distances say something about unknown ones."""
+INFERENCE_SIDE_SHARE = 0.25
+"""Maximum window of the inference from known free distances, relative to the photo's longer side."""
 
-NEARBY = 0.85
-"""Share of the least known distance around it that a pixel takes."""
+INFERRED_DISTANCE_SHARE = 0.85
+"""Inferred free distance, relative to the least known one in the window."""
 
-HEARSAY = 0.2
-"""How sure that is."""
+INFERRED_CONFIDENCE = 0.2
+"""Confidence of an inferred free distance."""
 
-NEAREST_SHARE = 0.7
-"""The least depth that a photo may show, over the 1 % quantile of the depths of known points in it."""
+MIN_DEPTH_SHARE = 0.7
+"""Minimum depth of a photo's content, relative to the 1 % quantile of its known points' depths."""
 
-RANDOM = 4000
-"""Random points, where a data set has none, at most."""
+MAX_RANDOM_POINTS = 4000
+"""Maximum number of random points for a data set without points."""
 
-SWEPT_SIDE = 150
-"""Least longer side of the photos that surface points are looked for in."""
+MIN_SWEEP_SIDE_PIXELS = 150
+"""Minimum longer side of the photo level used for plane sweeping."""
 
 
-class Seeds(NamedTuple):
-    """The splats that a training begins with, and what each photo knows to be empty.
+class InitialSplats(NamedTuple):
+    """Initial splats of a training, and the free space of each photo.
 
-    The latter [2,H,W] by photo: distances along its pixels' rays, 0 where nobody knows, and how sure that is.
+    `free_space` has [2,H,W] per photo: free distances along the pixels' rays, 0 where unknown, and
+    confidences.
     """
 
     state: SplatState
-    empty: list[NDArray[np.float32]]
+    free_space: list[NDArray[np.float32]]
 
 
-def first_splats(dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, most: int) -> Seeds:
-    """The splats that a training on photos begins with, at most `most`.
+def initialize_splats(
+    dataset: Dataset, views: Sequence[TrainingView], config: SplatConfig, max_splats: int
+) -> InitialSplats:
+    """Initial splats of a training on photos, at max_splats `max_splats`, with the photos' free space.
 
-    At the data set's points; at points that the photos agree on by plane sweeping; and, of an unbounded
-    capture, on a sphere far away. Where the data set has no points they are random ones.
+    Splats lie at the data set's points (random ones without), at points from plane sweeping, and, for an
+    unbounded capture, on a far sphere.
     """
     from scipy.spatial.transform import Rotation
 
-    points = dataset.points or random_points(dataset, min(most // 4, RANDOM), config.seed)
+    points = dataset.points or random_points(dataset, min(max_splats // 4, MAX_RANDOM_POINTS), config.seed)
     positions, rgb = points.positions, points.rgb
-    wanted = int(SURFACE_SHARE * most)
-    swept, colours, empty = swept_points(views, positions, wanted, config.seed)
-    _add_sightings(empty, views, dataset.points)
-    empty = [spread(one) for one in empty]
-    if dataset.points is None and len(swept) > len(positions):
-        # Random ones have done what they are for: to say how deep the photos may be.
-        positions, rgb = swept, colours
+    target_count = int(SURFACE_SPLAT_SHARE * max_splats)
+    sweep_positions, colors, free_distances = sweep_surface_points(
+        views, positions, target_count, config.seed
+    )
+    _add_sparse_points(free_distances, views, dataset.points)
+    free_distances = [infer_free_distances(one) for one in free_distances]
+    if dataset.points is None and len(sweep_positions) > len(positions):
+        # Random points only bound the depths of the plane sweep.
+        positions, rgb = sweep_positions, colors
     else:
-        positions, rgb = np.concatenate([positions, swept]), np.concatenate([rgb, colours])
+        positions, rgb = np.concatenate([positions, sweep_positions]), np.concatenate([rgb, colors])
     positions = positions.astype(np.float32)
     first = np.sort(np.unique(positions, axis=0, return_index=True)[1])
     positions = positions[first]
     far = None
-    if dataset.unbounded and config.background > 0.0:
-        unit = camera_scale([view.cameras[0] for view in views], dataset.bounds)
-        count = max(200, int(config.background * min(len(positions), most)))
-        far = background_seeds(views, dataset.bounds.mean(axis=0), unit, min(count, most // 4))
-    left = most if far is None else most - len(far[0])
-    if len(positions) > left:
-        chosen = np.sort(np.random.default_rng(config.seed).permutation(len(positions))[:left])
+    if dataset.unbounded and config.background_share > 0.0:
+        unit = median_camera_distance([view.cameras[0] for view in views], dataset.bounds)
+        count = max(200, int(config.background_share * min(len(positions), max_splats)))
+        far = build_background(views, dataset.bounds.mean(axis=0), unit, min(count, max_splats // 4))
+    remaining = max_splats if far is None else max_splats - len(far[0])
+    if len(positions) > remaining:
+        chosen = np.sort(np.random.default_rng(config.seed).permutation(len(positions))[:remaining])
         positions, first = positions[chosen], first[chosen]
     state = SplatState.new(
         positions,
-        neighbour_distance(positions.astype(np.float64)),
+        neighbor_spacing(positions.astype(np.float64)),
         rgb[first].astype(np.float32) / 255.0,
-        FIRST_OPACITY,
+        INITIAL_OPACITY,
         config.sh_degree,
     )
     if far is not None:
-        state.append(SplatState.new(*far, FIRST_OPACITY, config.sh_degree))
+        state.append(SplatState.new(*far, INITIAL_OPACITY, config.sh_degree))
     axes = Rotation.from_matrix(views[0].cameras[0].c2w[:3, :3])
     state.quaternions[:] = np.roll(axes.as_quat(), 1)
-    return Seeds(state, empty)
+    return InitialSplats(state, free_distances)
 
 
-def neighbour_distance(positions: Array) -> Array:
-    """Root mean square distance [N] to the three nearest other positions, extremes held back."""
+def neighbor_spacing(positions: Array) -> Array:
+    """Root mean square distance [N] to the three nearest other positions, clipped at the extremes."""
     from scipy.spatial import cKDTree
 
     count = min(4, len(positions))
@@ -118,10 +124,10 @@ def neighbour_distance(positions: Array) -> Array:
     return np.asarray(np.clip(rms, 1e-4 * max(high, 1e-30), high))
 
 
-def seen_colours(
+def mean_photo_colors(
     views: Sequence[TrainingView], positions: Array
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """(mean rgb [N,3] in [0,1], number of photos [N]) of the photos that picture positions [N,3]."""
+    """(mean rgb [N,3] in [0,1], number of photos [N]) over the photos that contain positions [N,3]."""
     sums, counts = np.zeros((len(positions), 3)), np.zeros(len(positions), np.int32)
     for view in views:
         camera, tiles = view.level(len(view.cameras) - 1)
@@ -141,8 +147,8 @@ def seen_colours(
     return (sums / np.maximum(counts, 1)[:, None]).astype(np.float32), counts
 
 
-def sphere(count: int) -> Array:
-    """Unit directions [N,3], even over the sphere. Source: the Fibonacci lattice (Gonzalez, 2010)."""
+def fibonacci_sphere(count: int) -> Array:
+    """Unit directions [N,3], evenly distributed. Source: the Fibonacci lattice (Gonzalez, 2010)."""
     k = np.arange(count) + 0.5
     height = 1.0 - 2.0 * k / count
     angle = np.pi * (1.0 + 5.0**0.5) * k
@@ -150,82 +156,87 @@ def sphere(count: int) -> Array:
     return np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
 
 
-def background_seeds(
-    views: Sequence[TrainingView], centre: Array, distance: float, count: int
+def build_background(
+    views: Sequence[TrainingView], center: Array, distance: float, count: int
 ) -> tuple[Array, Array, NDArray[np.float32]]:
-    """(positions, sigmas, rgb) of splats on the sphere of FAR distances, those that some photo shows."""
-    # Photos show a part of the sphere: enough directions that about `count` are left.
+    """(positions, sigmas, rgb) of background splats in the directions that some photo shows."""
+    # Photos show a part of the sphere: take enough directions that about `count` remain.
     axes = views[0].cameras[0].c2w[:3, :3]
-    trial = sphere(2000) @ axes.T
-    share = max(0.02, float((seen_colours(views, centre + FAR * distance * trial)[1] > 0).mean()))
-    directions = sphere(max(8, int(count / share))) @ axes.T
-    positions = centre + FAR * distance * directions
-    rgb, seen = seen_colours(views, positions)
-    sigma = 0.5 * FAR * distance * np.sqrt(4.0 * np.pi / len(directions))
-    kept = seen > 0
-    return positions[kept], np.full(int(kept.sum()), sigma), rgb[kept]
+    trial = fibonacci_sphere(2000) @ axes.T
+    share = max(
+        0.02,
+        float(
+            (mean_photo_colors(views, center + BACKGROUND_RADIUS_DISTANCES * distance * trial)[1] > 0).mean()
+        ),
+    )
+    directions = fibonacci_sphere(max(8, int(count / share))) @ axes.T
+    positions = center + BACKGROUND_RADIUS_DISTANCES * distance * directions
+    rgb, visible = mean_photo_colors(views, positions)
+    sigma = 0.5 * BACKGROUND_RADIUS_DISTANCES * distance * np.sqrt(4.0 * np.pi / len(directions))
+    keep = visible > 0
+    return positions[keep], np.full(int(keep.sum()), sigma), rgb[keep]
 
 
-def depths_seen(cameras: Sequence[Camera], positions: NDArray[Any]) -> list[tuple[float, float] | None]:
-    """(least, usual) depth of the positions [N,3] that each camera shows, None where it shows too few."""
-    found: list[tuple[float, float] | None] = []
+def depth_ranges(cameras: Sequence[Camera], positions: NDArray[Any]) -> list[tuple[float, float] | None]:
+    """(least, median) depth of the positions [N,3] in each camera's image; None for fewer than 20."""
+    ranges: list[tuple[float, float] | None] = []
     for camera in cameras:
         pixels, depth = camera.project(positions)
         with np.errstate(invalid="ignore"):
-            seen = (
+            visible = (
                 (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1) & (depth > 0)
             )
-        near, usual = np.quantile(depth[seen], (0.01, 0.5)) if seen.sum() >= 20 else (0.0, 0.0)
-        found.append((NEAREST_SHARE * float(near), float(usual)) if usual > 0 else None)
-    return found
+        near, median = np.quantile(depth[visible], (0.01, 0.5)) if visible.sum() >= 20 else (0.0, 0.0)
+        ranges.append((MIN_DEPTH_SHARE * float(near), float(median)) if median > 0 else None)
+    return ranges
 
 
-def in_front_of(camera: Camera, positions: NDArray[Any], depth: float) -> NDArray[np.bool_]:
-    """True [N] where a position [N,3] is pictured by the camera at less than a depth."""
+def closer_mask(camera: Camera, positions: NDArray[Any], depth: float) -> NDArray[np.bool_]:
+    """Mask [N] of positions [N,3] within the camera's image at less than a depth."""
     local = (positions - camera.origin) @ camera.c2w[:3, :3]
     rows = np.flatnonzero((-local[:, 2] > 0) & (-local[:, 2] < depth))
     pixels, _ = camera.project(positions[rows])
     with np.errstate(invalid="ignore"):
         inside = (pixels >= 0).all(axis=1) & (pixels < (camera.width, camera.height)).all(axis=1)
-    found = np.zeros(len(positions), bool)
-    found[rows[inside]] = True
-    return found
+    mask = np.zeros(len(positions), bool)
+    mask[rows[inside]] = True
+    return mask
 
 
-def swept_points(
-    views: Sequence[TrainingView], positions: Array, wanted: int, seed: int
+def sweep_surface_points(
+    views: Sequence[TrainingView], positions: Array, target_count: int, seed: int
 ) -> tuple[Array, NDArray[np.uint8], list[NDArray[np.float32]]]:
-    """Surface points (positions, rgb) by plane sweeping the photos, their depths guided by sparse points.
+    """(positions, rgb, free distances [H,W] by photo) of surface points from plane sweeping.
 
-    And, by photo, the distances [H,W] up to which there is nothing.
+    Sparse `positions` give the depth surfaces.
     """
     sides = [max(camera.width, camera.height) for camera in views[0].cameras]
-    level = max([level for level, side in enumerate(sides) if side >= SWEPT_SIDE], default=0)
+    level = max([level for level, side in enumerate(sides) if side >= MIN_SWEEP_SIDE_PIXELS], default=0)
     cameras = [view.level(level)[0] for view in views]
-    empty = [np.zeros((camera.height, camera.width), np.float32) for camera in cameras]
-    depths = depths_seen(cameras, positions)
+    free_distances = [np.zeros((camera.height, camera.width), np.float32) for camera in cameras]
+    depths = depth_ranges(cameras, positions)
     usable = [n for n, depth in enumerate(depths) if depth is not None]
     size = (cameras[0].width, cameras[0].height)
     usable = [n for n in usable if (cameras[n].width, cameras[n].height) == size]
-    images = [_without_masked(views[n], level) for n in usable]
-    if len(usable) < 3 or wanted < 1:
-        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8), empty
+    images = [_unmasked_rgb(views[n], level) for n in usable]
+    if len(usable) < 3 or target_count < 1:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.uint8), free_distances
     known = [depth for n in usable if (depth := depths[n]) is not None]
-    found = find_surfaces(
-        images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], wanted, seed
+    surfaces = sweep_surfaces(
+        images, [cameras[n] for n in usable], [d[0] for d in known], [d[1] for d in known], target_count, seed
     )
-    for n, one in zip(usable, found.empty, strict=True):
-        empty[n] = one
-    return found.positions, found.rgb, empty
+    for n, one in zip(usable, surfaces.free_distances, strict=True):
+        free_distances[n] = one
+    return surfaces.positions, surfaces.rgb, free_distances
 
 
-def _add_sightings(
-    empty: Sequence[NDArray[np.float32]], views: Sequence[TrainingView], points: SparsePoints | None
+def _add_sparse_points(
+    free_distances: Sequence[NDArray[np.float32]], views: Sequence[TrainingView], points: SparsePoints | None
 ) -> None:
-    """Writes what sparse points that a photo is known to see say about empty space into its distances."""
+    """Write the free distances in front of sparse points into the photos that observe the points."""
     if points is None or not points.seen_by:
         return
-    for view, distances in zip(views, empty, strict=True):
+    for view, distances in zip(views, free_distances, strict=True):
         camera = view.cameras[0]
         rows = np.flatnonzero([view.name in names for names in points.seen_by])
         pixels, depth = camera.project(points.positions[rows])
@@ -235,33 +246,34 @@ def _add_sightings(
             )
         height, width = distances.shape
         at = (pixels[inside] * (width / camera.width, height / camera.height)).astype(np.int64)
-        known = CLEAR * np.linalg.norm(points.positions[rows[inside]] - camera.origin, axis=1)
+        known = FREE_DISTANCE_SHARE * np.linalg.norm(points.positions[rows[inside]] - camera.origin, axis=1)
         before = distances[at[:, 1], at[:, 0]]
         distances[at[:, 1], at[:, 0]] = np.where(before > 0, np.minimum(before, known), known)
 
 
-def spread(distances: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Distances [2,H,W] up to which there is nothing, and how sure that is, from those [H,W] that are known.
+def infer_free_distances(distances: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(free distance, confidence) [2,H,W] from known free distances [H,W], 0 where unknown.
 
-    What has no texture lies mostly between things that have: a pixel of which nothing is known takes the
-    least that is known around it, in a square that is as small as has it and at most REACH of the photo.
+    Textureless regions mostly lie between textured ones: an unknown pixel takes INFERRED_DISTANCE_SHARE of
+    the least known distance in the smallest window that has one, of at max_splats INFERENCE_SIDE_SHARE of the
+    photo.
     """
     from scipy.ndimage import minimum_filter
 
     known = distances > 0
     filled, sure = distances.copy(), known.astype(np.float32)
     far = np.where(known, distances, np.inf).astype(np.float32)
-    size, most = 3, REACH * max(distances.shape)
-    while size <= most:
+    size, max_splats = 3, INFERENCE_SIDE_SHARE * max(distances.shape)
+    while size <= max_splats:
         around = minimum_filter(far, size, mode="nearest")
         new = (filled == 0) & np.isfinite(around)
-        filled[new], sure[new] = NEARBY * around[new], HEARSAY
+        filled[new], sure[new] = INFERRED_DISTANCE_SHARE * around[new], INFERRED_CONFIDENCE
         size = 2 * size + 1
     return np.stack([filled, sure])
 
 
-def _without_masked(view: TrainingView, level: int) -> NDArray[np.uint8]:
-    """rgb [H,W,3] of a photo over white; pixels that its mask excludes are gray, without texture."""
+def _unmasked_rgb(view: TrainingView, level: int) -> NDArray[np.uint8]:
+    """rgb [H,W,3] of a photo over white; masked pixels are gray, without texture."""
     camera, tiles = view.level(level)
     pixels = _over_white(untiled(tiles, camera.width, camera.height))
     valid = view.valid_at(level)
@@ -271,15 +283,15 @@ def _without_masked(view: TrainingView, level: int) -> NDArray[np.uint8]:
 
 
 def _over_white(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """rgb of pixels with straight alpha, as they are without it."""
+    """rgb [H,W,3] of pixels with straight alpha over white; pixels without alpha are unchanged."""
     if pixels.shape[2] == 3:
         return pixels
     alpha = pixels[..., 3:].astype(np.float32) / 255.0
     return (pixels[..., :3] * alpha + 255.0 * (1.0 - alpha) + 0.5).astype(np.uint8)
 
 
-def camera_scale(cameras: Sequence[Camera], bounds: Array) -> float:
-    """The median distance of the cameras from the middle of the bounds: the scene's own unit of length."""
+def median_camera_distance(cameras: Sequence[Camera], bounds: Array) -> float:
+    """Median distance of the cameras from the center of the bounds: the scene's unit of length."""
     origins = np.stack([camera.origin for camera in cameras])
     median = float(np.median(np.linalg.norm(origins - bounds.mean(axis=0), axis=1)))
     return max(median, 0.1 * float(np.linalg.norm(bounds[1] - bounds[0])))

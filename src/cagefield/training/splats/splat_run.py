@@ -1,4 +1,4 @@
-"""The state of one training of a SplatField, from photo to photo."""
+"""State of a SplatField's training run."""
 
 from __future__ import annotations
 
@@ -28,92 +28,93 @@ from cagefield.rendering.splats.rasterizer import (
     project,
     world_to_camera,
 )
-from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.checkpoint import read_checkpoint, signature_options, write_checkpoint
 from cagefield.training.checkpoint_checks import (
-    Form,
+    ArrayForm,
     check_arrays,
     check_finite,
     check_run,
-    refusing_damage,
+    reject_damage,
 )
-from cagefield.training.splats.densification import fading, needles, split
+from cagefield.training.splats.densification import needle_mask, prune_mask, split_splats
 from cagefield.training.splats.free_space import FreeSpace
 from cagefield.training.splats.initialization import (
-    NEAREST_SHARE,
-    Seeds,
-    camera_scale,
-    depths_seen,
-    first_splats,
-    in_front_of,
+    MIN_DEPTH_SHARE,
+    InitialSplats,
+    closer_mask,
+    depth_ranges,
+    initialize_splats,
+    median_camera_distance,
 )
 from cagefield.training.splats.kernels.gauss_newton_splats import gauss_newton, residuals
-from cagefield.training.splats.kernels.splat_backward import chain, shapes
-from cagefield.training.splats.kernels.ssim import MOMENTS, WINDOW, structure
-from cagefield.training.splats.pose_optimization import FROM, PoseRefinement
-from cagefield.training.splats.robust_weights import FROM as ROBUST_FROM
-from cagefield.training.splats.robust_weights import RobustWeights
-from cagefield.training.splats.splat_config import SplatConfig
+from cagefield.training.splats.kernels.splat_backward import backpropagate, build_covariances
+from cagefield.training.splats.kernels.ssim import MOMENTS, WINDOW_PIXELS, add_ssim_gradient
+from cagefield.training.splats.pose_optimization import POSE_START_PROGRESS, PoseRefinement
+from cagefield.training.splats.robust_weights import ROBUST_START_PROGRESS, RobustWeights
+from cagefield.training.splats.splat_config import CHECKPOINT_KEYS, SplatConfig
 from cagefield.training.splats.splat_state import SplatState
 from cagefield.training.splats.training_views import load_views
 
-LEVEL_UNTIL = ((2, 0.04), (1, 0.15))
-"""(level of the photos, progress until which it is used); then whole photos."""
+LEVEL_END_PROGRESS = ((2, 0.04), (1, 0.15))
+"""(photo level, progress until which it is used); afterwards level 0, the full size."""
 
-STRUCTURE_FROM = 0.6
-"""Progress from which structural similarity counts: while surfaces are being found it would favour fog."""
+SSIM_START_PROGRESS = 0.6
+"""Progress from which SSIM counts; earlier SSIM favors fog over surfaces."""
 
-DEGREE_FROM = (0.0, 0.1, 0.3, 0.6)
-"""Progress from which harmonics of each degree are used."""
+DEGREE_START_PROGRESS = (0.0, 0.1, 0.3, 0.6)
+"""Progress from which harmonics of each degree are trained."""
 
-GROWTH = (0.02, 0.6)
-"""Progress between which splats become more."""
+DENSIFICATION_PROGRESS = (0.02, 0.6)
+"""Progress at the first and the last densification."""
 
-GROWTH_EVERY = 60
-"""Steps between two growths."""
+DENSIFICATION_INTERVAL_STEPS = 60
+"""Steps between two densifications."""
 
-CLEAR = 0.7
-"""Share of a photo's least depth within which no splat may stand in its picture: such ones are fog."""
+OBSTRUCTION_DEPTH_SHARE = 0.7
+"""Share of a photo's least depth within which a splat in its image is fog in front of the camera."""
 
-CARVE_EVERY = 120
-"""Steps between two removals of those."""
+CARVING_INTERVAL_STEPS = 120
+"""Steps between two removals of obstructing splats."""
 
-PIXEL_SHARE = 0.15
-"""Most splats after five minutes, in shares of a photo's pixels."""
+MAX_SPLATS_PER_PIXEL = 0.15
+"""Maximum number of splats per photo pixel after a run of five minutes."""
 
-STEPS_A_MINUTE = 800
-"""Steps that count as a minute where a run is limited by steps."""
+STEPS_PER_MINUTE = 800
+"""Steps that count as a minute in a run limited by steps."""
 
 
-def most_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
-    """The most splats of a training: what is asked for, else what the photos' detail and the time allow."""
+def max_splats(cameras: Sequence[Camera], config: SplatConfig) -> int:
+    """Maximum number of splats of a training: `config.splats`, else from the photos' pixels and the time."""
     if config.splats is not None:
         return config.splats
     pixels = float(np.median([camera.width * camera.height for camera in cameras]))
-    minutes = config.minutes or config.steps / STEPS_A_MINUTE
-    return int(np.clip(PIXEL_SHARE * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
+    minutes = config.minutes or config.steps / STEPS_PER_MINUTE
+    return int(np.clip(MAX_SPLATS_PER_PIXEL * pixels * (minutes / 5.0) ** 0.5, 2000, 1_000_000))
 
 
 class SplatRun:
-    """A training run; see `loop.Run`."""
+    """Training run of a SplatField; a `loop.Run`."""
 
-    def __init__(self, dataset: Dataset, config: SplatConfig, seeds: Seeds | None = None) -> None:
-        """`seeds` are what to begin with; left out, they are looked for in the photos (`first_splats`)."""
+    def __init__(self, dataset: Dataset, config: SplatConfig, seeds: InitialSplats | None = None) -> None:
+        """State at the start; `seeds` are initial splats, None for `initialize_splats`."""
         self._config, self._dataset = config, dataset
         self.views = load_views(dataset.train)
         self._rng = np.random.default_rng(config.seed)
-        self._scale = camera_scale([view.camera for view in dataset.train], dataset.bounds)
+        self._scale = median_camera_distance([view.camera for view in dataset.train], dataset.bounds)
         self._near = near_depth(dataset.bounds)
-        self._most = most_splats([view.cameras[0] for view in self.views], config)
-        self.state, self.empty = seeds or first_splats(dataset, self.views, config, self._most)
-        self._depths = depths_seen([view.cameras[0] for view in self.views], self.state.means)
+        self._max_splats = max_splats([view.cameras[0] for view in self.views], config)
+        self.state, self.free_distances = seeds or initialize_splats(
+            dataset, self.views, config, self._max_splats
+        )
+        self._depths = depth_ranges([view.cameras[0] for view in self.views], self.state.means)
         self._free_space = FreeSpace(
             [view.cameras[0] for view in self.views],
-            [None if depth is None else depth[0] / NEAREST_SHARE for depth in self._depths],
+            [None if depth is None else depth[0] / MIN_DEPTH_SHARE for depth in self._depths],
             self.state.means,
         )
         alpha = self.views[0].has_alpha
         self.background = np.full(3, 1.0 if dataset.white_background else 0.0, np.float32)
-        self._fitted = (not alpha) if config.exposure is None else config.exposure
+        self._fits_exposure = (not alpha) if config.exposure is None else config.exposure
         self.gains = np.ones((len(self.views), 3), np.float32)
         sizes = [(view.cameras[0].width, view.cameras[0].height) for view in self.views]
         self._robust = (
@@ -123,7 +124,7 @@ class SplatRun:
         self._buffers = Buffers()
         self._queue: list[int] = []
         self.step, self.seconds, self.running_loss = 0, 0.0, float("nan")
-        self._cold = True
+        self._is_first_step = True
 
     @property
     def done(self) -> float:
@@ -133,26 +134,30 @@ class SplatRun:
         return min(1.0, self.step / self._config.steps)
 
     def advance(self) -> None:
-        """One photo: a step of all splats that it shows; before it, a growth where one is due."""
+        """Train one photo, after a due densification or removal of obstructions."""
         began = time.perf_counter()
         done = self.done
-        if self.step % GROWTH_EVERY == GROWTH_EVERY - 1 and GROWTH[0] <= done < GROWTH[1]:
-            self._grow(done)
-        if self.step % CARVE_EVERY == CARVE_EVERY - 1 and done < 0.95:
-            self._carve()
+        if (
+            self.step % DENSIFICATION_INTERVAL_STEPS == DENSIFICATION_INTERVAL_STEPS - 1
+            and DENSIFICATION_PROGRESS[0] <= done < DENSIFICATION_PROGRESS[1]
+        ):
+            self._densify(done)
+        if self.step % CARVING_INTERVAL_STEPS == CARVING_INTERVAL_STEPS - 1 and done < 0.95:
+            self._remove_obstructions()
         if not self._queue:
-            self.poses.centre()
+            self.poses.remove_mean_motion()
             if self._robust is not None:
                 self._robust.update_scale()
             self._queue = [int(n) for n in self._rng.permutation(len(self.views))]
         self.step_photo(self._queue.pop(), done)
         self.step += 1
-        self.seconds += 0.0 if self._cold else time.perf_counter() - began
-        self._cold = False
+        self.seconds += 0.0 if self._is_first_step else time.perf_counter() - began
+        self._is_first_step = False
 
     def step_photo(self, index: int, done: float) -> None:
+        """Take one step of all splats visible in a photo."""
         config, state = self._config, self.state
-        level = next((level for level, until in LEVEL_UNTIL if done < until), 0)
+        level = next((level for level, until in LEVEL_END_PROGRESS if done < until), 0)
         camera, target = self.views[index].level(level)
         if config.refine_poses:
             camera = self.poses.camera(index, camera)
@@ -160,90 +165,92 @@ class SplatRun:
         covariances = self._buffers.take("covariances", (count, 6), np.float32)
         opacities = self._buffers.take("opacities", (count,), np.float32)
         with kernels():
-            shapes(state.log_scales, state.quaternions, state.logits, covariances, opacities)
+            build_covariances(state.log_scales, state.quaternions, state.logits, covariances, opacities)
         if config.dropout > 0.0:
             opacities *= self._rng.random(count, np.float32) >= config.dropout * done
         splats = DeformedSplats(state.means, covariances, opacities, state.sh, None, config.antialiased)
         projected = project(splats, camera, near=self._near, buffers=self._buffers)
         out, stops = projected.blend(COLOUR)
-        colour = self._buffers.take("colour", (projected.tiles, 3, AREA), np.float32)
+        color = self._buffers.take("color", (projected.tiles, 3, AREA), np.float32)
         slopes = self._buffers.take("slopes", (projected.tiles, 3, AREA), np.float32)
         tile_sums = np.empty((projected.tiles, 7), np.float32)
-        background = self._behind()
+        background = self._next_background()
         gain = self.gains[index]
         lens = intrinsics(camera)
-        rate = config.rate[0] * (config.rate[1] / config.rate[0]) ** done
-        degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_FROM[n])
+        rate = config.lr[0] * (config.lr[1] / config.lr[0]) ** done
+        degree = max(n for n in range(config.sh_degree + 1) if done >= DEGREE_START_PROGRESS[n])
         weights = self._weights(index, level, projected.tiles)
         with kernels():
             size = projected.width, projected.height
-            residuals(out, target, *size, gain, background, weights, colour, slopes, tile_sums)
+            residuals(out, target, *size, gain, background, weights, color, slopes, tile_sums)
             if self._robust is not None and level == 0:
                 self._robust.add(index, slopes, gain, self.views[index].valid_at(0))
-            structured = config.structure > 0.0 and done >= STRUCTURE_FROM
-            if structured and min(size) >= WINDOW:
-                self._structure(projected, colour, target, gain, background, weights, slopes)
+            uses_ssim = config.ssim_lambda > 0.0 and done >= SSIM_START_PROGRESS
+            if uses_ssim and min(size) >= WINDOW_PIXELS:
+                self._add_ssim_slopes(projected, color, target, gain, background, weights, slopes)
             sums = self._buffers.take("sums", (max(projected.pairs, 1), SUMS), np.float32)
-            projected.gradients(colour, slopes, stops, sums, self.empty[index], config.veil, weights)
-            chain(
+            projected.gradients(
+                color, slopes, stops, sums, self.free_distances[index], config.empty_space_penalty, weights
+            )
+            backpropagate(
                 projected.order, projected.firsts, projected.slots, sums, projected.packed, splats.means,
                 state.log_scales, state.quaternions, splats.opacities, splats.sh, world_to_camera(camera),
                 camera.origin, lens.focal, lens.limits, lens.model, lens.coefficients, config.antialiased,
                 False, state.gradients, state.curvatures,
             )  # fmt: skip
-            if config.refine_poses and done >= FROM:
+            if config.refine_poses and done >= POSE_START_PROGRESS:
                 self.poses.step(index, camera.origin, state, projected.order, min(rate, 1.0))
             gauss_newton(
                 projected.order, state.gradients, state.curvatures, state.means, state.log_scales,
                 state.quaternions, state.logits, state.sh, camera.origin, state.momentum, state.running,
-                state.ticks, np.array(config.memory), np.array([rate, rate, rate, rate, 0.5 * rate]),
-                np.array(config.damping), np.array([config.cap, config.cap]), (degree + 1) ** 2,
-                np.array([1e-5, 1e3]) * self._scale, -config.opaque,
+                state.ticks, np.array(config.ema_decay), np.array([rate, rate, rate, rate, 0.5 * rate]),
+                np.array(config.damping), np.array([config.max_step, config.max_step]), (degree + 1) ** 2,
+                np.array([1e-5, 1e3]) * self._scale, -config.opacity_reg,
             )  # fmt: skip
         state.error[projected.order] += state.gradients[projected.order, 15]
         state.hits[projected.order] += 1
-        self._expose(index, tile_sums)
+        self._update_gain(index, tile_sums)
         loss = float(tile_sums[:, 0].sum()) / max(3.0 * float(weights.sum()), 1.0)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
 
-    def _structure(
+    def _add_ssim_slopes(
         self,
         projected: Projection,
-        colour: NDArray[np.float32],
+        color: NDArray[np.float32],
         target: NDArray[np.uint8],
         gain: NDArray[np.float32],
         background: NDArray[np.float32],
         weights: NDArray[np.float32],
         slopes: NDArray[np.float32],
     ) -> None:
-        """Adds what structural similarity says of the picture's pixels to the slopes of their error."""
+        """Add the SSIM gradient of the image's pixels to `slopes`."""
         size = (projected.height, projected.width)
-        structure(
-            colour, target, projected.width, projected.height, gain, background, weights,
-            self._config.structure,
+        add_ssim_gradient(
+            color, target, projected.width, projected.height, gain, background, weights,
+            self._config.ssim_lambda,
             self._buffers.take("moments", (3, MOMENTS, *size), np.float32),
-            self._buffers.take("slopes_of", (3, 3, *size), np.float32),
+            self._buffers.take("moment_slopes", (3, 3, *size), np.float32),
             self._buffers.take("pixels", (3, 2, *size), np.float32), slopes,
         )  # fmt: skip
 
     def _weights(self, index: int, level: int, tiles: int) -> NDArray[np.float32]:
-        """Weights [tiles,AREA] of a photo's pixels: 0 where its mask excludes them."""
+        """Weights [tiles,AREA] of a photo's pixels, 0 for masked pixels."""
         weights = self._buffers.take("weights", (tiles, AREA), np.float32)
         valid = self.views[index].valid_at(level)
         weights[:] = 1.0 if valid is None else valid
-        if self._robust is not None and level == 0 and self.done >= ROBUST_FROM:
-            self._robust.weigh(index, weights)
+        if self._robust is not None and level == 0 and self.done >= ROBUST_START_PROGRESS:
+            self._robust.scale_weights(index, weights)
         return weights
 
-    def _behind(self) -> NDArray[np.float32]:
-        """The background of the next picture: behind cut-outs a random one, so that they become opaque."""
+    def _next_background(self) -> NDArray[np.float32]:
+        """Background [3] of the next image; random behind cut-outs, so that the field becomes opaque."""
         if self.views[0].has_alpha:
             return self._rng.uniform(size=3).astype(np.float32)
         return self.background
 
-    def _expose(self, index: int, tile_sums: NDArray[np.float32]) -> None:
-        """Takes the photo's sums into its gain."""
-        if not self._fitted:
+    def _update_gain(self, index: int, tile_sums: NDArray[np.float32]) -> None:
+        """Update a photo's exposure gain from the sums of its tiles."""
+        if not self._fits_exposure:
             return
         sums = tile_sums[:, 1:].sum(axis=0, dtype=np.float64)
         if self.done > 0.05 and sums[3:].mean() > 0:
@@ -251,42 +258,47 @@ class SplatRun:
             self.gains[index] += 0.3 * (np.clip(fit, 0.5, 2.0) - self.gains[index])
             self.gains /= self.gains.mean(axis=0)
 
-    def _carve(self) -> None:
-        """Takes out needles, and what stands nearer to a camera than anything that it shows can be."""
+    def _remove_obstructions(self) -> None:
+        """Remove needles, splats in free space, and splats closer to a camera than its photo's content."""
         state = self.state
-        close = needles(state.log_scales) | self._free_space.occupied(state)
+        close = needle_mask(state.log_scales) | self._free_space.occupied_mask(state)
         for view, depth in zip(self.views, self._depths, strict=True):
             if depth is not None:
-                close |= in_front_of(view.cameras[0], state.means, CLEAR * depth[0])
+                close |= closer_mask(view.cameras[0], state.means, OBSTRUCTION_DEPTH_SHARE * depth[0])
         if close.any() and not close.all():
             state.take(np.flatnonzero(~close))
 
-    def _grow(self, done: float) -> None:
-        """Takes out what shows nothing, and splits what has the most error."""
+    def _densify(self, done: float) -> None:
+        """Prune splats without effect, and split those with the largest error."""
         state, config = self.state, self._config
-        kept = np.flatnonzero(~fading(state, config.prune, 20.0 * self._scale))
-        state.take(kept if len(kept) else np.arange(1))
-        rounds = max(1.0, (GROWTH[1] - done) / max(done / max(self.step, 1), 1e-9) / GROWTH_EVERY)
-        if len(state) < self._most:
-            want = int(len(state) * ((self._most / len(state)) ** (1.0 / rounds) - 1.0))
-            want = min(want, len(state) // 2, self._most - len(state))
+        keep = np.flatnonzero(~prune_mask(state, config.prune_opacity, 20.0 * self._scale))
+        state.take(keep if len(keep) else np.arange(1))
+        rounds = max(
+            1.0,
+            (DENSIFICATION_PROGRESS[1] - done)
+            / max(done / max(self.step, 1), 1e-9)
+            / DENSIFICATION_INTERVAL_STEPS,
+        )
+        if len(state) < self._max_splats:
+            want = int(len(state) * ((self._max_splats / len(state)) ** (1.0 / rounds) - 1.0))
+            want = min(want, len(state) // 2, self._max_splats - len(state))
             rows = np.argsort(-state.error)[:want]
-            split(state, rows[state.error[rows] > 0])
+            split_splats(state, rows[state.error[rows] > 0])
         state.error[:] = 0.0
         state.hits[:] = 0
 
     def cameras(self) -> tuple[Camera, ...]:
-        """The photos' cameras where they are now."""
+        """Current cameras of the photos."""
         return tuple(self.poses.camera(n, view.cameras[0]) for n, view in enumerate(self.views))
 
     def field(self) -> SplatField:
-        """The field as it is now."""
+        """Current field, without needles."""
         field = self.state.to_field(self._config.antialiased, self._dataset.bounds, self._dataset.unbounded)
-        thin = needles(field.log_scales)
+        thin = needle_mask(field.log_scales)
         return field if thin.all() else field.take(~thin)
 
     def progress(self) -> SplatProgress:
-        """Where the run stands."""
+        """Progress report of the run."""
         done = self.done
         left = self.seconds * (1.0 - done) / done if done > 0 else float("nan")
         if self._config.minutes is not None:
@@ -302,7 +314,7 @@ class SplatRun:
         )
 
     def store(self, path: Path) -> None:
-        """Writes the run's state, atomically."""
+        """Write the run's state atomically."""
         scalars = {
             "step": self.step,
             "seconds": self.seconds,
@@ -318,19 +330,19 @@ class SplatRun:
         write_checkpoint(path, self._signature(), scalars, arrays)
 
     def restore(self, path: Path) -> None:
-        """Takes the run's state from a file written by `store`.
+        """Restore the run's state from a file written by `store`.
 
         Raises:
-            CagefieldError: a file that cannot be read, or of other photos or settings.
+            CagefieldError: the file is unreadable, or of other photos or settings.
         """
         scalars, arrays = read_checkpoint(path, self._signature())
-        with refusing_damage(path):
+        with reject_damage(path):
             self._take(scalars, arrays)
 
     def _take(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
-        """Takes the state of a checkpoint. Raises ValueError where numbers or arrays cannot be a run's."""
+        """Set the state to a checkpoint's. Raises ValueError where its scalars or arrays are inconsistent."""
         own = {field.name: getattr(self.state, field.name) for field in dataclasses.fields(self.state)}
-        forms: dict[str, Form] = {
+        forms: dict[str, ArrayForm] = {
             name: (str(array.dtype), ("N", *array.shape[1:])) for name, array in own.items()
         }
         count = len(self.views)
@@ -356,15 +368,15 @@ class SplatRun:
         self.running_loss, self._queue = scalars["running_loss"], [int(number) for number in queue]
 
     def _signature(self) -> str:
-        """What a file must have been written for."""
+        """Options and photos that a checkpoint must share with this run."""
         sizes = [[view.cameras[0].width, view.cameras[0].height] for view in self.views]
-        settings = dataclasses.asdict(self._config)
+        settings = signature_options(self._config, CHECKPOINT_KEYS)
         return json.dumps(["splats", settings, [view.name for view in self.views], sizes])
 
 
 @dataclasses.dataclass(frozen=True)
 class SplatProgress:
-    """Where a run stands: `done` in [0,1], running mean squared error and its PSNR, seconds, splats."""
+    """Progress of a run: `done` in [0,1], running mean squared error and its PSNR, seconds, splats."""
 
     done: float
     step: int

@@ -1,4 +1,4 @@
-"""The splats of a training as arrays that steps change in place, with what the steps remember of each."""
+"""Splats in training: arrays that steps update in place, with the optimizer's state."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from cagefield.typing import Float32
 class SplatState:
     """N splats in training; arrays by row.
 
-    means [N,3], log_scales [N,3], quaternions [N,4], logits [N] of the opacities, sh [N,K,3]: as SplatField.
-    momentum, running, ticks: of `gauss_newton`. error [N], hits [N]: what `growth` weighs.
-    gradients, curvatures: of the last step, valid for the splats that it saw.
+    means [N,3], log_scales [N,3], quaternions [N,4], logits [N] of the opacities, sh [N,K,3]: as in
+    SplatField.
+    momentum, running, ticks: state of `gauss_newton`. error [N], hits [N]: error and visits since the last
+    densification. gradients, curvatures: of the last step, valid for the splats visible in it.
     """
 
     means: Float32
@@ -40,7 +41,7 @@ class SplatState:
     def new(
         cls, means: NDArray[Any], scales: NDArray[Any], rgb: Float32, opacity: float, sh_degree: int
     ) -> SplatState:
-        """Round splats: means [N,3], standard deviations [N], rgb [N,3]."""
+        """Isotropic splats of means [N,3], standard deviations [N] and rgb [N,3]."""
         n = len(means)
         quaternions = np.zeros((n, 4), np.float32)
         quaternions[:, 0] = 1.0
@@ -52,25 +53,25 @@ class SplatState:
             quaternions,
             np.full(n, np.log(opacity / (1.0 - opacity)), np.float32),
             sh,
-            *_memory(n),
+            *_empty_optimizer_rows(n),
         )
 
     def __len__(self) -> int:
         return len(self.means)
 
     def take(self, rows: NDArray[np.int64]) -> None:
-        """Keeps these rows, in this order; a row may be there more than once."""
+        """Keep the given rows, in this order; a row may occur several times."""
         for field in fields(self):
             setattr(self, field.name, np.ascontiguousarray(getattr(self, field.name)[rows]))
 
     def append(self, other: SplatState) -> None:
-        """Adds the rows of another state behind these."""
+        """Append the rows of another state."""
         for field in fields(self):
             both = np.concatenate([getattr(self, field.name), getattr(other, field.name)])
             setattr(self, field.name, both)
 
     def to_field(self, antialiased: bool, bounds: NDArray[np.float64], unbounded: bool) -> SplatField:
-        """The splats as a field."""
+        """SplatField of the splats."""
         opacities = 1.0 / (1.0 + np.exp(-self.logits.astype(np.float64)))
         return SplatField(
             self.means,
@@ -84,8 +85,8 @@ class SplatState:
         )
 
 
-def _memory(n: int) -> tuple[Any, ...]:
-    """Empty optimiser rows of n splats, in the order of SplatState's fields."""
+def _empty_optimizer_rows(n: int) -> tuple[Any, ...]:
+    """Zeroed optimizer arrays of n splats, in the order of SplatState's fields."""
     return (
         np.zeros((n, MOMENTS), np.float32),
         np.zeros((n, RUNNING), np.float32),

@@ -1,4 +1,4 @@
-"""The photos of a SplatField's training: tiles of pixels at several sizes, with their cameras."""
+"""Training photos of a SplatField: pixel tiles index several resolutions, with their cameras."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from cagefield.datasets.masks import shrink_mask
 from cagefield.datasets.views import View
 from cagefield.rendering.splats.rasterizer import tiled
 
-LEVELS = 3
-"""Sizes of each photo: whole, 1/2, 1/4."""
+LEVEL_COUNT = 3
+"""Number of resolutions of each photo: full, 1/2, 1/4."""
 
-SMALLEST = 48
-"""Pixels that the shorter side of a photo keeps at the least."""
+MIN_SIDE_PIXELS = 48
+"""Minimum shorter side of a downscaled photo."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingView:
-    """One photo: its camera and its pixels [tiles, 3 or 4, AREA] uint8 by level, 0 the whole size.
+    """Photo with its camera and its pixels [tiles, 3 or 4, AREA] uint8 by level; level 0 is the full size.
 
-    `valid` [tiles, AREA] by level is True where a pixel may be used; None where all of them may.
+    `valid` [tiles, AREA] by level masks the valid pixels; None where all are valid.
     """
 
     name: str
@@ -34,32 +34,32 @@ class TrainingView:
     valid: tuple[NDArray[np.bool_], ...] | None = None
 
     @classmethod
-    def of(cls, view: View) -> TrainingView:
-        """The photo read and shrunk by box filters; straight alpha is weighed in."""
+    def from_view(cls, view: View) -> TrainingView:
+        """Photo of a view, downscaled by box filters that weigh colors by straight alpha."""
         pixels, mask = view.load(), view.valid_pixels()
         cameras, tiles = [view.camera], [tiled(pixels)]
         valid = [] if mask is None else [_tiled_mask(mask)]
-        for level in range(1, LEVELS):
+        for level in range(1, LEVEL_COUNT):
             factor = 2**level
-            if min(view.camera.width, view.camera.height) // factor < SMALLEST:
+            if min(view.camera.width, view.camera.height) // factor < MIN_SIDE_PIXELS:
                 break
             cameras.append(view.camera.downscaled(factor))
-            tiles.append(tiled(_boxed(pixels, factor)))
+            tiles.append(tiled(_box_filter(pixels, factor)))
             if mask is not None:
                 valid.append(_tiled_mask(shrink_mask(mask, factor)))
         return cls(view.name, tuple(cameras), tuple(tiles), pixels.shape[2] == 4, tuple(valid) or None)
 
     def level(self, level: int) -> tuple[Camera, NDArray[np.uint8]]:
-        """(camera, tiles) of a level, or of the smallest that there is."""
-        at = min(level, len(self.cameras) - 1)
-        return self.cameras[at], self.tiles[at]
+        """(camera, tiles) of a level, or of the smallest level available."""
+        index = min(level, len(self.cameras) - 1)
+        return self.cameras[index], self.tiles[index]
 
     def valid_at(self, level: int) -> NDArray[np.bool_] | None:
-        """Pixels [tiles, AREA] of a level that may be used; None where all of them may."""
+        """Mask [tiles, AREA] of a level's valid pixels; None where all are valid."""
         return None if self.valid is None else self.valid[min(level, len(self.cameras) - 1)]
 
     def with_alpha(self) -> TrainingView:
-        """The same; a photo without alpha is opaque."""
+        """View with an alpha channel; opaque where the photo has none."""
         if self.has_alpha:
             return self
         filled = (np.pad(tiles, ((0, 0), (0, 1), (0, 0)), constant_values=255) for tiles in self.tiles)
@@ -67,17 +67,18 @@ class TrainingView:
 
 
 def load_views(views: Sequence[View]) -> list[TrainingView]:
-    """All photos, with alpha where one of them has it. Raises DatasetError where one cannot be read."""
-    found = [TrainingView.of(view) for view in views]
-    return [view.with_alpha() for view in found] if any(view.has_alpha for view in found) else found
+    """Training views of all photos, all with alpha if any has it. Raises DatasetError if unreadable."""
+    loaded = [TrainingView.from_view(view) for view in views]
+    return [view.with_alpha() for view in loaded] if any(view.has_alpha for view in loaded) else loaded
 
 
 def _tiled_mask(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A mask [H,W] as tiles [tiles, AREA]."""
+    """Mask [H,W] as tiles [tiles, AREA]."""
     return np.ascontiguousarray(tiled(mask[..., None])[:, 0])
 
 
-def _boxed(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+def _box_filter(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """Pixels averaged over factor x factor blocks, colors weighted by alpha."""
     height, width = pixels.shape[0] // factor, pixels.shape[1] // factor
     blocks = pixels[: height * factor, : width * factor].astype(np.float32)
     blocks = blocks.reshape(height, factor, width, factor, -1)

@@ -1,4 +1,4 @@
-"""One batch of a VoxelField's training: marched, smoothed, and every voxel it met updated."""
+"""Training batches of a VoxelField: ray march, Laplacian regularization, and the update of the voxels met."""
 
 from __future__ import annotations
 
@@ -16,26 +16,28 @@ from cagefield.training.voxels.grid_state import GridState
 from cagefield.training.voxels.kernels.gauss_newton_voxels import gauss_newton, laplacian
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs
 from cagefield.training.voxels.kernels.training_march import (
-    MOST_SAMPLES,
-    SAMPLE,
+    MAX_SAMPLES,
+    SAMPLE_FLOATS,
     BatchArgs,
     LossArgs,
     WorkerArgs,
     march_batch,
 )
-from cagefield.training.voxels.ray_batches import Photos
+from cagefield.training.voxels.ray_batches import DevicePhotos
 from cagefield.training.voxels.voxel_config import VoxelConfig
-from cagefield.training.voxels.voxel_defaults import Settings
+from cagefield.training.voxels.voxel_defaults import VoxelSettings
 from cagefield.training.voxels.voxel_space import VoxelSpace
 
-GPU_WORKERS = 1 << 15
-"""Rays that a GPU marches at once: what they note takes 16 kB each."""
+MAX_GPU_RAYS = 1 << 15
+"""Maximum number of rays that a GPU marches at once; the noted samples of a ray take 16 kB."""
 
 
-class Batches:
-    """Batches of the patches of `photos`, and the device memory that they share."""
+class BatchTrainer:
+    """Trains a grid on batches of pixel patches; owns the device buffers that the batches share."""
 
-    def __init__(self, config: VoxelConfig, settings: Settings, photos: Photos, space: VoxelSpace) -> None:
+    def __init__(
+        self, config: VoxelConfig, settings: VoxelSettings, photos: DevicePhotos, space: VoxelSpace
+    ) -> None:
         self._config, self._settings, self._photos, self._space = config, settings, photos, space
         self._buffers: dict[int, tuple[Any, Any, Any, Any]] = {}
         self._notes: tuple[int, Any] | None = None
@@ -43,42 +45,42 @@ class Batches:
     def train(
         self, grid: GridState, patches: NDArray[np.int32], exposure: Exposure, step: int, done: float
     ) -> float:
-        """Mean squared error of the patches [P,3] per channel; `grid` and `exposure` have learnt from them.
+        """Mean squared error per channel of the patches [P,3], before the update of `grid` and `exposure`.
 
-        The step decides jitter and backgrounds, the progress `done` of the run the learning rate.
+        `step` seeds jitter and random backgrounds; the progress `done` sets the learning rate.
         """
         losses, sums = self._march(grid, patches, exposure.gains, step)
-        if self._settings.smooth > 0:
-            self._regularise(grid)
-        self._descend(grid, done)
+        if self._settings.laplacian_reg > 0:
+            self._add_laplacian(grid)
+        self._update_grid(grid, done)
         if exposure.fitted:
             exposure.add(patches[:, 0], sums.to_numpy().reshape(len(patches), -1, 6).sum(axis=1))
         return float(losses.to_numpy().mean()) / 3.0
 
     def _march(
-        self, grid: GridState, chosen: NDArray[np.int32], gains: Any, step_number: int
+        self, grid: GridState, selected: NDArray[np.int32], gains: Any, step_number: int
     ) -> tuple[Any, Any]:
-        """Device arrays: losses [rays] and exposure sums [rays * 6]; the grid's accumulator is filled."""
+        """Device arrays (losses [rays], exposure sums [rays * 6]); adds to the grid's accumulator."""
         config, photos, space = self._config, self._photos, self._space
-        count, gpu = len(chosen), devices.is_gpu()
-        workers = min(count * config.patch**2, GPU_WORKERS) if gpu else grid.workers
-        patches, losses, penalties, sums = self._buffer(count)
-        patches.from_numpy(np.ascontiguousarray(chosen).reshape(-1))
+        count, gpu = len(selected), devices.is_gpu()
+        workers = min(count * config.patch_size**2, MAX_GPU_RAYS) if gpu else grid.workers
+        patches, losses, penalties, sums = self._batch_buffers(count)
+        patches.from_numpy(np.ascontiguousarray(selected).reshape(-1))
         cells = grid.args
-        step = config.step if space.contracted else config.step / float(np.max(cells.scale))
+        step = config.step_voxels if space.contracted else config.step_voxels / float(np.max(cells.scale))
         march_batch(
             block_cyclic_schedule(workers, 1),
-            PatchArgs(patches, count, config.patch),
+            PatchArgs(patches, count, config.patch_size),
             photos.args(gains),
             cells,
             grid.bricks,
-            WorkerArgs(grid.accumulator, grid.record, self._scratch(workers), workers),
+            WorkerArgs(grid.accumulator, grid.record, self._sample_scratch(workers), workers),
             LossArgs(losses, penalties, sums),
             BatchArgs(
                 step,
                 space.near,
-                config.distortion,
-                space.reach,
+                config.distortion_reg,
+                space.half_extent,
                 step_number + 1000003 * config.seed,
                 1,
                 floats((1.0, 1.0, 1.0)),
@@ -89,8 +91,8 @@ class Batches:
         )
         return losses, sums
 
-    def _regularise(self, grid: GridState) -> None:
-        """Adds the Laplacian's gradient to the accumulator."""
+    def _add_laplacian(self, grid: GridState) -> None:
+        """Add the gradient of the Laplacian regularization to the accumulator."""
         laplacian(
             grid.density,
             grid.sh,
@@ -100,15 +102,15 @@ class Batches:
             grid.accumulator,
             grid.slots,
             ints(grid.resolution),
-            self._settings.smooth,
-            self._settings.smooth,
+            self._settings.laplacian_reg,
+            self._settings.laplacian_reg,
             grid.terms,
         )
 
-    def _descend(self, grid: GridState, done: float) -> None:
-        """Updates the grid from its accumulator, which is empty then."""
+    def _update_grid(self, grid: GridState, done: float) -> None:
+        """Update the grid from its accumulator, and empty the accumulator."""
         config = self._config
-        first, last = self._settings.rate
+        first, last = self._settings.lr
         rate = first * (last / first) ** done
         gauss_newton(
             grid.density,
@@ -120,18 +122,18 @@ class Batches:
             grid.record,
             grid.workers,
             grid.slots,
-            config.decay,
+            config.curvature_decay,
             rate,
             rate,
-            config.largest_step,
+            config.max_step,
             config.damping,
-            self._settings.plain,
+            self._settings.view_dependence_reg,
             grid.terms,
         )
 
-    def _buffer(self, count: int) -> tuple[Any, Any, Any, Any]:
-        """Device arrays for so many patches: patches, losses, penalties, exposure sums."""
-        rays = count * self._config.patch**2
+    def _batch_buffers(self, count: int) -> tuple[Any, Any, Any, Any]:
+        """Device arrays for `count` patches: (patches, losses, penalties, exposure sums)."""
+        rays = count * self._config.patch_size**2
         if count not in self._buffers:
             self._buffers = {
                 count: (
@@ -143,8 +145,8 @@ class Batches:
             }
         return self._buffers[count]
 
-    def _scratch(self, workers: int) -> Any:
-        """Device memory in which so many workers note their samples."""
+    def _sample_scratch(self, workers: int) -> Any:
+        """Device buffer for the samples of `workers` rays."""
         if self._notes is None or self._notes[0] != workers:
-            self._notes = (workers, qd.ndarray(qd.f32, (workers * MOST_SAMPLES * SAMPLE,)))
+            self._notes = (workers, qd.ndarray(qd.f32, (workers * MAX_SAMPLES * SAMPLE_FLOATS,)))
         return self._notes[1]

@@ -1,4 +1,4 @@
-"""Exposures of the training photos, fitted beside the field: photo = gain x picture, per channel."""
+"""Exposure gains of the training photos, fitted with the field: photo = gain x image, per channel."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from numpy.typing import NDArray
 
 from cagefield.rendering.voxels.device_grid import to_device
 
-DECAY = 0.995
-"""Of the sums, for each batch."""
+SUMS_DECAY = 0.995
+"""Decay of the sums per batch."""
 
-PRIOR = 0.05
-"""Weight of gain 1 in a photo's fit, relative to what the photos' mean holds."""
+PRIOR_WEIGHT = 0.05
+"""Weight of the prior gain 1 in a photo's fit, relative to the mean C C of the photos."""
 
-LIMITS = (0.5, 2.0)
-"""A gain before the gains are scaled to mean 1."""
+GAIN_RANGE = (0.5, 2.0)
+"""Limits of a gain, before all gains are scaled to mean 1."""
 
 
 class Exposure:
-    """Gains of V photos; all 1 where they are not `fitted`.
+    """Exposure gains of V photos; all 1 unless `fitted`.
 
     Attributes:
-        sums: [V,6] decayed sums of C photo and of C C per channel, C the picture.
-        gains: device [V,3] float32, those that the march uses; `refresh` brings them up to date.
+        sums: [V,6] decayed sums of C photo and of C C per channel, C the rendered color.
+        gains: device [V,3] float32 gains of the march, as of the last `refresh`.
     """
 
     def __init__(self, photos: int, fitted: bool) -> None:
@@ -33,24 +33,24 @@ class Exposure:
         self.gains: Any = to_device(np.ones((photos, 3), np.float32))
 
     def add(self, views: NDArray[np.int32], sums: NDArray[np.float32]) -> None:
-        """Takes in a batch: sums [P,6] of patches of these views [P]."""
-        self.sums *= DECAY
+        """Add the sums [P,6] of a batch's patches, of the views [P]."""
+        self.sums *= SUMS_DECAY
         np.add.at(self.sums, views, sums)
 
     def values(self) -> NDArray[np.float32]:
-        """The least-squares gains [V,3] of all batches so far; their mean is 1."""
+        """Least-squares gains [V,3] of all batches so far, scaled to mean 1."""
         if not self.fitted:
             return np.ones((len(self.sums), 3), np.float32)
-        prior = PRIOR * self.sums[:, 3:].mean(axis=0) + 1e-6
+        prior = PRIOR_WEIGHT * self.sums[:, 3:].mean(axis=0) + 1e-6
         gains = (self.sums[:, :3] + prior) / (self.sums[:, 3:] + prior)
-        gains = np.clip(gains, *LIMITS)
+        gains = np.clip(gains, *GAIN_RANGE)
         return np.asarray(gains / gains.mean(axis=0), np.float32)
 
     def refresh(self) -> None:
-        """From now on the march uses the gains of all batches so far."""
+        """Set the gains of the march to `values()`."""
         self.gains.from_numpy(self.values().reshape(-1))
 
-    def go_to(self, sums: NDArray[np.float64], gains: NDArray[np.float32]) -> None:
-        """Goes on with these sums and gains in use."""
+    def restore(self, sums: NDArray[np.float64], gains: NDArray[np.float32]) -> None:
+        """Set the sums and gains to those of a checkpoint."""
         self.sums = sums
         self.gains = to_device(gains.astype(np.float32))

@@ -1,7 +1,7 @@
-"""Specks: small clouds of density that hang free of everything else, what a short training leaves in the air.
+"""Removal of floaters: small clouds of density detached from everything else, left over by short trainings.
 
-They hide in the pictures that a field was trained on, and show when an edit moves or stretches the space
-around a part.
+Floaters are hidden in the views of the training photos and become visible when an edit moves or stretches the
+space around them.
 """
 
 from __future__ import annotations
@@ -11,37 +11,37 @@ from scipy import ndimage
 
 from cagefield.fields.voxel_field import VoxelField
 
-LEAST_DEPTH = 0.02
-"""Optical depth per voxel from which on a vertex belongs to a cloud."""
+MIN_OPTICAL_DEPTH = 0.02
+"""Minimum optical depth per voxel of a vertex that belongs to a cloud."""
 
-LARGEST_SPECK, LARGEST_SHARE = 64, 1e-3
-"""A speck has fewer vertices than this, and less than this share of the largest cloud's."""
+MAX_FLOATER_VERTICES, MAX_FLOATER_SHARE = 64, 1e-3
+"""Upper bounds of a floater's number of vertices: absolute, and as a share of the largest cloud's."""
 
-_NEIGHBOURS = np.ones((3, 3, 3), bool)
+_NEIGHBORHOOD = np.ones((3, 3, 3), bool)
 
 
-def without_specks(field: VoxelField) -> VoxelField:
-    """The field without its specks: clouds of vertices that touch no larger cloud, not even diagonally.
+def remove_floaters(field: VoxelField) -> VoxelField:
+    """Field without its floaters: small clouds that are not 26-connected to a larger cloud.
 
-    What lies next to a cloud that stays is kept, however thin. On the built-in digger (200x200 photos, 1,600
-    steps) 170 of 172 clouds and 1.8% of the vertices go; test PSNR changes by +0.001 dB.
+    Every vertex next to a remaining cloud is keep, however thin. On the built-in digger (200x200 photos,
+    1,600 steps) 170 of 172 clouds and 1.8% of the vertices go; test PSNR changes by +0.001 dB.
     """
-    full = np.zeros(field.resolution, bool)
+    occupied = np.zeros(field.resolution, bool)
     depth = field.density * field.voxel_size.max()
-    full.reshape(-1)[field.vertices[depth > LEAST_DEPTH]] = True
-    cloud, count = ndimage.label(full, _NEIGHBOURS)
+    occupied.reshape(-1)[field.vertices[depth > MIN_OPTICAL_DEPTH]] = True
+    cloud, count = ndimage.label(occupied, _NEIGHBORHOOD)
     if count == 0:
         return field
     size = np.bincount(cloud.reshape(-1))
     size[0] = 0
-    stays = size >= min(LARGEST_SPECK, LARGEST_SHARE * size.max())
-    near = ndimage.binary_dilation(stays[cloud], _NEIGHBOURS)
-    kept = near.reshape(-1)[field.vertices]
+    is_large = size >= min(MAX_FLOATER_VERTICES, MAX_FLOATER_SHARE * size.max())
+    near_large = ndimage.binary_dilation(is_large[cloud], _NEIGHBORHOOD)
+    keep = near_large.reshape(-1)[field.vertices]
     return VoxelField(
         field.bounds,
         field.resolution,
-        field.vertices[kept],
-        field.density[kept],
-        field.sh[kept],
+        field.vertices[keep],
+        field.density[keep],
+        field.sh[keep],
         field.contracted,
     )

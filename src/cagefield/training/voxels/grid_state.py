@@ -1,4 +1,4 @@
-"""The voxel grid while it is trained: device arrays that can be pruned, cropped and refined.
+"""Voxel grid in training: device arrays that can be pruned, cropped and refined.
 
 Notation as in `cagefield.rendering.voxels.device_grid`: slot 0 is the empty vertex; slots follow `vertices`
 in brick order.
@@ -22,25 +22,25 @@ from cagefield.rendering.voxels import occupancy
 from cagefield.rendering.voxels.device_grid import brick_order, to_device, transform_of
 from cagefield.rendering.voxels.kernels.grid import GridArgs
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs
-from cagefield.training.voxels.kernels.accumulators import HEAD
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
 
-CHUNK, MOST_THREADS = 2**16, 8
-"""Vertices that a thread interpolates at once, and how many threads do."""
+VERTICES_PER_CHUNK, MAX_THREADS = 2**16, 8
+"""Vertices per interpolation task, and maximum number of threads for these tasks."""
 
-MOST_BYTES = 2 * 1024**3
-"""Memory of all accumulators together, at most: of a large grid many threads have fewer."""
+MAX_ACCUMULATOR_BYTES = 2 * 1024**3
+"""Maximum memory of all accumulators together; a large grid gets fewer accumulators than threads."""
 
 
 @dataclass(eq=False)
 class GridState:
-    """A trainable grid.
+    """Trainable voxel grid.
 
     Attributes:
-        bounds: [2,3] as VoxelField. resolution: vertices per axis. vertices: [M] linear, in slot order.
+        bounds: [2,3] as in VoxelField. resolution: vertices per axis. vertices: [M] linear indices, by slot.
         contracted: as VoxelField. degree: SH degree.
         density, sh, state, weight, accumulator, index, codes: device arrays; see
             `kernels.march`, `kernels.gauss_newton_voxels` and `kernels.accumulators`.
-        threads: of the CPU that may take part. workers: number of accumulators, at most as many.
+        threads: number of CPU threads available. workers: number of accumulators, at most `threads`.
     """
 
     bounds: NDArray[np.float64]
@@ -74,12 +74,12 @@ class GridState:
         contracted: bool,
         threads: int,
     ) -> "GridState":
-        """The state with these vertices (any order), density [M], sh [M,K,3] and running curvatures [M,2]."""
+        """State from vertices (any order), density [M], sh [M,K,3] and running curvatures [M,2]."""
         order = brick_order(vertices, resolution)
         vertices = vertices[order]
         count, terms = len(vertices), sh.shape[1]
         # Each array is on the device before the next is copied: a large grid's take most of the memory.
-        densities, colours = _slots(density, order), _slots(sh, order)
+        densities, colors = _slots(density, order), _slots(sh, order)
         curvatures = _slots(np.zeros((count, 2), np.float32) if state is None else state, order)
         index = np.zeros(int(np.prod(resolution)), np.int32)
         index[vertices] = np.arange(1, count + 1, dtype=np.int32)
@@ -88,9 +88,9 @@ class GridState:
         full.reshape(-1)[vertices] = True
         bricks = occupancy.of_vertices(full)
         del index, full
-        record = 4 * (count + 1) * (HEAD + 3 * terms)
-        workers = max(1, min(threads, MOST_BYTES // record))
-        accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEAD + 3 * terms),))
+        record = 4 * (count + 1) * (HEADER_FLOATS + 3 * terms)
+        workers = max(1, min(threads, MAX_ACCUMULATOR_BYTES // record))
+        accumulator = qd.ndarray(qd.f32, (workers * (count + 1) * (HEADER_FLOATS + 3 * terms),))
         accumulator.fill(0.0)
         return cls(
             bounds=bounds,
@@ -101,7 +101,7 @@ class GridState:
             workers=workers,
             vertices=vertices,
             density=densities,
-            sh=colours,
+            sh=colors,
             state=curvatures,
             weight=to_device(np.zeros(count + 1, np.float32)),
             accumulator=accumulator,
@@ -126,7 +126,7 @@ class GridState:
         threads: int,
         keep: NDArray[np.bool_] | None = None,
     ) -> "GridState":
-        """Every vertex (of those in `keep` [nx*ny*nz]) stored, grey, each voxel `opacity` deep optically."""
+        """Gray grid with every vertex (of `keep` [nx*ny*nz]) stored, of optical depth `opacity` per voxel."""
         vertices = np.arange(int(np.prod(resolution))) if keep is None else np.flatnonzero(keep)
         count = len(vertices)
         return cls.build(
@@ -141,18 +141,18 @@ class GridState:
 
     @property
     def args(self) -> GridArgs:
-        """The grid as kernels take it."""
+        """Kernel arguments of the grid."""
         transform = transform_of(self.bounds, self.resolution, self.contracted)
         return GridArgs(self.index, self.density, self.sh, ints(self.resolution), *transform)
 
     @property
     def bricks(self) -> OccupancyArgs:
-        """Its occupancy as kernels take it."""
+        """Kernel arguments of the grid's occupancy bricks."""
         return OccupancyArgs(self.codes, ints((0, 0, 0)), ints(self.brick_dims))
 
     @property
     def terms(self) -> int:
-        """SH coefficients per channel."""
+        """Number of SH coefficients per channel."""
         return (self.degree + 1) ** 2
 
     @property
@@ -162,13 +162,13 @@ class GridState:
 
     @property
     def record(self) -> int:
-        """Floats of one accumulator."""
-        return self.slots * (HEAD + 3 * self.terms)
+        """Number of floats of one accumulator."""
+        return self.slots * (HEADER_FLOATS + 3 * self.terms)
 
     def arrays(
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-        """(density [M], sh [M,K,3], running curvatures [M,2], largest weight [M]), in slot order."""
+        """(density [M], sh [M,K,3], running curvatures [M,2], maximum weight [M]) on the host, by slot."""
         return (
             self.density.to_numpy()[1:],
             self.sh.to_numpy().reshape(-1, self.terms, 3)[1:],
@@ -177,7 +177,7 @@ class GridState:
         )
 
     def to_field(self) -> VoxelField:
-        """The field on the host, without vertices that cannot change any picture (no density around them)."""
+        """VoxelField on the host, without vertices that have no density at or around them."""
         density, sh, _, _ = self.arrays()
         full = np.zeros(self.resolution, bool)
         full.reshape(-1)[self.vertices] = density > 0
@@ -188,8 +188,8 @@ class GridState:
             self.bounds, self.resolution, self.vertices[order], density[order], sh[order], self.contracted
         )
 
-    def pruned(self, least_weight: float, *, dilate: int = 1) -> "GridState":
-        """Without the vertices whose own and neighbours' largest weights stayed under `least_weight`."""
+    def prune(self, least_weight: float, *, dilate: int = 1) -> "GridState":
+        """Grid without the vertices whose own and neighbors' maximum weights are below `least_weight`."""
         density, sh, state, weight = self.arrays()
         full = np.zeros(self.resolution, bool)
         full.reshape(-1)[self.vertices[weight > least_weight]] = True
@@ -207,15 +207,14 @@ class GridState:
             threads=self.threads,
         )
 
-    def refined(
+    def refine(
         self, bounds: NDArray[np.float64], resolution: tuple[int, int, int], degree: int
     ) -> "GridState":
-        """The same field on another grid, over other bounds: values and curvatures interpolated trilinearly.
+        """Grid of another resolution and bounds, with values and curvatures interpolated trilinearly.
 
-        The SH degree is at least the grid's own; new coefficients are 0.
-
-        A new vertex is stored where its cell of the old grid has a stored corner. Curvatures, sums over
-        the rays that meet a voxel, are scaled by the ratio of the voxels' volumes.
+        The SH degree is at least the old one; new coefficients are 0. A new vertex is stored where its cell
+        of the old grid has a stored corner. Curvatures are sums over the rays that meet a voxel, so they are
+        scaled by the ratio of the voxels' volumes.
         """
         density, sh, state, _ = self.arrays()
         field_bounds = np.array([[-2.0] * 3, [2.0] * 3]) if self.contracted else self.bounds
@@ -243,11 +242,11 @@ class GridState:
         values = np.concatenate([np.zeros((1, values.shape[1]), np.float32), values])
         volume = float(np.prod(new_cell / old_cell))
         densities = np.empty(count, np.float32)
-        colours = np.zeros((count, (degree + 1) ** 2, 3), np.float32)
+        colors = np.zeros((count, (degree + 1) ** 2, 3), np.float32)
         curvatures = np.empty((count, 2), np.float32)
 
         def interpolate(begin: int) -> None:
-            part = slice(begin, min(begin + CHUNK, count))
+            part = slice(begin, min(begin + VERTICES_PER_CHUNK, count))
             xyz = np.unravel_index(vertices[part], resolution)
             out = np.zeros((part.stop - begin, values.shape[1]), np.float32)
             stored = np.zeros(len(out), np.float32)
@@ -264,24 +263,24 @@ class GridState:
                 stored += weight * (slot > 0)
             out[:, 1:] /= np.maximum(stored, 1e-6)[:, None]
             densities[part] = out[:, 0]
-            colours[part, :terms] = out[:, 1 : 1 + 3 * terms].reshape(-1, terms, 3)
+            colors[part, :terms] = out[:, 1 : 1 + 3 * terms].reshape(-1, terms, 3)
             curvatures[part] = out[:, 1 + 3 * terms :] * volume
 
-        with ThreadPoolExecutor(min(devices.threads(), MOST_THREADS)) as threads:
-            list(threads.map(interpolate, range(0, count, CHUNK)))
+        with ThreadPoolExecutor(min(devices.threads(), MAX_THREADS)) as threads:
+            list(threads.map(interpolate, range(0, count, VERTICES_PER_CHUNK)))
         return GridState.build(
             bounds,
             resolution,
             vertices,
             densities,
-            colours,
+            colors,
             curvatures,
             contracted=self.contracted,
             threads=self.threads,
         )
 
-    def support(self) -> NDArray[np.float64]:
-        """World-space box [2,3] of the stored vertices, one voxel wider, within the bounds (bounded only)."""
+    def support_bounds(self) -> NDArray[np.float64]:
+        """World-space box [2,3] of the stored vertices, one voxel larger, within `bounds` (bounded grids)."""
         cell = (self.bounds[1] - self.bounds[0]) / (np.array(self.resolution) - 1)
         at = np.stack(np.unravel_index(self.vertices, self.resolution), axis=1)
         lower = self.bounds[0] + (at.min(axis=0) - 1) * cell
@@ -290,7 +289,7 @@ class GridState:
 
 
 def _slots(values: NDArray[np.float32], order: NDArray[np.int64]) -> Any:
-    """A device array of the values [M,...] in this order, after those of the empty slot, which are 0."""
+    """Device array [M+1,...] of the values in `order`, after zeros for the empty slot."""
     padded = np.zeros((len(values) + 1, *values.shape[1:]), np.float32)
     np.take(values, order, axis=0, out=padded[1:])
     return to_device(padded)
@@ -302,7 +301,7 @@ def cell_sizes(
     vertices: NDArray[np.int64],
     contracted: bool,
 ) -> NDArray[np.float32]:
-    """World-space voxel size [M] at each vertex; along the radius, growing as m^2, if contracted."""
+    """World-space voxel size [M] at each vertex; radial, growing as m^2, for contracted grids."""
     n = np.array(resolution) - 1
     if not contracted:
         return np.full(len(vertices), ((bounds[1] - bounds[0]) / n).max(), np.float32)

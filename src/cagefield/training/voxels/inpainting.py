@@ -1,12 +1,14 @@
-"""Filling what no photo showed: the ground under a part, the inside of a thing.
+"""Inpainting of vertices that no training photo shows: the ground under an object, the inside of an object.
 
-Photos say nothing of it, so a trained field holds anything there, and an edit that moves a part away shows
-it. It is filled a few voxels deep, opaque, with colours that go on from the surfaces around, each mostly in
-its own plane: under a part, the ground continues, not the part's sides.
+Photos do not constrain these vertices, and an edit that moves an object away exposes them. Vertices up to
+FILL_DEPTH_VOXELS from a visible surface become opaque. Their colors continue the visible surfaces around,
+each
+surface mostly within its own plane: under an object the ground continues, not the sides of the object.
 
-For each axis a, the surfaces' weight n_a^2 (n their normals) and weight times colour are spread by a screened
-diffusion, (1 - L^2 div K_a grad) u = 0, whose conductivity K_a is 1 in the plane across a and less along a.
-The colour is the sum of the spread colours over that of the spread weights.
+For each axis a, the squared normal component n_a^2 of the surfaces and n_a^2 times their color are the
+sources of a screened diffusion (1 - L^2 div K_a grad) u = 0, whose conductivity K_a is 1 in the plane normal
+to a and NORMAL_CONDUCTIVITY along a. The color is the sum over axes of the diffused colors, over that of the
+diffused weights.
 """
 
 from __future__ import annotations
@@ -18,95 +20,97 @@ from scipy.sparse.linalg import cg
 
 from cagefield.fields.voxel_field import VoxelField
 
-DEPTH = 8
-"""How far from a seen surface is filled, voxels."""
+FILL_DEPTH_VOXELS = 8
+"""Maximum distance of an inpainted vertex from a visible surface."""
 
-SURFACE = 0.05
-"""Optical depth per voxel from which on a seen vertex belongs to a surface."""
+MIN_SURFACE_OPTICAL_DEPTH = 0.05
+"""Minimum optical depth per voxel of a visible vertex that belongs to a surface."""
 
-OPAQUE = 3.0
-"""Optical depth per voxel of what is filled."""
+FILL_OPTICAL_DEPTH = 3.0
+"""Optical depth per voxel of inpainted vertices."""
 
-REACH = 6.0
-"""L: how far colours spread before nearer surfaces outweigh them, voxels."""
+DIFFUSION_LENGTH_VOXELS = 6.0
+"""L: screening length of the diffusion."""
 
-ACROSS = 1.0 / 16.0
-"""Conductivity across a surface's plane, over that in it."""
+NORMAL_CONDUCTIVITY = 1.0 / 16.0
+"""Conductivity along a surface's normal, relative to the conductivity in its plane."""
 
-TOLERANCE = 1e-4
-"""Relative residual to which the diffusion is solved."""
+MAX_RELATIVE_RESIDUAL = 1e-4
+"""Relative residual at which conjugate gradients stop."""
 
-MOST_STEPS = 200
-"""Steps of an iterative solution, at most; see `solve_diffusion`."""
+MAX_SOLVER_STEPS = 200
+"""Maximum number of steps of an iterative solver; see `solve_diffusion`."""
 
 
-def filled(field: VoxelField, unseen: NDArray[np.bool_]) -> VoxelField:
-    """The field with its vertices `unseen` [nx,ny,nz] opaque up to DEPTH voxels from what was seen.
+def fill_unseen(field: VoxelField, unseen: NDArray[np.bool_]) -> VoxelField:
+    """Field whose vertices `unseen` [nx,ny,nz] are opaque up to FILL_DEPTH_VOXELS from visible surfaces.
 
-    Other unseen vertices stay as they are. Every colour that is filled is the same in all directions.
+    Other unseen vertices stay unchanged. Inpainted colors do not depend on the view direction.
     """
     voxel = float(field.voxel_size.max())
     density = np.zeros(field.resolution, np.float32)
     density.reshape(-1)[field.vertices] = field.density
-    surface = (density * voxel > SURFACE) & ~unseen
-    target = unseen & (ndimage.distance_transform_edt(~surface) <= DEPTH)
-    where = np.flatnonzero(target)
-    if not len(where) or not surface.any():
+    surface = (density * voxel > MIN_SURFACE_OPTICAL_DEPTH) & ~unseen
+    target = unseen & (ndimage.distance_transform_edt(~surface) <= FILL_DEPTH_VOXELS)
+    target_indices = np.flatnonzero(target)
+    if not len(target_indices) or not surface.any():
         return field
     slot = np.zeros(density.size, np.int64)
     slot[field.vertices] = np.arange(len(field.vertices))
-    colours = _spread(target, surface, _normals(density, surface), field.sh[slot[np.flatnonzero(surface)], 0])
+    colors = _diffuse_colors(
+        target, surface, _squared_normals(density, surface), field.sh[slot[np.flatnonzero(surface)], 0]
+    )
     stored = np.zeros(density.size, bool)
     stored[field.vertices] = True
-    stored[where] = True
+    stored[target_indices] = True
     vertices = np.flatnonzero(stored)
-    density.reshape(-1)[where] = OPAQUE / voxel
+    density.reshape(-1)[target_indices] = FILL_OPTICAL_DEPTH / voxel
     sh = field.sh[slot[vertices]]
-    at = np.searchsorted(vertices, where)
+    at = np.searchsorted(vertices, target_indices)
     sh[at] = 0.0
-    sh[at, 0] = colours
+    sh[at, 0] = colors
     return VoxelField(
         field.bounds, field.resolution, vertices, density.reshape(-1)[vertices], sh, field.contracted
     )
 
 
-def _normals(density: NDArray[np.float32], surface: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Squares [S,3] of the components of the surface vertices' unit normals."""
+def _squared_normals(density: NDArray[np.float32], surface: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Squared components [S,3] of the surface vertices' unit normals."""
     smooth = ndimage.gaussian_filter(np.minimum(density, np.median(density[surface])), 1.0)
     squares = np.stack([np.gradient(smooth, axis=axis)[surface] ** 2 for axis in range(3)], axis=-1)
     return np.asarray((squares + 1e-12) / (squares + 1e-12).sum(axis=-1, keepdims=True), np.float64)
 
 
-def _spread(
+def _diffuse_colors(
     target: NDArray[np.bool_],
     surface: NDArray[np.bool_],
     normals: NDArray[np.float64],
-    colours: NDArray[np.float32],
+    colors: NDArray[np.float32],
 ) -> NDArray[np.float64]:
-    """Colours [T,3] at the target vertices, spread from those [S,3] of the surface vertices."""
+    """Colors [T,3] of the target vertices, diffused from the colors [S,3] of the surface vertices."""
     number = np.full(target.shape, -1, np.int64)
     number[target] = np.arange(target.sum())
     known = np.full(target.shape, -1, np.int64)
     known[surface] = np.arange(surface.sum())
     count = int(target.sum())
-    links = [links_of(number, number, axis) for axis in range(3)]
-    inlets = [links_of(number, known, axis) for axis in range(3)]
+    links = [neighbor_pairs(number, number, axis) for axis in range(3)]
+    surface_links = [neighbor_pairs(number, known, axis) for axis in range(3)]
     total = np.zeros((count, 4))
     for axis in range(3):
         weight = normals[:, axis : axis + 1]
-        given = np.concatenate([weight, weight * colours], axis=1)
+        values_in = np.concatenate([weight, weight * colors], axis=1)
         diagonal = np.ones(count)
         source = np.zeros((count, 4))
         parts = []
         for other in range(3):
-            share = REACH**2 * (ACROSS if other == axis else 1.0)
+            share = DIFFUSION_LENGTH_VOXELS**2 * (NORMAL_CONDUCTIVITY if other == axis else 1.0)
             a, b = links[other]
             diagonal += share * np.bincount(a, minlength=count)
             parts.append((a, b, np.full(len(a), share)))
-            a, b = inlets[other]
+            a, b = surface_links[other]
             diagonal += share * np.bincount(a, minlength=count)
             for channel in range(4):
-                source[:, channel] += share * np.bincount(a, given[b, channel], minlength=count)
+                source[:, channel] += share * np.bincount(a, values_in[b, channel], minlength=count)
         rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
         total += solve_diffusion(
             sparse.csr_matrix((values, (rows, columns)), (count, count)), diagonal, source
@@ -115,44 +119,47 @@ def _spread(
 
 
 def solve_diffusion(
-    pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
+    coupling: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """u [T,C] with (diag(diagonal) - pull) u = source [T,C]; pull [T,T] >= 0 with row sums <= diagonal - 1.
+    """Solution u [T,C] of (diag(diagonal) - coupling) u = source [T,C].
 
-    With the diagonal as preconditioner the eigenvalues are in [1 / max(diagonal), 2]: a condition number of
-    300 at most for REACH and ACROSS, for which the bound on the error of conjugate gradients gives TOLERANCE
-    after 111 steps. Where MOST_STEPS of them do not reach it for some column, all get as many sweeps of
-    Jacobi's instead. Those stop short of the solution, but each u of theirs is a sum of sources with the same
-    weights >= 0 in all columns, so that a ratio of columns stays between those of the sources; an unfinished
-    u of conjugate gradients is not.
+    `coupling` [T,T] >= 0 has row sums <= diagonal - 1. With the diagonal as preconditioner the eigenvalues
+    are in [1 / max(diagonal), 2]: a condition number of at most 300 for DIFFUSION_LENGTH_VOXELS and
+    NORMAL_CONDUCTIVITY, for which the error bound of conjugate gradients gives MAX_RELATIVE_RESIDUAL after
+    111 steps. Where MAX_SOLVER_STEPS do not reach it for some column, all columns get MAX_SOLVER_STEPS Jacobi
+    sweeps instead. Jacobi sweeps stop short of the solution, but every iterate is a sum of sources with equal
+    weights >= 0 in all columns, so a ratio of columns stays within the sources' ratios; an unfinished iterate
+    of conjugate gradients need not.
 
     Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), sections 6.11 and 4.2.
     """
-    matrix = sparse.diags(diagonal) - pull
-    guide = sparse.diags(1.0 / diagonal)
-    solved = []
+    matrix = sparse.diags(diagonal) - coupling
+    preconditioner = sparse.diags(1.0 / diagonal)
+    columns_out = []
     for column in source.T:
-        u, unfinished = cg(matrix, column, rtol=TOLERANCE, maxiter=MOST_STEPS, M=guide)
+        u, unfinished = cg(
+            matrix, column, rtol=MAX_RELATIVE_RESIDUAL, maxiter=MAX_SOLVER_STEPS, M=preconditioner
+        )
         if unfinished:
-            return jacobi_sweeps(pull, diagonal, source)
-        solved.append(u)
-    return np.stack(solved, axis=1)
+            return jacobi_sweeps(coupling, diagonal, source)
+        columns_out.append(u)
+    return np.stack(columns_out, axis=1)
 
 
 def jacobi_sweeps(
-    pull: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
+    coupling: sparse.csr_matrix, diagonal: NDArray[np.float64], source: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """u [T,C] of `solve_diffusion` after MOST_STEPS sweeps of Jacobi's from u = 0."""
+    """Iterate u [T,C] of `solve_diffusion` after MAX_SOLVER_STEPS Jacobi sweeps from u = 0."""
     u = np.zeros_like(source)
-    for _ in range(MOST_STEPS):
-        u = (source + pull @ u) / diagonal[:, None]
+    for _ in range(MAX_SOLVER_STEPS):
+        u = (source + coupling @ u) / diagonal[:, None]
     return u
 
 
-def links_of(
+def neighbor_pairs(
     number: NDArray[np.int64], other: NDArray[np.int64], axis: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs (a, b) of neighbours along an axis: a numbered by `number`, b by `other`, both not -1."""
+    """Neighbor pairs (a, b) along an axis: a numbered by `number`, b by `other`, pairs with -1 left out."""
     before, after = [slice(None)] * 3, [slice(None)] * 3
     before[axis], after[axis] = slice(None, -1), slice(1, None)
     pairs = []

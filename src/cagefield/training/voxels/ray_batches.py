@@ -1,7 +1,7 @@
-"""Posed photos on the compute device, cut into small square patches of neighbouring rays.
+"""Posed photos on the compute device, cut into small square patches of neighboring rays.
 
-Neighbouring rays read the same voxels, so a batch of patches runs about as fast as its voxels can be
-fetched once; single random rays would fetch them anew each time.
+Neighboring rays read the same voxels, so a batch of patches fetches each voxel about once; independent random
+rays would fetch it for every ray.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Photos:
+class DevicePhotos:
     """Photos and cameras as flat device arrays.
 
     Attributes:
@@ -31,8 +31,8 @@ class Photos:
         poses: device [V, 12] float32, first three rows of c2w.
         directions: device [sum of distinct W*H, 3] float32 unit camera-space directions.
         pixels: device [sum W*H, 4] uint8 straight RGBA.
-        valid: [sum W*H] bool, pixels that may be used; None where all may. valid_args: the same as kernels
-            take it, a single 1 without.
+        valid: [sum W*H] bool mask of valid pixels; None where all are valid. valid_args: device uint8 copy
+            for kernels, a single 1 without mask.
         has_alpha: True when any photo has a transparent pixel.
     """
 
@@ -47,11 +47,11 @@ class Photos:
     has_alpha: bool
 
     @classmethod
-    def load(cls, views: Sequence[View]) -> Photos:
-        """The photos of these views, read from disk.
+    def load(cls, views: Sequence[View]) -> DevicePhotos:
+        """Photos of the views, read from disk.
 
         Raises:
-            DatasetError: no view, or a photo that cannot be read.
+            DatasetError: no view, or an unreadable photo.
         """
         from cagefield.rendering.voxels.device_grid import to_device
 
@@ -59,7 +59,7 @@ class Photos:
             raise DatasetError("no training photo: the data set is empty")
         table = np.zeros((len(views), 4), np.int32)
         poses = np.zeros((len(views), 12), np.float32)
-        direction_at: dict[int, int] = {}
+        first_direction: dict[int, int] = {}
         directions: list[NDArray[np.float32]] = []
         pixels = []
         masks = []
@@ -67,14 +67,14 @@ class Photos:
         for i, view in enumerate(views):
             camera = view.camera
             local = camera.local_directions()
-            if id(local) not in direction_at:
-                direction_at[id(local)] = n_directions
+            if id(local) not in first_direction:
+                first_direction[id(local)] = n_directions
                 directions.append(local)
                 n_directions += len(local)
             image = view.load()
             if image.shape[2] == 3:
                 image = np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=2)
-            table[i] = n_pixels, camera.width, direction_at[id(local)], camera.height
+            table[i] = n_pixels, camera.width, first_direction[id(local)], camera.height
             poses[i] = camera.c2w[:3].reshape(-1)
             pixels.append(image.reshape(-1, 4))
             valid = view.valid_pixels()
@@ -95,7 +95,7 @@ class Photos:
         )
 
     def args(self, gains: Any) -> PhotoArgs:
-        """The photos as kernels take them, with a gain [V,3] (on the device) for each."""
+        """Kernel arguments of the photos, with device gains [V,3]."""
         from cagefield.training.voxels.kernels.ray_batches import PhotoArgs
 
         return PhotoArgs(
@@ -109,11 +109,11 @@ class Photos:
         )
 
     def patches(self, size: int) -> NDArray[np.int32]:
-        """Patches [P, 3] (view, first column, first row) of size x size pixels that tile the photos.
+        """PatchSampler [P, 3] (view, first column, first row) of size x size pixels that tile the photos.
 
-        Views without a valid pixel are left out.
+        Patches without a valid pixel are left out.
         """
-        found = []
+        tiles_of_views = []
         first = 0
         for view, (width, height) in enumerate(self.sizes):
             row, column = np.meshgrid(np.arange(0, height, size), np.arange(0, width, size), indexing="ij")
@@ -123,5 +123,5 @@ class Photos:
                 whole = np.pad(valid, ((0, -height % size), (0, -width % size)))
                 tiles = tiles[whole.reshape(len(row), size, -1, size).any(axis=(1, 3)).ravel()]
             first += width * height
-            found.append(tiles)
-        return np.concatenate(found).astype(np.int32)
+            tiles_of_views.append(tiles)
+        return np.concatenate(tiles_of_views).astype(np.int32)

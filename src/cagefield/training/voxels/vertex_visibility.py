@@ -1,9 +1,9 @@
-"""What no training photo showed of a field: the inside of things, and the surfaces on which they stand.
+"""Visibility of a field's vertices in the training photos.
 
-A ray of a photo shows what it meets while some of its light comes through. Vertices that no ray reached so
-may have any density and colour, since no photo says anything of them; `cagefield.training.voxels.inpainting`
-gives
-them plausible ones.
+A ray of a photo constrains the field up to the depth at which its transmittance falls below
+MIN_TRANSMITTANCE.
+Photos do not constrain vertices beyond that depth of every ray: the inside of objects, and the surfaces below
+objects. `cagefield.training.voxels.inpainting` gives such vertices plausible densities and colors.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from cagefield.compute.devices import floats
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.rendering.voxels import occupancy
 from cagefield.rendering.voxels.device_grid import DeviceGrid, occupancy_args, to_device
-from cagefield.training.voxels.kernels.vertex_visibility import mark_seen
+from cagefield.training.voxels.kernels.vertex_visibility import mark_visible
 
-LEAST_TRANSMITTANCE = 0.1
-"""A ray shows what it meets until less than this share of its light comes through."""
+MIN_TRANSMITTANCE = 0.1
+"""Transmittance of a ray below which it makes no vertex visible."""
 
-STEP = 0.5
-"""Distance between samples, voxels."""
+STEP_VOXELS = 0.5
+"""Distance between samples of a ray."""
 
-MOST_RAYS = 4_000_000
-"""Rays that are followed, about: of larger photos every second or third pixel each way."""
+MAX_RAYS = 4_000_000
+"""Approximate maximum number of rays; larger photos are subsampled in both directions."""
 
 
-def unseen_vertices(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
-    """Vertices [nx,ny,nz] of a bounded field around which no ray of the cameras shows anything.
+def invisible_vertices(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.bool_]:
+    """Mask [nx,ny,nz] of a bounded field's vertices that no ray of the cameras reaches.
 
-    Every cell that a ray crosses with at least LEAST_TRANSMITTANCE left is seen, and so are its 8 vertices:
-    what is changed at unseen ones, a photo shows only through what hides them.
+    A cell is visible where a ray crosses it with a transmittance of at least MIN_TRANSMITTANCE;
+    the 8 vertices of a visible cell are visible.
     """
     grid = DeviceGrid.from_field(field)
-    found = occupancy.of_field(field)
-    bricks = occupancy_args(found, to_device(found.codes))
-    seen = to_device(np.zeros(int(np.prod(field.resolution)), np.uint8))
+    bricks_on_host = occupancy.of_field(field)
+    bricks = occupancy_args(bricks_on_host, to_device(bricks_on_host.codes))
+    visible = to_device(np.zeros(int(np.prod(field.resolution)), np.uint8))
     pixels = sum(camera.width * camera.height for camera in cameras)
-    stride = max(1, math.ceil(math.sqrt(pixels / MOST_RAYS)))
+    stride = max(1, math.ceil(math.sqrt(pixels / MAX_RAYS)))
     for camera in cameras:
         local = camera.local_directions().reshape(camera.height, camera.width, 3)[::stride, ::stride]
-        mark_seen(
-            seen,
+        mark_visible(
+            visible,
             block_cyclic_schedule(local.shape[0] * local.shape[1]),
             to_device(local.astype(np.float32)),
             local.shape[0] * local.shape[1],
@@ -55,10 +55,10 @@ def unseen_vertices(field: VoxelField, cameras: Sequence[Camera]) -> NDArray[np.
             floats(camera.origin),
             grid.args,
             bricks,
-            STEP / float(np.max(grid.args.scale)),
-            LEAST_TRANSMITTANCE,
+            STEP_VOXELS / float(np.max(grid.args.scale)),
+            MIN_TRANSMITTANCE,
         )
-    cells = seen.to_numpy().reshape(field.resolution) > 0
+    cells = visible.to_numpy().reshape(field.resolution) > 0
     for axis in range(3):
         before, after = [slice(None)] * 3, [slice(None)] * 3
         before[axis], after[axis] = slice(None, -1), slice(1, None)

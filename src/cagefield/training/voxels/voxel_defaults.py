@@ -1,8 +1,8 @@
-"""What a VoxelField's training takes where its configuration leaves a choice to it.
+"""Defaults of a VoxelField's training that depend on the capture, the device and the training time.
 
-A bounded scene's grid grows with the photos and with the time. Detail finer than a pixel cannot be learnt, so
-its longest axis gets at most VOXELS_PER_PIXEL vertices for each pixel of the photos' longer side. And every
-voxel of its surfaces must be met by enough rays: their number grows with the square of the resolution.
+The resolution of a bounded scene grows with the photos and with the time. Detail finer than a pixel cannot be
+learned, so the longest axis gets at most MAX_VOXELS_PER_PIXEL vertices per pixel of the photos' longer side.
+Enough rays must meet every surface voxel, and the number of surface voxels grows with the squared resolution.
 """
 
 from __future__ import annotations
@@ -16,60 +16,66 @@ from numpy.typing import NDArray
 
 from cagefield.training.voxels.voxel_config import VoxelConfig
 
-VOXELS_PER_PIXEL = 0.9
-"""Vertices along the longest axis for each pixel of the photos' longer side, at most."""
+MAX_VOXELS_PER_PIXEL = 0.9
+"""Maximum number of vertices along the longest axis, per pixel of the photos\' longer side."""
 
-RAYS_PER_VOXEL = 340.0
-"""Rays that a training takes for each vertex of a square of the grid's longest axis, at least."""
+MIN_RAYS_PER_SURFACE_VOXEL = 340.0
+"""Minimum number of training rays per squared vertex count of the longest axis."""
 
-RAYS_PER_SECOND = 75_000.0
-"""Rays that one thread of a slow CPU takes a second; a run by the clock chooses its resolution by it."""
+RAYS_PER_THREAD_SECOND = 75_000.0
+"""Speed of one slow CPU thread, by which a run limited by time chooses its resolution."""
 
-SMALLEST, LARGEST = 64, 512
-"""Limits of the resolution that is chosen; a larger grid may need more than 6 GiB of memory."""
+MIN_AUTO_RESOLUTION, MAX_AUTO_RESOLUTION = 64, 512
+"""Limits of the defaults resolution; a larger grid may need more than 6 GiB of memory."""
 
-BATCH, GPU_BATCH = 4096, 32768
-"""Rays of a batch: on a CPU and of a run of so many steps, and on a GPU by the clock."""
+BATCH_RAYS, GPU_BATCH_RAYS = 4096, 32768
+"""Rays per batch: in general, and on a GPU in a run limited by time."""
 
-UNBOUNDED = 256
-"""Resolution of an unbounded capture."""
+UNBOUNDED_RESOLUTION = 256
+"""Vertices along the longest axis for an unbounded capture."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The choices of a `VoxelConfig`, all made; see there."""
+class VoxelSettings:
+    """Options of a `VoxelConfig` with every default resolved."""
 
     resolution: int
     sh_degree: int
-    rate: tuple[float, float]
-    smooth: float
-    plain: float
+    lr: tuple[float, float]
+    laplacian_reg: float
+    view_dependence_reg: float
     batch_rays: int
 
 
-def settings(
+def resolve_settings(
     config: VoxelConfig, sizes: NDArray[np.int64], *, unbounded: bool, threads: int | None
-) -> Settings:
-    """The choices for photos of these sizes [V,2]; `threads` of the CPU, None on a GPU."""
-    batch = GPU_BATCH if threads is None and config.minutes is not None else BATCH
-    chosen = (
-        Settings(UNBOUNDED, 1, (4.0, 0.4), 2e-3, 2e-2, batch)
+) -> VoxelSettings:
+    """Resolved options for photos of `sizes` [V,2]; `threads` is the number of CPU threads, None on a GPU."""
+    batch = GPU_BATCH_RAYS if threads is None and config.minutes is not None else BATCH_RAYS
+    defaults = (
+        VoxelSettings(UNBOUNDED_RESOLUTION, 1, (4.0, 0.4), 2e-3, 2e-2, batch)
         if unbounded
-        else Settings(bounded_resolution(sizes, rays(config, threads)), 2, (8.0, 2.0), 2e-5, 3e-3, batch)
+        else VoxelSettings(
+            bounded_resolution(sizes, expected_rays(config, threads)), 2, (8.0, 2.0), 2e-5, 3e-3, batch
+        )
     )
-    named = {field.name: getattr(config, field.name) for field in dataclasses.fields(Settings)}
-    return dataclasses.replace(chosen, **{name: value for name, value in named.items() if value is not None})
+    given = {field.name: getattr(config, field.name) for field in dataclasses.fields(VoxelSettings)}
+    return dataclasses.replace(
+        defaults, **{name: value for name, value in given.items() if value is not None}
+    )
 
 
-def rays(config: VoxelConfig, threads: int | None) -> float:
-    """How many rays a training takes, about; infinite on a GPU by the clock."""
+def expected_rays(config: VoxelConfig, threads: int | None) -> float:
+    """Expected number of training rays; infinite on a GPU in a run limited by time."""
     if config.minutes is None:
-        return float(config.steps * (config.batch_rays or BATCH))
-    return math.inf if threads is None else 60.0 * config.minutes * threads * RAYS_PER_SECOND
+        return float(config.steps * (config.batch_rays or BATCH_RAYS))
+    return math.inf if threads is None else 60.0 * config.minutes * threads * RAYS_PER_THREAD_SECOND
 
 
 def bounded_resolution(sizes: NDArray[np.int64], rays: float) -> int:
-    """Vertices along the longest axis for photos of these sizes [V,2] and so many rays; a multiple of 8."""
+    """Vertices along the longest axis, a multiple of 8, for photos of `sizes` [V,2] and a number of rays."""
     side = float(np.median(sizes.max(axis=1)))
-    found = min(VOXELS_PER_PIXEL * side, math.sqrt(rays / RAYS_PER_VOXEL), LARGEST)
-    return int(max(SMALLEST, 8 * round(found / 8)))
+    resolution = min(
+        MAX_VOXELS_PER_PIXEL * side, math.sqrt(rays / MIN_RAYS_PER_SURFACE_VOXEL), MAX_AUTO_RESOLUTION
+    )
+    return int(max(MIN_AUTO_RESOLUTION, 8 * round(resolution / 8)))

@@ -1,4 +1,4 @@
-"""The state of one training of a VoxelField, from batch to batch."""
+"""State of a VoxelField's training run."""
 
 from __future__ import annotations
 
@@ -15,57 +15,57 @@ from cagefield.compute import devices
 from cagefield.datasets.views import Dataset
 from cagefield.errors import DatasetError
 from cagefield.fields.voxel_field import VoxelField
-from cagefield.training.checkpoint import read_checkpoint, write_checkpoint
+from cagefield.training.checkpoint import read_checkpoint, signature_options, write_checkpoint
 from cagefield.training.checkpoint_checks import (
     check_arrays,
     check_counts,
     check_finite,
     check_run,
-    refusing_damage,
+    reject_damage,
 )
 from cagefield.training.progress import Progress
-from cagefield.training.voxels.batches import Batches
+from cagefield.training.voxels.batches import BatchTrainer
 from cagefield.training.voxels.exposure import Exposure
-from cagefield.training.voxels.floater_removal import without_specks
+from cagefield.training.voxels.floater_removal import remove_floaters
 from cagefield.training.voxels.grid_state import GridState
-from cagefield.training.voxels.pixel_patches import Patches
-from cagefield.training.voxels.ray_batches import Photos
-from cagefield.training.voxels.schedule import LEAST_RESOLUTION, Schedule, stages
-from cagefield.training.voxels.voxel_config import VoxelConfig
-from cagefield.training.voxels.voxel_defaults import settings
+from cagefield.training.voxels.pixel_patches import PatchSampler
+from cagefield.training.voxels.ray_batches import DevicePhotos
+from cagefield.training.voxels.schedule import MIN_RESOLUTION, Schedule, stages
+from cagefield.training.voxels.voxel_config import CHECKPOINT_KEYS, VoxelConfig
+from cagefield.training.voxels.voxel_defaults import resolve_settings
 from cagefield.training.voxels.voxel_space import VoxelSpace
 
-EXPOSURE_FROM = 0.05
-"""Share of a run after which the march uses fitted exposures."""
+EXPOSURE_START_PROGRESS = 0.05
+"""Progress from which the march uses fitted exposures."""
 
-EXPOSURE_EVERY = 50
-"""Steps between two of their fits."""
+EXPOSURE_INTERVAL_STEPS = 50
+"""Steps between two updates of the march's exposures."""
 
-_MOST_VERTICES = 1024
-"""Along the longest axis of a grid, as in `VoxelConfig`."""
+MAX_RESOLUTION = 1024
+"""Maximum number of vertices along the longest axis, as in `VoxelConfig`."""
 
 
 class VoxelRun:
-    """A training run; see `loop.Run`.
+    """Training run of a VoxelField; a `loop.Run`.
 
     Attributes:
-        step: batches so far. seconds: their time. rays: their rays.
-        running_loss: decayed mean squared error.
+        step, seconds, rays: totals of the batches so far.
+        running_loss: exponential moving average of the mean squared error.
     """
 
     def __init__(self, dataset: Dataset, config: VoxelConfig) -> None:
-        self._config, self._photos = config, Photos.load(dataset.train)
-        self._space = VoxelSpace.of(dataset, config.near)
+        self._config, self._photos = config, DevicePhotos.load(dataset.train)
+        self._space = VoxelSpace.from_dataset(dataset, config.near)
         self._threads = 1 if devices.is_gpu() else devices.threads()
-        self._settings = settings(
+        self._settings = resolve_settings(
             config,
             self._photos.sizes,
             unbounded=dataset.unbounded,
             threads=None if devices.is_gpu() else self._threads,
         )
         self._schedule = self._new_schedule(self._settings.resolution)
-        self._patches = Patches(self._photos, config.patch, config.seed)
-        self._batches = Batches(config, self._settings, self._photos, self._space)
+        self._patches = PatchSampler(self._photos, config.patch_size, config.seed)
+        self._batch_trainer = BatchTrainer(config, self._settings, self._photos, self._space)
         fitted = (not self._photos.has_alpha) if config.exposure is None else config.exposure
         self.exposure = Exposure(len(dataset.train), fitted)
         self._grid = self._space.first_grid(
@@ -87,44 +87,51 @@ class VoxelRun:
         return min(1.0, self.step / self._config.steps)
 
     def advance(self) -> None:
-        """One batch; before it, the next stage or a pruning where one is due.
+        """Train one batch, after a due change of stage or pruning.
 
         Raises:
-            DatasetError: a pruning left nothing.
+            DatasetError: pruning removes everything.
         """
         began = time.perf_counter()
         done, schedule = self.done, self._schedule
         if schedule.is_over(done, self.step):
             schedule.enter_next(self.step)
             self._grid = self._pruned()
-            # Empty after every batch, and the refined grid has its own.
+            # The accumulator is empty after every batch; freeing it makes room for the refined grid's.
             self._grid.accumulator = None
-            self._grid = self._space.refined(self._grid, schedule.resolution, schedule.sh_degree)
-            self._patches.choose(self._space, self._grid)
-        elif schedule.prunes(done, self.step):
+            self._grid = self._space.refine(self._grid, schedule.resolution, schedule.sh_degree)
+            self._patches.select_occupied(self._space, self._grid)
+        elif schedule.is_pruning_due(done, self.step):
             schedule.prune(self.step)
             self._grid = self._pruned()
-            self._patches.choose(self._space, self._grid)
+            self._patches.select_occupied(self._space, self._grid)
         prepared = time.perf_counter()
         self.next_batch(done)
         self.step += 1
-        # A process's first batch of each SH degree compiles the kernels, which is no training.
+        # The first batch of each SH degree in a process compiles kernels; compilation is not training time.
         compiles = self._grid.degree not in self._compiled
         self._compiled.add(self._grid.degree)
         self.seconds += (prepared if compiles else time.perf_counter()) - began
 
     def next_batch(self, done: float) -> None:
+        """Train one batch at this progress."""
         config = self._config
-        patches = self._patches.take((1 + self._schedule.last) * self._settings.batch_rays // config.patch**2)
-        loss = self._batches.train(self._grid, patches, self.exposure, self.step, done)
+        patches = self._patches.take(
+            (1 + self._schedule.is_last) * self._settings.batch_rays // config.patch_size**2
+        )
+        loss = self._batch_trainer.train(self._grid, patches, self.exposure, self.step, done)
         self.running_loss = loss if not self.running_loss > 0 else 0.98 * self.running_loss + 0.02 * loss
-        self.rays += len(patches) * config.patch**2
-        if self.exposure.fitted and self.step % EXPOSURE_EVERY == EXPOSURE_EVERY - 1 and done > EXPOSURE_FROM:
+        self.rays += len(patches) * config.patch_size**2
+        if (
+            self.exposure.fitted
+            and self.step % EXPOSURE_INTERVAL_STEPS == EXPOSURE_INTERVAL_STEPS - 1
+            and done > EXPOSURE_START_PROGRESS
+        ):
             self.exposure.refresh()
 
     def _pruned(self) -> GridState:
-        """The grid without vertices that no ray gives weight."""
-        pruned = self._grid.pruned(self._config.prune)
+        """Grid without the vertices of low weight. Raises DatasetError where fewer than 8 remain."""
+        pruned = self._grid.prune(self._config.prune_weight)
         if len(pruned.vertices) < 8:
             raise DatasetError(
                 "training lost the scene: no voxel got any weight; check the camera poses and their axes "
@@ -133,12 +140,12 @@ class VoxelRun:
         return pruned
 
     def field(self) -> VoxelField:
-        """The field as it is now; that of a bounded scene without specks."""
+        """Current field; a bounded scene's without floaters."""
         field = self._grid.to_field()
-        return field if self._space.contracted else without_specks(field)
+        return field if self._space.contracted else remove_floaters(field)
 
     def progress(self) -> Progress:
-        """Where the run stands."""
+        """Progress report of the run."""
         done = self.done
         left = self.seconds * (1.0 - done) / done if done > 0 else float("nan")
         if self._config.minutes is not None:
@@ -156,15 +163,15 @@ class VoxelRun:
         )
 
     def store(self, path: Path) -> None:
-        """Writes the run's state, atomically."""
+        """Write the run's state atomically."""
         schedule, patches, grid = self._schedule, self._patches, self._grid
         density, sh, state, weight = grid.arrays()
         scalars = {
             "step": self.step,
             "resolution": schedule.final,
             "stage": schedule.stage,
-            "stage_began": schedule.began,
-            "pruned": schedule.pruned,
+            "stage_began": schedule.start_step,
+            "pruned": schedule.is_pruned,
             "seconds": self.seconds,
             "rays": self.rays,
             "running_loss": self.running_loss,
@@ -179,21 +186,21 @@ class VoxelRun:
             "sh": sh,
             "state": state,
             "weight": weight,
-            "patches": patches.chosen,
+            "patches": patches.selected,
             "gain_sums": self.exposure.sums,
             "gains": self.exposure.gains.to_numpy(),
         }
         write_checkpoint(path, self._signature(), scalars, arrays)
 
     def restore(self, path: Path) -> None:
-        """Takes the run's state from a file written by `store`.
+        """Restore the run's state from a file written by `store`.
 
         Raises:
-            CagefieldError: a file that cannot be read, or of other photos or settings.
+            CagefieldError: the file is unreadable, or of other photos or settings.
         """
         scalars, arrays = read_checkpoint(path, self._signature())
-        with refusing_damage(path):
-            schedule = self._checked(scalars, arrays)
+        with reject_damage(path):
+            schedule = self._check_state(scalars, arrays)
         self._grid = GridState.build(
             arrays["bounds"],
             _triple(arrays["resolution"]),
@@ -208,11 +215,11 @@ class VoxelRun:
         self.step, self.rays = scalars["step"], scalars["rays"]
         self.seconds, self.running_loss = scalars["seconds"], scalars["running_loss"]
         self._schedule = schedule
-        self._patches.go_to(arrays["patches"], scalars["epoch"], scalars["position"])
-        self.exposure.go_to(arrays["gain_sums"], arrays["gains"])
+        self._patches.restore(arrays["patches"], scalars["epoch"], scalars["position"])
+        self.exposure.restore(arrays["gain_sums"], arrays["gains"])
 
-    def _checked(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Schedule:
-        """The schedule of a checkpoint. Raises ValueError where numbers or arrays cannot be a run's."""
+    def _check_state(self, scalars: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Schedule:
+        """Schedule of a checkpoint. Raises ValueError where its scalars or arrays are inconsistent."""
         photos = len(self._photos.names)
         lengths = check_arrays(
             arrays,
@@ -231,33 +238,35 @@ class VoxelRun:
         )
         check_finite(arrays, ("bounds", "density", "sh", "state", "weight", "gain_sums", "gains"))
         check_run(scalars, "running_loss")
-        check_counts(scalars, resolution=_MOST_VERTICES, rays=2**62, epoch=2**31, position=lengths["P"])
-        # By the clock a machine with other threads might have chosen another resolution.
-        schedule = self._new_schedule(max(scalars["resolution"], LEAST_RESOLUTION))
+        check_counts(scalars, resolution=MAX_RESOLUTION, rays=2**62, epoch=2**31, position=lengths["P"])
+        # In a run limited by time the resolution depends on the number of threads of the machine.
+        schedule = self._new_schedule(max(scalars["resolution"], MIN_RESOLUTION))
         check_counts(scalars, stage=len(stages(schedule.final)) - 1, stage_began=scalars["step"])
         schedule = dataclasses.replace(
             schedule,
             stage=scalars["stage"],
-            began=scalars["stage_began"],
-            pruned=scalars["pruned"] is True,
+            start_step=scalars["stage_began"],
+            is_pruned=scalars["pruned"] is True,
         )
         low, high = arrays["bounds"]
         dims, vertices = arrays["resolution"], arrays["vertices"]
         if not (low < high).all() or dims.min() < 2 or dims.max() > schedule.resolution:
             raise ValueError(f"a grid of {dims.tolist()} vertices in stage {schedule.stage}")
         if lengths["K"] != (schedule.sh_degree + 1) ** 2:
-            raise ValueError(f"colours of {lengths['K']} numbers in stage {schedule.stage}")
+            raise ValueError(f"colors of {lengths['K']} numbers in stage {schedule.stage}")
         if not len(vertices) or vertices.min() < 0 or vertices.max() >= np.prod(dims):
             raise ValueError("vertices outside of its grid")
         if len(np.unique(vertices)) != len(vertices):
             raise ValueError("vertices that are there twice")
-        if not self._patches.are_known(arrays["patches"]):
+        if not self._patches.contains_all(arrays["patches"]):
             raise ValueError("patches of no photo")
         return schedule
 
     def _signature(self) -> str:
-        """What a file must have been written for."""
-        settings = dataclasses.asdict(self._config) | {"batch_rays": self._settings.batch_rays}
+        """Options and photos that a checkpoint must share with this run."""
+        settings = signature_options(self._config, CHECKPOINT_KEYS) | {
+            "batch_rays": self._settings.batch_rays
+        }
         return json.dumps([settings, list(self._photos.names), self._photos.sizes.tolist()])
 
 

@@ -1,7 +1,8 @@
-"""Where a VoxelField's training has its grids: the box they fill, and how rays come into their coordinates.
+"""Grid bounds of a VoxelField's training, and their coordinates.
 
-A bounded scene's first grid fills the data set's box; each later one fills what of the one before is stored.
-Their voxels are cubes. An unbounded scene's grids all fill the contracted space around a cube.
+The first grid of a bounded scene fills the data set's box; each later one fills the bounding box of the
+vertices stored before. Voxels of bounded scenes are cubes. All grids of an unbounded scene fill the
+contracted space around a cube.
 """
 
 from __future__ import annotations
@@ -16,28 +17,28 @@ from cagefield.fields.contraction import uncontract
 from cagefield.fields.frusta import in_frusta
 from cagefield.training.voxels.grid_state import GridState
 
-FIRST_DEPTH = 0.5
+INITIAL_OPTICAL_DEPTH = 0.5
 """Optical depth of the first grid along its longest axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class VoxelSpace:
-    """The box of a training's grids.
+    """Bounds of a training's grids.
 
     Attributes:
-        bounds: [2,3] world units, of the first grid; where `contracted`, the cube that is not contracted.
-        near: distance from a camera within which an unbounded scene is empty, else 0.
-        reach: half the longest edge of `bounds`.
+        bounds: [2,3] box of the first grid in world units; the uncontracted cube of a contracted grid.
+        near: empty distance around each camera of an unbounded scene in world units, else 0.
+        half_extent: half the longest edge of `bounds`.
     """
 
     bounds: NDArray[np.float64]
     contracted: bool
     near: float
-    reach: float
+    half_extent: float
 
     @classmethod
-    def of(cls, dataset: Dataset, near: float) -> VoxelSpace:
-        """The space of a data set; `near` is relative to the cameras' median distance to its middle."""
+    def from_dataset(cls, dataset: Dataset, near: float) -> VoxelSpace:
+        """Space of a data set; `near` is relative to the cameras' median distance to the box center."""
         bounds = np.array(dataset.bounds, dtype=np.float64)
         distance = 0.0
         if dataset.unbounded:
@@ -50,36 +51,36 @@ class VoxelSpace:
         return cls(bounds, dataset.unbounded, distance, float((bounds[1] - bounds[0]).max()) / 2)
 
     def first_grid(self, views: tuple[View, ...], resolution: int, degree: int, threads: int) -> GridState:
-        """A grey grid of this resolution and SH degree, FIRST_DEPTH deep optically.
+        """Gray grid of INITIAL_OPTICAL_DEPTH along the longest axis.
 
-        Of an unbounded scene's, the vertices that the views show are stored.
+        An unbounded scene's stores only vertices within at least two views.
         """
         box, dims, keep = self.bounds, (resolution,) * 3, None
         if self.contracted:
-            keep = _seen_vertices(views, self.bounds, resolution, self.near)
+            keep = _vertices_in_two_views(views, self.bounds, resolution, self.near)
         else:
             box, dims = _cubic_voxels(self.bounds, resolution)
         return GridState.dense(
             box,
             dims,
-            opacity=FIRST_DEPTH / resolution,
+            opacity=INITIAL_OPTICAL_DEPTH / resolution,
             degree=degree,
             contracted=self.contracted,
             threads=threads,
             keep=keep,
         )
 
-    def refined(self, grid: GridState, resolution: int, degree: int) -> GridState:
-        """What a grid stores, on one with this resolution along its longest axis and this SH degree."""
+    def refine(self, grid: GridState, resolution: int, degree: int) -> GridState:
+        """Grid resampled to `resolution` vertices along the longest axis and an SH degree."""
         if self.contracted:
-            return grid.refined(self.bounds, (resolution,) * 3, degree)
-        return grid.refined(*_cubic_voxels(grid.support(), resolution), degree)
+            return grid.refine(self.bounds, (resolution,) * 3, degree)
+        return grid.refine(*_cubic_voxels(grid.support_bounds(), resolution), degree)
 
 
 def _cubic_voxels(
     box: NDArray[np.float64], resolution: int
 ) -> tuple[NDArray[np.float64], tuple[int, int, int]]:
-    """The box, grown so that cubic voxels fill it, and its vertices: `resolution` along the longest axis."""
+    """(box enlarged to a whole number of cubic voxels [2,3], vertices per axis)."""
     voxel = float((box[1] - box[0]).max()) / (resolution - 1)
     n = np.maximum(np.ceil((box[1] - box[0]) / voxel - 1e-6).astype(int) + 1, 2)
     middle = box.mean(axis=0)
@@ -87,12 +88,12 @@ def _cubic_voxels(
     return grown, (int(n[0]), int(n[1]), int(n[2]))
 
 
-def _seen_vertices(
+def _vertices_in_two_views(
     views: tuple[View, ...], bounds: NDArray[np.float64], resolution: int, near: float
 ) -> NDArray[np.bool_]:
-    """Vertices [resolution^3] of a contracted grid that at least two views have in their picture.
+    """Mask [resolution^3] of a contracted grid's vertices within the frusta of at least two views.
 
-    What fewer views see cannot be told from a floater in front of a camera.
+    A single view cannot distinguish a surface from a floater in front of its camera.
     """
     axis = np.linspace(-2.0, 2.0, resolution)
     c = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,13 +1,12 @@
-"""Damped Gauss-Newton steps of splats, each by its own blocks, and what becomes of a picture's error (Numba).
+"""Damped Gauss-Newton steps of splats by per-splat blocks, and image residuals (Numba).
 
-A photo's curvature at a pixel is |J_k| sum_j |J_j| in place of |J_k|^2, J_k the derivative of its colour by
-splat
-k's log alpha: what majorises the sum over overlapping splats (separable surrogates). A splat's blocks are 3
-x 3 for its mean and for its log scales, diagonal for its turn and its logit; its colour's
-curvature is the sum of its weights, for those of a pixel add up to at most 1. Gradients and
-curvatures
-are running means over the views that see the splat. No step is longer than a cap: overlapping splats break
-the block-diagonal model where steps are long.
+The curvature of a pixel is |J_k| sum_j |J_j| in place of |J_k|^2, with J_k the derivative of its color by
+splat k's
+log alpha: it majorizes the sum over overlapping splats (separable surrogates). A splat has 3 x 3 blocks for
+its mean and for its log scales, and diagonal curvatures for its rotation and its logit; the curvature of its
+color is the sum of its weights, because the weights of a pixel sum to at most 1. Gradients and curvatures are
+running means over the views of the splat. Steps are clamped: overlapping splats break the block-diagonal
+model for long steps.
 
 Source: derived here; per-splat blocks as in 3DGS^2 (Lan et al., 2025), damping as in Levenberg-Marquardt;
 separable surrogates as in De Pierro, "A modified expectation maximization algorithm for penalized likelihood
@@ -25,18 +24,19 @@ from cagefield.rendering.splats.kernels.projection import AREA, MAX_TERMS, TILE,
 MOMENTS, RUNNING = 13, 17
 """Floats of a splat's running gradient, and of its running curvature (the last is the sum of weights)."""
 
-PRESENT = 0.5
-"""Share of this photo's own curvature that is added to the running one: a photo that sees a splat from close
-by would otherwise take steps that are too long for it."""
+CURRENT_CURVATURE_SHARE = 0.5
+"""Share of the current photo's curvature added to the running curvature.
+
+Without it, the steps of a photo taken from close by are too long for that photo."""
 
 
 @njit(parallel=True, **FAST)
-def residuals(out, target, width, height, gain, background, weights, colour, slopes, sums):
-    """The picture over its background, dL/d(picture) of L = |gain picture - photo|^2 / 2, and sums a tile.
+def residuals(out, target, width, height, gain, background, weights, color, slopes, sums):
+    """Write the composited image, dL/d(image) of L = |gain image - photo|^2 / 2, and sums per tile.
 
-    out [tiles, >=4, AREA] is T and colour; target [tiles, 3 or 4, AREA] uint8 with straight alpha. sums
-    [tiles, 7]: squared error; gain-free picture x photo and picture^2, by channel; all of them weighted by
-    `weights` [tiles,AREA]. The slopes are not.
+    out [tiles, >=4, AREA] is T and color; target [tiles, 3 or 4, AREA] uint8 with straight alpha. sums
+    [tiles, 7]: squared error; gain-free image x photo and image^2, by channel; all weighted by `weights`
+    [tiles,AREA]. The slopes are unweighted.
     """
     across = (width + TILE - 1) // TILE
     alpha = target.shape[1] == 4
@@ -56,7 +56,7 @@ def residuals(out, target, width, height, gain, background, weights, colour, slo
                     share = np.float32(target[t, 3, i]) * np.float32(1 / 255)
                     photo = photo * share + background[ch] * (np.float32(1) - share)
                 d = gain[ch] * c - photo if inside else np.float32(0.0)
-                colour[t, ch, i] = c
+                color[t, ch, i] = c
                 slopes[t, ch, i] = gain[ch] * d
                 error += weights[t, i] * d * d
                 if inside:
@@ -69,7 +69,7 @@ def residuals(out, target, width, height, gain, background, weights, colour, slo
 
 @njit(inline="always", **FAST)
 def turn(quaternions, i, wx, wy, wz):
-    """q <- q exp(w / 2), to second order, normalised."""
+    """Rotate a quaternion in place: q <- q exp(w / 2) to second order, normalized."""
     w, a, b, c = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
     x, y, z = 0.5 * wx, 0.5 * wy, 0.5 * wz
     n0 = w - a * x - b * y - c * z
@@ -87,7 +87,7 @@ def turn(quaternions, i, wx, wy, wz):
 
 @njit(inline="always", **FAST)
 def solve3(H, at, damp, g0, g1, g2):
-    """(H + damp I)^-1 g of the symmetric block at H[at:at+6]."""
+    """Solution (H + damp I)^-1 g for the symmetric block at H[at:at+6]."""
     a = H[at] + damp
     b = H[at + 1]
     c = H[at + 2]
@@ -106,8 +106,8 @@ def solve3(H, at, damp, g0, g1, g2):
 
 
 @njit(inline="always", **FAST)
-def at_most(value, cap):
-    """The value, its size at most `cap`."""
+def clamp_size(value, cap):
+    """Value clamped to [-cap, cap]."""
     return min(cap, max(-cap, value))
 
 
@@ -133,12 +133,13 @@ def gauss_newton(
     scale_range,
     pull,
 ):
-    """One step of the splats in `order`.
+    """Take one step of the splats in `order`.
 
-    memory: decay of the running gradient and of the running curvature. rates: mean, log scales, turn, logit,
-    colour. damping: relative to the block, and absolute. caps: log scales and turns; mean, in largest sigmas.
-    terms: harmonics in use. scale_range: (least, largest) sigma. pull: added to the
-    logit's gradient.
+    memory: decay of the running gradient and of the running curvature. rates: mean, log scales, rotation,
+    logit, color. damping: relative to the block, and absolute. caps: log scales and rotations; mean, in
+    largest sigmas.
+    terms: number of harmonics in use. scale_range: (least, largest) sigma. pull: added to the logit's
+    gradient.
     """
     for q in prange(order.size):
         i = order[q]
@@ -151,9 +152,9 @@ def gauss_newton(
         H = np.empty(17)
         for j in range(16):
             memory_H[j] += new2 * (curvatures[i, j] - memory_H[j])
-            H[j] = memory_H[j] + PRESENT * curvatures[i, j]
+            H[j] = memory_H[j] + CURRENT_CURVATURE_SHARE * curvatures[i, j]
         memory_H[16] += new2 * (gradients[i, 14] - memory_H[16])
-        H[16] = memory_H[16] + PRESENT * gradients[i, 14]
+        H[16] = memory_H[16] + CURRENT_CURVATURE_SHARE * gradients[i, 14]
         for j in range(13):
             g[j] += new1 * (gradients[i, j] - g[j])
         rel, tiny, cap = damping[0], damping[1], caps[0]
@@ -168,19 +169,19 @@ def gauss_newton(
         damp = rel * (H[6] + H[9] + H[11]) / 3.0 + tiny
         x, y, z = solve3(H, 6, damp, g[3], g[4], g[5])
         low, high = np.log(scale_range[0]), np.log(scale_range[1])
-        log_scales[i, 0] = min(high, max(low, log_scales[i, 0] + at_most(-rates[1] * x, cap)))
-        log_scales[i, 1] = min(high, max(low, log_scales[i, 1] + at_most(-rates[1] * y, cap)))
-        log_scales[i, 2] = min(high, max(low, log_scales[i, 2] + at_most(-rates[1] * z, cap)))
+        log_scales[i, 0] = min(high, max(low, log_scales[i, 0] + clamp_size(-rates[1] * x, cap)))
+        log_scales[i, 1] = min(high, max(low, log_scales[i, 1] + clamp_size(-rates[1] * y, cap)))
+        log_scales[i, 2] = min(high, max(low, log_scales[i, 2] + clamp_size(-rates[1] * z, cap)))
         damp = rel * (H[12] + H[13] + H[14]) / 3.0 + tiny
         turn(
             quaternions,
             i,
-            at_most(-rates[2] * g[6] / (H[12] + damp), cap),
-            at_most(-rates[2] * g[7] / (H[13] + damp), cap),
-            at_most(-rates[2] * g[8] / (H[14] + damp), cap),
+            clamp_size(-rates[2] * g[6] / (H[12] + damp), cap),
+            clamp_size(-rates[2] * g[7] / (H[13] + damp), cap),
+            clamp_size(-rates[2] * g[8] / (H[14] + damp), cap),
         )
         step = -rates[3] * (g[9] + pull) / (H[15] * (1.0 + rel) + tiny)
-        logits[i] = at_most(logits[i] + at_most(step, 4.0 * cap), 7.0)
+        logits[i] = clamp_size(logits[i] + clamp_size(step, 4.0 * cap), 7.0)
         dx = np.float64(means[i, 0]) - origin[0]
         dy = np.float64(means[i, 1]) - origin[1]
         dz = np.float64(means[i, 2]) - origin[2]

@@ -1,10 +1,9 @@
-"""Inverse depths of photos by plane sweeping: how well neighbours agree at each of many depths (Numba).
+"""Inverse depths of photos by plane sweeping over many depths (Numba).
 
 Notation: w is the inverse depth 1/z of a reference pixel with direction (x, y, 1) in its camera's axes. A
-neighbour sees it at q = A (x, y, 1) + w b, A and b the relative rotation and translation. The score of w is
-the
-zero-mean normalised cross-correlation of windows of (2 RADIUS + 1)^2 pixels, the mean of the two best
-neighbours: what one of them does not see counts for nothing.
+neighbor sees it at q = A (x, y, 1) + w b, with A and b the relative rotation and translation. The score of w
+is the zero-mean normalized cross-correlation of windows of (2 WINDOW_RADIUS_PIXELS + 1)^2 pixels, averaged
+over the two best neighbors, so that occlusion in other neighbors does not count.
 
 Source: Collins, "A space-sweep approach to true multi-image matching" (1996); Gallup et al. (2007).
 """
@@ -17,34 +16,34 @@ from numba import prange
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import distort
 
-RADIUS = 2
-"""Pixels on each side of a window's centre."""
+WINDOW_RADIUS_PIXELS = 2
+"""Pixels on each side of a window's center."""
 
-NOISE = np.float32((3.0 / 255.0) ** 2)
-"""Variance that windows have without texture."""
+NOISE_VARIANCE = np.float32((3.0 / 255.0) ** 2)
+"""Variance of windows without texture."""
 
 
 @njit(**FAST)
 def box_sums(image, rows, out):
-    """Sums over windows of (2 RADIUS + 1)^2 pixels, cut off at the borders; `rows` is scratch."""
+    """Sums over windows of (2 WINDOW_RADIUS_PIXELS + 1)^2 pixels, clipped at borders; `rows` is scratch."""
     height, width = image.shape
     for y in range(height):
         for x in range(width):
             total = np.float32(0.0)
-            for k in range(max(0, x - RADIUS), min(width, x + RADIUS + 1)):
+            for k in range(max(0, x - WINDOW_RADIUS_PIXELS), min(width, x + WINDOW_RADIUS_PIXELS + 1)):
                 total += image[y, k]
             rows[y, x] = total
     for y in range(height):
         for x in range(width):
             out[y, x] = np.float32(0.0)
-        for k in range(max(0, y - RADIUS), min(height, y + RADIUS + 1)):
+        for k in range(max(0, y - WINDOW_RADIUS_PIXELS), min(height, y + WINDOW_RADIUS_PIXELS + 1)):
             for x in range(width):
                 out[y, x] += rows[k, x]
 
 
 @njit(**FAST)
-def warp(image, directions, A, b, w, focal, centre, model, coefficients, out, seen):
-    """The neighbour's image at the reference's pixels, all at the inverse depth w; `seen` is 0 outside it."""
+def warp(image, directions, A, b, w, focal, center, model, coefficients, out, inside):
+    """Warp the neighbor's image to the reference's pixels at inverse depth w; `inside` is 0 outside."""
     height, width = out.shape
     rows, columns = image.shape
     for y in range(height):
@@ -54,38 +53,37 @@ def warp(image, directions, A, b, w, focal, centre, model, coefficients, out, se
             qy = A[1, 0] * dx + A[1, 1] * dy + A[1, 2] + w * b[1]
             qz = A[2, 0] * dx + A[2, 1] * dy + A[2, 2] + w * b[2]
             out[y, x] = np.float32(0.0)
-            seen[y, x] = np.float32(0.0)
+            inside[y, x] = np.float32(0.0)
             if qz > 0.05:
                 u, v, _, _, _, _ = distort(qx / qz, qy / qz, model, coefficients)
-                px = focal[0] * u + centre[0] - 0.5
-                py = focal[1] * v + centre[1] - 0.5
+                px = focal[0] * u + center[0] - 0.5
+                py = focal[1] * v + center[1] - 0.5
                 if px >= 0.0 and py >= 0.0 and px < columns - 1 and py < rows - 1:
                     i, j = int(px), int(py)
                     fx, fy = np.float32(px - i), np.float32(py - j)
                     top = image[j, i] + fx * (image[j, i + 1] - image[j, i])
                     low = image[j + 1, i] + fx * (image[j + 1, i + 1] - image[j + 1, i])
                     out[y, x] = top + fy * (low - top)
-                    seen[y, x] = np.float32(1.0)
+                    inside[y, x] = np.float32(1.0)
 
 
 @njit(parallel=True, **FAST)
 def sweep(
-    images, directions, rotations, origins, focals, centres, models, coefficients, neighbours, inverse, out
+    images, directions, rotations, origins, focals, centers, models, coefficients, neighbors, inverse, out
 ):
-    """Writes out [V,H,W,3]: the best inverse depth's (fractional) number, its score, the best score
-    elsewhere.
+    """Write out [V,H,W,3]: fractional index of the best inverse depth, its score, the best score elsewhere.
 
-    images [V,H,W] float32; directions [V,H,W,2]; rotations [V,3,3] world to camera; origins [V,3]; neighbours
-    [V,K]; inverse [V,D] inverse depths of each reference view, even and growing.
+    images [V,H,W] float32; directions [V,H,W,2]; rotations [V,3,3] world to camera; origins [V,3]; neighbors
+    [V,K]; inverse [V,D] inverse depths of each reference view, evenly spaced and increasing.
     """
     views, height, width = images.shape
     count = inverse.shape[1]
-    K = neighbours.shape[1]
+    K = neighbors.shape[1]
     for r in prange(views):
         reference = images[r]
         rows = np.empty((height, width), np.float32)
         warped = np.empty((height, width), np.float32)
-        seen = np.empty((height, width), np.float32)
+        inside = np.empty((height, width), np.float32)
         product = np.empty((height, width), np.float32)
         n0 = np.empty((height, width), np.float32)
         s_r = np.empty((height, width), np.float32)
@@ -109,7 +107,7 @@ def sweep(
         for d in range(count):
             best2[:] = np.float32(-1.0)
             for k in range(K):
-                n = neighbours[r, k]
+                n = neighbors[r, k]
                 if n < 0:
                     continue
                 for i in range(3):
@@ -120,8 +118,8 @@ def sweep(
                         for m in range(3):
                             A[i, j] += rotations[n, i, m] * rotations[r, j, m]
                 warp(
-                    images[n], directions[r], A, b, inverse[r, d], focals[n], centres[n], models[n],
-                    coefficients[n], warped, seen,
+                    images[n], directions[r], A, b, inverse[r, d], focals[n], centers[n], models[n],
+                    coefficients[n], warped, inside,
                 )  # fmt: skip
                 box_sums(warped, rows, s_n)
                 for y in range(height):
@@ -135,10 +133,10 @@ def sweep(
                 for y in range(height):
                     for x in range(width):
                         c = np.float32(1.0) / n0[y, x]
-                        vr = c * (s_rr[y, x] - c * s_r[y, x] * s_r[y, x]) + NOISE
-                        vn = c * (s_nn[y, x] - c * s_n[y, x] * s_n[y, x]) + NOISE
+                        vr = c * (s_rr[y, x] - c * s_r[y, x] * s_r[y, x]) + NOISE_VARIANCE
+                        vn = c * (s_nn[y, x] - c * s_n[y, x] * s_n[y, x]) + NOISE_VARIANCE
                         cov = c * (s_rn[y, x] - c * s_r[y, x] * s_n[y, x])
-                        score = cov / np.sqrt(vr * vn) if seen[y, x] > 0.0 else np.float32(-1.0)
+                        score = cov / np.sqrt(vr * vn) if inside[y, x] > 0.0 else np.float32(-1.0)
                         if score > best2[0, y, x]:
                             best2[1, y, x] = best2[0, y, x]
                             best2[0, y, x] = score
@@ -158,12 +156,12 @@ def sweep(
                 for d in range(count):
                     if abs(d - at) > 3 and volume[d, y, x] > second:
                         second = volume[d, y, x]
-                place = np.float32(at)
+                position = np.float32(at)
                 if 0 < at < count - 1:
                     before, after = volume[at - 1, y, x], volume[at + 1, y, x]
                     bend = before - np.float32(2.0) * top + after
                     if bend < -1e-6:
-                        place += np.float32(0.5) * (before - after) / bend
-                out[r, y, x, 0] = place
+                        position += np.float32(0.5) * (before - after) / bend
+                out[r, y, x, 0] = position
                 out[r, y, x, 1] = top
                 out[r, y, x, 2] = second

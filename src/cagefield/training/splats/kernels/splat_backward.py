@@ -1,10 +1,9 @@
-"""From sums over a picture's pixels to gradients and curvatures of each splat's own parameters (Numba).
+"""Gradients and curvatures of each splat's parameters, from sums over an image's pixels (Numba).
 
-Notation as in `rendering.splats.kernels.projection` and `splat_blending`. A splat's parameters are its mean,
-log
-scales, a turn about its own axes (so that R <- R exp([turn]x)), the logit of its opacity, and its colour
-before the
-clamp at 0. k_j = M R_j is the screen vector of its unit axis j. With G = dL/dS, S the projected covariance:
+Notation as in `rendering.splats.kernels.projection` and `blending`. A splat's parameters are its mean, log
+scales, a rotation `turn` about its own axes (R <- R exp([turn]x)), the logit of its opacity, and its color
+before the clamp at 0. k_j = M R_j is the screen vector of its unit axis j. With G = dL/dS, S the projected
+covariance:
     log scale j:  dS = 2 s_j^2 k_j k_j^T                  turn about j: dS = (s_m^2 - s_n^2) (k_m k_n^T +
     k_n k_m^T)
 and (m, n) the other two axes. G = sum v e e^T / 2; an antialiased splat's opacity adds v K / 2,
@@ -34,18 +33,18 @@ from cagefield.rendering.splats.kernels.projection import (
 )
 
 GRADIENTS = 16
-"""0-2 mean, 3-5 log scales, 6-8 turn, 9 logit, 10-12 colour, 13 |dL/d(projected mean)|, 14 sum of weights,
+"""0-2 mean, 3-5 log scales, 6-8 turn, 9 logit, 10-12 color, 13 |dL/d(projected mean)|, 14 sum of weights,
 15 sum of weight |dL/dC|^2."""
 CURVATURES = 16
-"""0-5 mean (xx xy xz yy yz zz), 6-11 log scales (the same), 12-14 turn, 15 logit."""
+"""0-5 mean (xx xy xz yy yz zz), 6-11 log scales (same order), 12-14 turn, 15 logit."""
 
-STEP = 1e-4
-"""Step of the lens's second derivative, in n."""
+LENS_STEP = 1e-4
+"""Finite-difference step of the lens's second derivative, in normalized coordinates n."""
 
 
 @njit(**FAST)
 def quartic(s, ax, ay, bx, by, cx, cy, dx, dy):
-    """sum h (a.e)(b.e)(c.e)(d.e) from the moments 14 to 18."""
+    """Sum of h (a.e)(b.e)(c.e)(d.e) from the moments s[14] to s[18]."""
     p0, p1, p2 = ax * bx, ax * by + ay * bx, ay * by
     q0, q1, q2 = cx * dx, cx * dy + cy * dx, cy * dy
     return (
@@ -59,12 +58,12 @@ def quartic(s, ax, ay, bx, by, cx, cy, dx, dy):
 
 @njit(**FAST)
 def bilinear(a, b, c, x0, y0, x1, y1):
-    """(x0, y0) (a b; b c) (x1, y1)^T."""
+    """Bilinear form (x0, y0) (a b; b c) (x1, y1)^T."""
     return a * x0 * x1 + b * (x0 * y1 + y0 * x1) + c * y0 * y1
 
 
 @njit(parallel=True, **FAST)
-def chain(
+def backpropagate(
     order,
     firsts,
     slots,
@@ -86,10 +85,10 @@ def chain(
     gradients,
     curvatures,
 ):
-    """Writes gradients [N,GRADIENTS] and curvatures [N,CURVATURES] of the splats in `order`; others are left.
+    """Write gradients [N,GRADIENTS] and curvatures [N,CURVATURES] of the splats in `order`; others stay.
 
-    The colour's gradient is that before its clamp at 0. `directional` adds to the mean's gradient what
-    comes from the direction in which the colour is seen, where the clamp does not hold.
+    The color's gradient is before its clamp at 0. `directional` adds the mean's gradient through the viewing
+    direction of the color, where the clamp is inactive.
     """
     fx, fy = focal[0], focal[1]
     terms = sh.shape[1]
@@ -134,7 +133,7 @@ def chain(
             s2[j] = np.exp(2.0 * log_scales[i, j])
             for m in range(2):
                 k[m, j] = M[m, 0] * R[0, j] + M[m, 1] * R[1, j] + M[m, 2] * R[2, j]
-        # What antialiasing adds: K, where the compensation is not at its least.
+        # Antialiasing term K, where the compensation is above its minimum.
         K0 = K1 = K2 = 0.0
         if antialiased:
             f0 = s2[0] * k[0, 0] * k[0, 0] + s2[1] * k[0, 1] * k[0, 1] + s2[2] * k[0, 2] * k[0, 2]
@@ -190,15 +189,15 @@ def chain(
             e01 = iz * (j01 - ny * j02)
             e10 = iz * (j10 - nx * j12)
             e11 = iz * (j11 - ny * j12)
-            _, _, a00, a01, a10, a11 = distort(nx + STEP, ny, model, coefficients)
-            _, _, b00, b01, b10, b11 = distort(nx - STEP, ny, model, coefficients)
+            _, _, a00, a01, a10, a11 = distort(nx + LENS_STEP, ny, model, coefficients)
+            _, _, b00, b01, b10, b11 = distort(nx - LENS_STEP, ny, model, coefficients)
             gx += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (
-                2.0 * STEP
+                2.0 * LENS_STEP
             )
-            _, _, a00, a01, a10, a11 = distort(nx, ny + STEP, model, coefficients)
-            _, _, b00, b01, b10, b11 = distort(nx, ny - STEP, model, coefficients)
+            _, _, a00, a01, a10, a11 = distort(nx, ny + LENS_STEP, model, coefficients)
+            _, _, b00, b01, b10, b11 = distort(nx, ny - LENS_STEP, model, coefficients)
             gy += ((a00 - b00) * e00 + (a01 - b01) * e01 + (a10 - b10) * e10 + (a11 - b11) * e11) / (
-                2.0 * STEP
+                2.0 * LENS_STEP
             )
         free_x = limits[0] < x * iz < limits[1]
         free_y = limits[2] < y * iz < limits[3]
@@ -210,7 +209,7 @@ def chain(
         if free_y:
             cy += gy * iz
             cz -= gy * y * iz * iz
-        # The mean, through its projection, where n is not held back.
+        # The mean, through its projection, where n is not clamped.
         if not (free_x and free_y):
             _, _, d00, d01, d10, d11 = distort(x * iz, y * iz, model, coefficients)
         P = np.empty((2, 3))
@@ -262,7 +261,7 @@ def chain(
 
 @njit(**FAST)
 def add_direction(i, dx, dy, dz, s, packed, sh, terms, G):
-    """Adds the mean's gradient through the direction in which its colour is seen; central differences."""
+    """Add the mean's gradient through the viewing direction of its color, by central differences."""
     r = 1.0 / np.sqrt(dx * dx + dy * dy + dz * dz)
     ex, ey, ez = dx * r, dy * r, dz * r
     ahead = np.empty(MAX_TERMS)
@@ -290,8 +289,8 @@ def add_direction(i, dx, dy, dz, s, packed, sh, terms, G):
 
 
 @njit(parallel=True, **FAST)
-def shapes(log_scales, quaternions, logits, covariances, opacities):
-    """Writes covariances [N,6] and opacities [N] of the parameters."""
+def build_covariances(log_scales, quaternions, logits, covariances, opacities):
+    """Write covariances [N,6] and opacities [N] of the parameters."""
     for i in prange(log_scales.shape[0]):
         w, a, b, c = quaternions[i, 0], quaternions[i, 1], quaternions[i, 2], quaternions[i, 3]
         R = np.empty((3, 3), nb.float32)

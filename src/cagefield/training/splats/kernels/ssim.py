@@ -1,7 +1,7 @@
-"""What structural similarity says of a picture's pixels, beside their squared error (Numba).
+"""Gradient of structural similarity (SSIM) by an image's pixels (Numba).
 
-The loss is half the sum of 1 - SSIM over windows and channels, of windows that fit the picture: with n of
-them, n (1 - `images.metrics.ssim`) / 2, which is the oracle of this module's gradient.
+The loss is half the sum of 1 - SSIM over channels and over windows within the image: with n windows, n (1 -
+`images.metrics.ssim`) / 2, which is the oracle of this module's gradient.
 
 Source: Wang et al., "Image quality assessment: from error visibility to structural similarity" (2004),
 equation 13; the derivative worked out here.
@@ -15,28 +15,28 @@ from numba import prange
 from cagefield.compute.numba_cache import FAST, njit
 from cagefield.rendering.splats.kernels.projection import TILE
 
-WINDOW = 11
-"""Pixels of a window's side; its Gaussian's standard deviation is 1.5."""
+WINDOW_PIXELS = 11
+"""Side of a window; its Gaussian has a standard deviation of 1.5."""
 
 MOMENTS = 5
-"""Planes of a channel between the passes: means of the picture, the photo, their squares, their product."""
+"""Planes per channel between the passes: means of image, photo, their squares, their product."""
 
-_HALF = WINDOW // 2
-_OFFSETS = np.arange(WINDOW) - _HALF
+_HALF = WINDOW_PIXELS // 2
+_OFFSETS = np.arange(WINDOW_PIXELS) - _HALF
 _WEIGHTS = np.exp(-0.5 * (_OFFSETS / 1.5) ** 2)
 _WEIGHTS = (_WEIGHTS / _WEIGHTS.sum()).astype(np.float32)
 _C1, _C2 = np.float32(0.01**2), np.float32(0.03**2)
 
 
 @njit(parallel=True, **FAST)
-def structure(
-    colour, target, width, height, gain, background, weights, weight, moments, slopes_of, pixels, slopes
+def add_ssim_gradient(
+    color, target, width, height, gain, background, weights, weight, moments, moment_slopes, pixels, slopes
 ):
-    """Adds `weight` times the loss's derivative by the picture (before its gain) to `slopes`.
+    """Add `weight` times the loss's derivative by the image (before its gain) to `slopes`.
 
-    colour and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
-    background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal.
-    moments [3,MOMENTS,H,W], slopes_of [3,3,H,W] and pixels [3,2,H,W] are room to work in.
+    color and slopes [tiles,3,AREA]; target [tiles, 3 or 4, AREA] uint8 with straight alpha over the
+    background; gain and background [3]. Where `weights` [tiles,AREA] are 0 the photo counts as equal to the
+    image. moments [3,MOMENTS,H,W], moment_slopes [3,3,H,W] and pixels [3,2,H,W] are scratch.
     """
     across = (width + TILE - 1) // TILE
     alpha = target.shape[1] == 4
@@ -53,12 +53,12 @@ def structure(
                 if alpha:
                     share = np.float32(target[first + tile, 3, at]) * np.float32(1 / 255)
                     photo = photo * share + background[ch] * (np.float32(1) - share)
-                shown = gain[ch] * colour[first + tile, ch, at]
+                shown = gain[ch] * color[first + tile, ch, at]
                 x[tile * TILE + i] = shown
                 p[tile * TILE + i] = photo if weights[first + tile, at] > np.float32(0) else shown
         out = moments[ch, :, y]
         out[:] = np.float32(0)
-        for k in range(WINDOW):
+        for k in range(WINDOW_PIXELS):
             w = _WEIGHTS[k]
             for i in range(width - 2 * _HALF):
                 a, b = x[i + k], p[i + k]
@@ -69,12 +69,12 @@ def structure(
                 out[4, _HALF + i] += w * a * b
     for row in prange(3 * height):
         ch, y = row // height, row % height
-        result = slopes_of[ch, :, y]
+        result = moment_slopes[ch, :, y]
         result[:] = np.float32(0)
         if y < _HALF or y >= height - _HALF:
             continue
         sums = np.zeros((MOMENTS, width), np.float32)
-        for k in range(WINDOW):
+        for k in range(WINDOW_PIXELS):
             w = _WEIGHTS[k]
             for j in range(MOMENTS):
                 source = moments[ch, j, y + k - _HALF]
@@ -98,7 +98,7 @@ def structure(
             )
             by[1, i] = by_square
             by[2, i] = by_product
-        for k in range(WINDOW):
+        for k in range(WINDOW_PIXELS):
             w = _WEIGHTS[k]
             for j in range(3):
                 for i in range(width - 2 * _HALF):
@@ -106,10 +106,10 @@ def structure(
     for row in prange(3 * height):
         ch, y = row // height, row % height
         total = np.zeros((3, width), np.float32)
-        for k in range(max(0, _HALF - y), min(WINDOW, height - y + _HALF)):
+        for k in range(max(0, _HALF - y), min(WINDOW_PIXELS, height - y + _HALF)):
             w = _WEIGHTS[k]
             for j in range(3):
-                source = slopes_of[ch, j, y + k - _HALF]
+                source = moment_slopes[ch, j, y + k - _HALF]
                 for i in range(width):
                     total[j, i] += w * source[i]
         first = (y // TILE) * across

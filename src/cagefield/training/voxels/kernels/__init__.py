@@ -1,1 +1,1 @@
-"""Kernels of the trainers; their host code lies one folder up."""
+"""Quadrants kernels of voxel training; their host code is one folder up."""

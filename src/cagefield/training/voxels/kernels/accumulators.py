@@ -1,15 +1,15 @@
-"""The record that a batch of rays leaves for each slot of the grid, in an accumulator.
+"""Accumulator records: sums over a batch of rays for each slot of the grid.
 
-A record has HEAD + 3K floats: density gradient, density curvature sum_c (dC_c/ds)^2, colour curvature w^2,
-largest weight, then the 3K colour gradients (basis-major). On a CPU each worker adds into its own
-accumulator, so that no atomics are needed and the sums do not depend on timing; on a GPU one accumulator is
-shared, with atomic adds.
+A record has HEADER_FLOATS + 3K floats: density gradient, density curvature sum_c (dC_c/ds)^2, color curvature
+w^2, maximum weight, then the 3K color gradients (basis-major). On a CPU each worker adds to its own
+accumulator, without atomics, so the sums do not depend on timing; on a GPU all workers share one accumulator
+with atomic adds.
 """
 
 from cagefield.compute.quadrants import qd
 
-HEAD = 4
-"""Floats of a record before its colour gradients."""
+HEADER_FLOATS = 4
+"""Floats of a record before its color gradients."""
 
 
 @qd.func

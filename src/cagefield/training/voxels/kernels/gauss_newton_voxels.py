@@ -1,8 +1,8 @@
-"""The kernels that make new densities and colours of a batch's records: Laplacian, diagonal Gauss-Newton."""
+"""Kernels that update densities and colors from a batch's records: Laplacian, diagonal Gauss-Newton step."""
 
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.voxels.kernels.grid import F32, I32, ivec3
-from cagefield.training.voxels.kernels.accumulators import HEAD
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS
 
 
 @qd.kernel(fastcache=True)
@@ -16,17 +16,17 @@ def laplacian(
     slots: qd.i32,
     resolution: ivec3,
     density_weight: qd.f32,
-    colour_weight: qd.f32,
+    color_weight: qd.f32,
     K: qd.template(),
 ):
-    """Adds the gradient and curvature of weight/2 * sum over stored neighbours (x - x_n)^2 to touched slots.
+    """Add gradient and curvature of weight/2 * sum over stored neighbors (x - x_n)^2 to the batch's slots.
 
-    Touched: the first accumulator has a colour curvature. Neighbours are the 6 along the axes. The density's
-    weight is times the squared voxel size, so that it acts on optical depth per voxel.
+    Slots of the batch have a color curvature in the first accumulator. Neighbors are the 6 along the axes.
+    The density's weight is multiplied by the squared voxel size: it acts on optical depth per voxel.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
-        stride = qd.static(HEAD + 3 * K)
+        stride = qd.static(HEADER_FLOATS + 3 * K)
         to = slot * stride
         if accumulator[to + 2] > 0.0:
             at = vertex_at[slot]
@@ -66,10 +66,10 @@ def laplacian(
             scaled = density_weight * cell[slot] * cell[slot]
             accumulator[to] = accumulator[to] + scaled * (count * density[slot] - d)
             accumulator[to + 1] = accumulator[to + 1] + scaled * count
-            accumulator[to + 2] = accumulator[to + 2] + colour_weight * count
+            accumulator[to + 2] = accumulator[to + 2] + color_weight * count
             for j in qd.static(range(3 * K)):
-                a = to + HEAD + j
-                accumulator[a] = accumulator[a] + colour_weight * (count * sh[slot * (3 * K) + j] - s[j])
+                a = to + HEADER_FLOATS + j
+                accumulator[a] = accumulator[a] + color_weight * (count * sh[slot * (3 * K) + j] - s[j])
 
 
 @qd.kernel(fastcache=True)
@@ -85,33 +85,33 @@ def gauss_newton(
     slots: qd.i32,
     decay: qd.f32,
     density_rate: qd.f32,
-    colour_rate: qd.f32,
-    largest_step: qd.f32,
+    color_rate: qd.f32,
+    max_step: qd.f32,
     damping: qd.f32,
-    plain: qd.f32,
+    view_dependence_reg: qd.f32,
     K: qd.template(),
 ):
-    """One diagonal Gauss-Newton step of every slot the batch touched; empties the accumulators.
+    """Take one diagonal Gauss-Newton step of every slot in the batch, and empty the accumulators.
 
-    state: [slots, 2] running sums of density and colour curvature, decayed on each touch.
-    weight: [slots] the largest weight seen since the last pruning. cell: [slots] world-space voxel size h.
-    The density moves by at most largest_step / h; `damping` is added to the colour curvature, and times h^2
-    to the density curvature. Coefficients c that make a colour depend on the view get the gradient of
-    plain/2 * c^2 for each unit of colour curvature: where photos from many sides say what they are it does
-    little, where they do not it keeps them small.
+    state: [slots, 2] running sums of density and color curvature, decayed per batch with the slot.
+    weight: [slots] maximum weight since the last pruning. cell: [slots] world-space voxel size h.
+    The density moves by at most max_step / h; `damping` is added to the color curvature, and times h^2
+    to the density curvature. View-dependent coefficients c get the gradient of view_dependence_reg/2 * c^2
+    per
+    unit of color curvature: small against the evidence of photos from many sides, and a damping without it.
     """
     qd.loop_config(block_dim=256)
     for slot in range(1, slots):
-        stride = qd.static(HEAD + 3 * K)
+        stride = qd.static(HEADER_FLOATS + 3 * K)
         h_density = 0.0
-        h_colour = 0.0
+        h_color = 0.0
         for worker in range(workers):
             at = worker * record + slot * stride
             h_density += accumulator[at + 1]
-            h_colour += accumulator[at + 2]
-        if h_colour > 0.0:
+            h_color += accumulator[at + 2]
+        if h_color > 0.0:
             s0 = state[2 * slot] * decay + h_density
-            s1 = state[2 * slot + 1] * decay + h_colour
+            s1 = state[2 * slot + 1] * decay + h_color
             state[2 * slot] = s0
             state[2 * slot + 1] = s1
             g_density = 0.0
@@ -120,20 +120,20 @@ def gauss_newton(
                 at = worker * record + slot * stride
                 g_density += accumulator[at]
                 w = qd.max(w, accumulator[at + 3])
-                for a in qd.static(range(HEAD)):
+                for a in qd.static(range(HEADER_FLOATS)):
                     accumulator[at + a] = 0.0
             weight[slot] = w
             change = density_rate * g_density / (s0 + damping * cell[slot] * cell[slot])
-            limit = largest_step / cell[slot]
+            limit = max_step / cell[slot]
             density[slot] = density[slot] - qd.max(qd.min(change, limit), -limit)
-            rate = colour_rate / (s1 + damping)
+            rate = color_rate / (s1 + damping)
             for j in qd.static(range(3 * K)):
                 g = 0.0
                 for worker in range(workers):
-                    at = worker * record + slot * stride + HEAD + j
+                    at = worker * record + slot * stride + HEADER_FLOATS + j
                     g += accumulator[at]
                     accumulator[at] = 0.0
                 c = sh[slot * (3 * K) + j]
                 if qd.static(j >= 3):
-                    g += plain * h_colour * c
+                    g += view_dependence_reg * h_color * c
                 sh[slot * (3 * K) + j] = c - rate * g

@@ -1,4 +1,4 @@
-"""The kernels of `cagefield.training.voxels.pixel_patches`."""
+"""Kernel that finds the pixel patches whose rays meet an occupied block."""
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
@@ -12,7 +12,7 @@ from cagefield.training.voxels.kernels.ray_batches import PatchArgs, PhotoArgs
 def touched_patches(
     touched: I32, patches: PatchArgs, photos: PhotoArgs, grid: GridArgs, bricks: OccupancyArgs, near: qd.f32
 ):
-    """Sets touched[p] to 1 where any ray of patch p meets an occupied block of a bounded grid, else 0."""
+    """Set touched[p] to 1 where any ray of patch p meets an occupied block of a bounded grid, else to 0."""
     for patch in range(patches.count):
         found = 0
         for r in range(patches.size * patches.size):

@@ -1,4 +1,4 @@
-"""Photos, and patches of them, as kernels take them."""
+"""Kernel arguments of posed photos and of their pixel patches."""
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
@@ -10,11 +10,11 @@ from cagefield.rendering.voxels.kernels.grid import F32, I32, U8
 
 @dataclass(frozen=True, eq=False)
 class PhotoArgs:
-    """Posed photos as kernels take them; see `Photos`.
+    """Kernel arguments of posed photos; see `DevicePhotos`.
 
     views: [V,4] (first pixel, width, first direction, height). poses: [V,12] rows of c2w. gains: [V,3].
-    directions: camera-space, of the pixels of each kind of camera. pixels: RGBA of all photos. valid: 0 for
-    pixels that are left out, one value for each where `masked` is 1, else a single 1.
+    directions: camera-space pixel directions of each camera model. pixels: RGBA of all photos. valid: 0 for
+    masked pixels, one value per pixel where `masked` is 1, else a single 1.
     """
 
     views: I32

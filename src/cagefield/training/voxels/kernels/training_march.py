@@ -1,8 +1,8 @@
-"""The kernel that marches a batch of photo rays forward and back and adds up their gradients.
+"""Kernel that marches a batch of photo rays forward and backward and accumulates gradients and curvatures.
 
 Notation, per ray and channel: samples i with density s_i, step h_i, alpha_i = 1 - exp(-s_i h_i),
-transmittance T_i, weight w_i = T_i alpha_i, colour c_i; C = sum_i w_i c_i + T_end * background;
-residual r = gain * C - photo; remaining colour S_i = C - sum_{j<=i} w_j c_j. Then
+transmittance T_i, weight w_i = T_i alpha_i, color c_i; C = sum_i w_i c_i + T_end * background;
+residual r = gain * C - photo; remaining color S_i = C - sum_{j<=i} w_j c_j. Then
 
     dC/dc_i = w_i          dC/ds_i = h_i (T_{i+1} c_i - S_i)
 
@@ -11,13 +11,13 @@ The loss of a ray is r^2 / 2 summed over channels, plus `distortion` times the d
 
 A voxel's curvature in a bounded grid is that of one Gauss-Newton step for all voxels at once: with J_k the
 slope of C with respect to voxel k, (sum_k J_k x_k)^2 <= sum_k D_k x_k^2 for D_k = |J_k| sum_j |J_j|, and D_k
-is summed over the rays. J_k^2 alone is too small where samples share a ray's error, most in the fog of a
-training's start: all of them would mend the whole error. A contracted grid has J_k^2: with D_k its fog clears
-too slowly (3 dB less on a capture).
+is summed over the rays. J_k^2 alone is too small where samples share a ray's error, most in the fog at the
+start of a training: each of them would correct the whole error. A contracted grid uses J_k^2: with D_k its
+fog clears too slowly (3 dB less on a capture).
 
-The march computes C and notes its few samples that carry weight in a scratch area of the worker; the way
-back over them has the gradients from S_i. (Marching twice instead, with nothing noted, took 1.5 times as long
-on a CPU.) b_v are trilinear weights.
+The forward march computes C and notes the few samples with weight in the worker's scratch; the backward pass
+over these samples computes gradients from S_i. (Two marches without notes take 1.5 times as long on a CPU.)
+b_v are trilinear weights.
 """
 
 from dataclasses import dataclass
@@ -37,17 +37,17 @@ from cagefield.rendering.voxels.kernels.grid import (
     vec3,
 )
 from cagefield.rendering.voxels.kernels.ray_grid import OccupancyArgs, look_ahead, safe_inverse, slab
-from cagefield.training.voxels.kernels.accumulators import HEAD, add
+from cagefield.training.voxels.kernels.accumulators import HEADER_FLOATS, add
 from cagefield.training.voxels.kernels.ray_batches import PatchArgs, PhotoArgs
 
-SAMPLE = 8
-"""Floats of a noted sample: t, h, w, T after it, and its colour before the clamp."""
+SAMPLE_FLOATS = 8
+"""Floats of a noted sample: t, h, w, T after it, color before the clamp, and distortion slope u."""
 
-MOST_SAMPLES = 512
-"""Samples of a ray that are noted at most."""
+MAX_SAMPLES = 512
+"""Maximum number of noted samples per ray."""
 
-LEAST_WEIGHT = 1e-4
-"""Weight from which on a sample counts."""
+MIN_WEIGHT = 1e-4
+"""Minimum weight of a sample with a color."""
 
 
 @qd.func
@@ -71,7 +71,7 @@ def spread_slope(
 
 @dataclass(frozen=True, eq=False)
 class WorkerArgs:
-    """What workers add up: an accumulator of `record` floats for each of them, and room for their samples."""
+    """Accumulators of `record` floats per worker, and scratch for the workers' samples."""
 
     accumulator: F32
     record: qd.i32
@@ -81,9 +81,9 @@ class WorkerArgs:
 
 @dataclass(frozen=True, eq=False)
 class LossArgs:
-    """What is found of each ray: losses (squared error), penalties (distortion term), gain_sums [rays,6].
+    """Outputs per ray: losses (squared error), penalties (distortion term), gain_sums [rays,6].
 
-    The gain sums are C photo and C C of each channel, for the exposure's fit.
+    The gain sums are C photo and C C per channel, for the exposure fit.
     """
 
     losses: F32
@@ -93,7 +93,7 @@ class LossArgs:
 
 @dataclass(frozen=True, eq=False)
 class BatchArgs:
-    """How a batch is marched: step and nearest distance, in units of t, and what is random about it."""
+    """Options of a batch's march: step and near distance in units of t, and random seed and background."""
 
     step: qd.f32
     near: qd.f32
@@ -118,10 +118,10 @@ def march_batch(
     contracted: qd.template(),
     gpu: qd.template(),
 ):
-    """Adds the gradients and curvatures of a batch of patches to the accumulators; writes `loss`."""
+    """Add the gradients and curvatures of a batch of patches to the accumulators, and write `loss`."""
     rays = patches.size * patches.size
     total = patches.count * rays
-    # A CPU's worker takes patches that lie together; a GPU's neighbours take neighbouring rays.
+    # A CPU worker takes consecutive patches; neighboring GPU threads take neighboring rays.
     per = (patches.count + work.workers - 1) // work.workers * rays
     if qd.static(gpu):
         per = (total + work.workers - 1) // work.workers
@@ -178,7 +178,7 @@ def march_batch(
                         )
                     basis = sh_basis(d, K)
 
-                    # Ray in grid coordinates (bounded) or normalised coordinates (contracted).
+                    # Ray in grid coordinates (bounded) or normalized coordinates (contracted).
                     go = (o - grid.lower) * grid.scale
                     gd = d * grid.scale
                     inverse = safe_inverse(gd)
@@ -219,20 +219,20 @@ def march_batch(
                                 keep = qd.exp(-raw * h)
                                 w = T * (1.0 - keep)
                                 T *= keep
-                                if w > LEAST_WEIGHT:
-                                    colour = gather_rgb(grid.sh, slots, b, basis, K)
-                                    C += w * qd.max(qd.min(colour, 1.0), 0.0)
-                                    if samples < MOST_SAMPLES:
+                                if w > MIN_WEIGHT:
+                                    color = gather_rgb(grid.sh, slots, b, basis, K)
+                                    C += w * qd.max(qd.min(color, 1.0), 0.0)
+                                    if samples < MAX_SAMPLES:
                                         s = t / (t + batch.reach)
                                         total_w += w
                                         total_ws += w * s
-                                        at = SAMPLE * (worker * MOST_SAMPLES + samples)
+                                        at = SAMPLE_FLOATS * (worker * MAX_SAMPLES + samples)
                                         work.scratch[at] = t
                                         work.scratch[at + 1] = h
                                         work.scratch[at + 2] = w
                                         work.scratch[at + 3] = T
                                         for a in qd.static(range(3)):
-                                            work.scratch[at + 4 + a] = colour[a]
+                                            work.scratch[at + 4 + a] = color[a]
                                         samples += 1
                             t += h
                     C += T * bg
@@ -247,7 +247,7 @@ def march_batch(
                         before_w = 0.0
                         before_ws = 0.0
                         for sample in range(samples):
-                            at = SAMPLE * (worker * MOST_SAMPLES + sample)
+                            at = SAMPLE_FLOATS * (worker * MAX_SAMPLES + sample)
                             s = work.scratch[at] / (work.scratch[at] + batch.reach)
                             ds = (
                                 work.scratch[at + 1]
@@ -266,7 +266,7 @@ def march_batch(
                     remaining = C
                     if qd.static(not contracted):
                         for sample in range(samples):
-                            at = SAMPLE * (worker * MOST_SAMPLES + sample)
+                            at = SAMPLE_FLOATS * (worker * MAX_SAMPLES + sample)
                             for a in qd.static(range(3)):
                                 c = qd.max(qd.min(work.scratch[at + 4 + a], 1.0), 0.0)
                                 remaining[a] -= work.scratch[at + 2] * c
@@ -277,11 +277,11 @@ def march_batch(
 
                     remaining = C
                     for sample in range(samples):
-                        at = SAMPLE * (worker * MOST_SAMPLES + sample)
+                        at = SAMPLE_FLOATS * (worker * MAX_SAMPLES + sample)
                         q = go + work.scratch[at] * gd
                         h = work.scratch[at + 1]
                         w = work.scratch[at + 2]
-                        colour = vec3(
+                        color = vec3(
                             work.scratch[at + 4],
                             work.scratch[at + 5],
                             work.scratch[at + 6],
@@ -292,14 +292,14 @@ def march_batch(
                         cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
                         slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                         b = corner_weights(g - qd.cast(cell, qd.f32))
-                        c = qd.max(qd.min(colour, 1.0), 0.0)
+                        c = qd.max(qd.min(color, 1.0), 0.0)
                         remaining -= w * c
                         slope = h * gain * (work.scratch[at + 3] * c - remaining)
                         curvature = slope.dot(slope)
-                        colour_curvature = w * w
+                        color_curvature = w * w
                         if qd.static(not contracted):
                             curvature = qd.abs(slope).dot(slopes)
-                            colour_curvature = w * total_w
+                            color_curvature = w * total_w
                         gradient = slope.dot(residual)
                         if batch.distortion > 0.0:
                             total_wu -= w * work.scratch[at + 7]
@@ -310,16 +310,16 @@ def march_batch(
                             )
                         pull = residual * gain * w
                         for a in qd.static(range(3)):
-                            if colour[a] < 0.0 and pull[a] > 0.0:
+                            if color[a] < 0.0 and pull[a] > 0.0:
                                 pull[a] = 0.0
-                            if colour[a] > 1.0 and pull[a] < 0.0:
+                            if color[a] > 1.0 and pull[a] < 0.0:
                                 pull[a] = 0.0
                         for k in qd.static(range(8)):
                             if slots[k] > 0:
-                                to = base + slots[k] * (HEAD + 3 * K)
+                                to = base + slots[k] * (HEADER_FLOATS + 3 * K)
                                 add(work.accumulator, to, b[k] * gradient, gpu)
                                 add(work.accumulator, to + 1, b[k] * curvature, gpu)
-                                add(work.accumulator, to + 2, b[k] * colour_curvature, gpu)
+                                add(work.accumulator, to + 2, b[k] * color_curvature, gpu)
                                 if qd.static(gpu):
                                     qd.atomic_max(work.accumulator[to + 3], b[k] * w)
                                 else:
@@ -327,4 +327,6 @@ def march_batch(
                                 for j in qd.static(range(K)):
                                     y = b[k] * basis[j]
                                     for a in qd.static(range(3)):
-                                        add(work.accumulator, to + HEAD + 3 * j + a, y * pull[a], gpu)
+                                        add(
+                                            work.accumulator, to + HEADER_FLOATS + 3 * j + a, y * pull[a], gpu
+                                        )

@@ -1,4 +1,4 @@
-"""The kernels of `cagefield.training.voxels.vertex_visibility`."""
+"""Kernel that marks the vertices visible in a photo."""
 
 # Kernel annotations are read at run time, so this module has no `from __future__ import annotations`.
 
@@ -19,8 +19,8 @@ mat3 = qd.types.matrix(3, 3, qd.f32)
 
 
 @qd.kernel(fastcache=True)
-def mark_seen(
-    seen: U8,
+def mark_visible(
+    visible: U8,
     deal: Schedule,
     directions: F32,
     rays: qd.i32,
@@ -29,9 +29,9 @@ def mark_seen(
     grid: GridArgs,
     bricks: OccupancyArgs,
     step: qd.f32,
-    least: qd.f32,
+    min_transmittance: qd.f32,
 ):
-    """Writes 1 into `seen` [nx*ny*nz], at the first vertex of each cell, where rays of a camera come by."""
+    """Write 1 into `visible` [nx*ny*nz] at the first vertex of each cell with a visible ray segment."""
     for turn in range(turn_count(deal)):
         n = scheduled_item(turn, deal)
         if n < rays:
@@ -41,10 +41,10 @@ def mark_seen(
             through = slab(go, safe_inverse(gd), vec3(0.0, 0.0, 0.0), qd.cast(grid.resolution - 1, qd.f32))
             t = qd.max(through.x, 0.0) + 0.5 * step
             T = 1.0
-            while t < through.y and least < T:
+            while t < through.y and min_transmittance < T:
                 g = go + t * gd
                 cell = qd.max(qd.min(qd.cast(qd.floor(g), qd.i32), grid.resolution - 2), 0)
-                seen[(cell.x * grid.resolution.y + cell.y) * grid.resolution.z + cell.z] = qd.u8(1)
+                visible[(cell.x * grid.resolution.y + cell.y) * grid.resolution.z + cell.z] = qd.u8(1)
                 if is_occupied(bricks, g):
                     slots = corner_slots(grid.index, cell, grid.resolution.y, grid.resolution.z)
                     raw = gather_density(grid.density, slots, corner_weights(g - qd.cast(cell, qd.f32)))
