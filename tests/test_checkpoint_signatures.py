@@ -10,7 +10,7 @@ import pytest
 
 from cagefield.datasets import load_dataset
 from cagefield.datasets.views import Dataset
-from cagefield.procedural.scene import make_scene
+from cagefield.procedural import make_scene
 from cagefield.training.checkpoint import read_checkpoint, signature_options, write_checkpoint
 from cagefield.training.splats.splat_config import SplatConfig
 from cagefield.training.splats.splat_run import SplatRun

@@ -1,11 +1,10 @@
 from .evaluation import Evaluation as Evaluation
-from .evaluation import ViewFigures as ViewFigures
+from .evaluation import ViewMetrics as ViewMetrics
 from .nerf.nerf_config import NerfConfig as NerfConfig
 from .nerf.train_nerf import NerfResult as NerfResult
 from .nerf.train_nerf import train_nerf as train_nerf
+from .result import TrainResult as TrainResult
 from .splats.splat_config import SplatConfig as SplatConfig
-from .splats.train_splats import SplatTrainResult as SplatTrainResult
 from .splats.train_splats import train_splat as train_splat
-from .voxels.train_voxels import TrainResult as TrainResult
 from .voxels.train_voxels import train_voxel as train_voxel
 from .voxels.voxel_config import VoxelConfig as VoxelConfig
