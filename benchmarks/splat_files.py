@@ -24,7 +24,7 @@ import tyro
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from cagefield.formats.splats.splat_ply import write_splat_ply
-from cagefield.formats.splats.splat_table import BATCH, SplatBatch
+from cagefield.formats.splats.splat_table import BATCH_SPLATS, SplatBatch
 
 PAIRS = (
     (".ply", ".spz"),
@@ -109,8 +109,8 @@ class _Made:
 
     def batches(self) -> Iterator[SplatBatch]:
         chance = np.random.default_rng(0)
-        for first in range(0, self.count, BATCH):
-            n = min(BATCH, self.count - first)
+        for first in range(0, self.count, BATCH_SPLATS):
+            n = min(BATCH_SPLATS, self.count - first)
             x, y = chance.uniform(-50.0, 50.0, (2, n))
             z = np.sin(x) * np.cos(0.7 * y) + 0.02 * chance.normal(size=n)
             sh = 0.2 * chance.normal(size=(n, (self.sh_degree + 1) ** 2, 3))

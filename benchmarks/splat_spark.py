@@ -36,7 +36,7 @@ from benchmarks.common.machine import Machine
 from benchmarks.common.tables import Table, number, write_text
 from cagefield.cameras.camera import Camera
 from cagefield.fields.splat_field import SplatField
-from cagefield.formats.splats.open_splats import READABLE, ending_of
+from cagefield.formats.splats.open_splats import READABLE, format_suffix
 from cagefield.formats.splats.splat_files import read_splats, write_splats
 from cagefield.images.image_files import write_png
 from cagefield.images.render_result import RenderResult
@@ -169,7 +169,7 @@ class Spark:
             found.append([])
             for background in BACKGROUNDS.values():
                 wish = {
-                    "url": url, "half": ending_of(path) == ".spz", "width": camera.width,
+                    "url": url, "half": format_suffix(path) == ".spz", "width": camera.width,
                     "height": camera.height, "c2w": camera.c2w.tolist(), "background": background,
                     "fovY": float(np.degrees(2.0 * np.arctan(0.5 * camera.height / camera.fy))),
                     "options": options,
@@ -206,7 +206,7 @@ def splat_files(places: list[Path]) -> list[tuple[str, Path]]:
         if place.is_file() or (place / "meta.json").exists():
             found.append((place.name, place))
             continue
-        inside = [path for path in place.rglob("*") if ending_of(path) in READABLE and not path.is_dir()]
+        inside = [path for path in place.rglob("*") if format_suffix(path) in READABLE and not path.is_dir()]
         for path in sorted(inside):
             path = path.parent if path.name == "meta.json" else path
             found.append((path.relative_to(place).as_posix(), path))

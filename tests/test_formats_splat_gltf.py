@@ -15,7 +15,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from cagefield.fields.sh import C0, MAX_DEGREE, sh_basis
-from cagefield.formats.splats.color_space import srgb_encoded, srgb_harmonics
+from cagefield.formats.splats.color_space import convert_harmonics_to_srgb, encode_srgb
 from cagefield.formats.splats.splat_files import read_splats, write_splats
 from cagefield.geometry.quaternions import rotation_matrices
 from splat_scenes import assert_same_splats, random_splats
@@ -62,7 +62,7 @@ def test_srgb_is_as_its_standard_says() -> None:
     # Of 8 bits: 0, 1, 10, 11, 118, 188, 255, of tables of the standard; beyond 1 the curve goes on.
     linear = [-0.1, 0.0, 0.000303527, 0.003035270, 0.003346536, 0.181164244, 0.502886458, 1.0, 2.0]
     expected = [0.0, 0.0, *(np.array([1, 10, 11, 118, 188, 255]) / 255.0), 1.055 * 2.0 ** (1 / 2.4) - 0.055]
-    np.testing.assert_allclose(srgb_encoded(np.array(linear)), expected, atol=1e-7)
+    np.testing.assert_allclose(encode_srgb(np.array(linear)), expected, atol=1e-7)
 
 
 def test_linear_light_becomes_srgb(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_linear_light_becomes_srgb(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="its colours are linear light; they become sRGB splat by splat"):
         read = read_splats(in_space(tmp_path / "a.glb", "lin_rec709_display"))
     linear = np.maximum(0.5 + C0 * field.sh[:, 0].astype(float), 0.0)
-    np.testing.assert_allclose(0.5 + C0 * read.sh[:, 0], srgb_encoded(linear), atol=1e-6)
+    np.testing.assert_allclose(0.5 + C0 * read.sh[:, 0], encode_srgb(linear), atol=1e-6)
     assert_same_splats(replace(read, sh=field.sh), field, atol=1e-6)
     with pytest.warns(UserWarning, match="its colour space 'acescg' is not known and taken as srgb_rec709"):
         assert_same_splats(read_splats(in_space(tmp_path / "a.glb", "acescg")), field, atol=1e-6)
@@ -90,14 +90,14 @@ def test_harmonics_of_linear_light_become_those_of_srgb(degree: int) -> None:
     errors = []
     for size in (0.02, 0.01, 0.005):
         small = np.concatenate([sh[:, :1], size * sh[:, 1:]], axis=1)
-        exact = srgb_encoded(colours(small, directions()))
-        errors.append(np.abs(colours(srgb_harmonics(small), directions()) - exact).max())
+        exact = encode_srgb(colours(small, directions()))
+        errors.append(np.abs(colours(convert_harmonics_to_srgb(small), directions()) - exact).max())
     assert errors[0] < 0.02
     assert 3.5 < errors[0] / errors[1] < 4.6 and 3.5 < errors[1] / errors[2] < 4.6
     # No other harmonics are nearer over all directions: small changes of any one add to the squared error.
     d = Rotation.random(4000, random_state=2).as_matrix()[:, 0]
-    exact = srgb_encoded(colours(0.1 * sh, d))
-    best = srgb_harmonics(0.1 * sh)
+    exact = encode_srgb(colours(0.1 * sh, d))
+    best = convert_harmonics_to_srgb(0.1 * sh)
     least = np.square(colours(best, d) - exact).mean(axis=(1, 2))
     for _ in range(20):
         other = best + 0.05 * chance.normal(size=best.shape)

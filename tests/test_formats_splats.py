@@ -19,8 +19,8 @@ from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.splat_field import SplatField
 from cagefield.formats.splats import splat_table
-from cagefield.formats.splats.axes import AXES, Axes, with_axes
-from cagefield.formats.splats.sog_writer import codebook
+from cagefield.formats.splats.axes import AXES, Axes, convert_axes
+from cagefield.formats.splats.sog_writer import build_codebook
 from cagefield.formats.splats.splat_files import WRITABLE, convert_splats, read_splats, write_splats
 from cagefield.formats.splats.splat_table import FieldTable, SplatBatch
 from cagefield.formats.splats.spz_writer import write_spz
@@ -107,8 +107,8 @@ def test_the_antialiased_filter_is_kept(tmp_path: Path, ending: str) -> None:
 def test_other_axes_are_the_same_splats(axes: str) -> None:
     field = random_splats(50, degree=spherical_harmonics.MAX_DEGREE)
     batch = next(FieldTable(field).batches())
-    turned = with_axes(batch, "rdf", axes)
-    back = with_axes(turned, axes, "rdf")
+    turned = convert_axes(batch, "rdf", axes)
+    back = convert_axes(turned, axes, "rdf")
     for name in ("means", "log_scales", "quaternions", "opacities", "sh"):
         np.testing.assert_allclose(getattr(back, name), getattr(batch, name), atol=1e-6)
     flip = np.diag([1.0 if a == b else -1.0 for a, b in zip("rdf", axes, strict=True)])
@@ -142,7 +142,7 @@ def test_converting_many_batches_is_writing_the_field(
     field = random_splats(900, degree=1)
     write_splats(field, tmp_path / "a.ply")
     for module in ("splat_table", "splat_ply"):
-        monkeypatch.setattr(f"cagefield.formats.splats.{module}.BATCH", 128)
+        monkeypatch.setattr(f"cagefield.formats.splats.{module}.BATCH_SPLATS", 128)
     shares: list[float] = []
     assert convert_splats(tmp_path / "a.ply", tmp_path / f"b{ending}", on_progress=shares.append) == (
         900,
@@ -153,10 +153,10 @@ def test_converting_many_batches_is_writing_the_field(
 
 
 def test_a_spool_sorts_as_memory_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(splat_table, "BATCH", 128)
+    monkeypatch.setattr(splat_table, "BATCH_SPLATS", 128)
     table = FieldTable(random_splats(1000, degree=0))
     source = splat_table.SplatSource(tmp_path, 1000, 0, "rdf", table.batches)
-    with splat_table.spooled(source, table.batches(), 0, lambda _: None) as spool:
+    with splat_table.spool_splats(source, table.batches(), 0, lambda _: None) as spool:
         for _ in range(2):
             sorted_ = np.concatenate([batch.rows() for batch in spool.sorted_batches()])
             np.testing.assert_array_equal(
@@ -166,7 +166,7 @@ def test_a_spool_sorts_as_memory_does(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_codebook_has_little_error() -> None:
     values = np.random.default_rng(0).normal(size=20000)
-    book = codebook(values)
+    book = build_codebook(values)
     error = np.abs(values[:, None] - book).min(axis=1)
     # A normal distribution, rounded to 256 values as well as possible (Panter and Dite).
     assert np.sqrt((error**2).mean()) < 1.15 * np.sqrt(np.pi * np.sqrt(3.0) / 2.0) / 256

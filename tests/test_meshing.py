@@ -12,7 +12,7 @@ from cagefield.errors import FieldError
 from cagefield.fields.meshing import HALF, Mesh, mesh_of
 from cagefield.fields.voxel_field import VoxelField
 from cagefield.files.ply import read_ply
-from cagefield.formats.mesh_files import linear, write_mesh, write_points
+from cagefield.formats.mesh_files import srgb_to_linear, write_mesh, write_points
 from scenes import SH_C0
 
 trimesh = pytest.importorskip("trimesh", reason="needs trimesh")
@@ -116,13 +116,13 @@ def test_another_program_reads_the_glb_with_y_up(mesh: Mesh, tmp_path: Path, up:
     view = document["bufferViews"][document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]
     start = 28 + length + view["byteOffset"]
     colours = np.frombuffer(content[start : start + view["byteLength"]], "<u2").reshape(-1, 4) / 65535.0
-    np.testing.assert_allclose(colours[:, :3], linear(mesh.rgb), atol=0.5 / 65535 + 1e-6)
+    np.testing.assert_allclose(colours[:, :3], srgb_to_linear(mesh.rgb), atol=0.5 / 65535 + 1e-6)
     assert (colours[:, 3] == 1.0).all() and len(content) % 4 == 0
 
 
 def test_linear_light_is_srgbs() -> None:
     np.testing.assert_allclose(
-        linear(np.array([0.0, 0.04045, 0.5, 1.0])), [0, 0.0031308, 0.2140411, 1], atol=1e-7
+        srgb_to_linear(np.array([0.0, 0.04045, 0.5, 1.0])), [0, 0.0031308, 0.2140411, 1], atol=1e-7
     )
 
 

@@ -14,11 +14,11 @@ from cagefield.datasets import load_dataset
 from cagefield.errors import FieldError
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_file import load_nerf, save_nerf
-from cagefield.formats.nerf.nerf_pytorch_config import Settings, find_config, read_config
+from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings, find_config, read_config
 from commands import printed, refused
 from nerf_networks import krrish94_state, small_field, small_mlp, yenchenlin_state
 from posed_photos import save
-from scenes import ball_scene, files_of
+from scenes import ball_scene, source_files
 
 
 def equal(one: NerfField, other: NerfField) -> bool:
@@ -109,16 +109,16 @@ lindisp = False
 
 def test_configs_of_both_projects_are_read(tmp_path) -> None:
     (tmp_path / "args.txt").write_text(YENCHENLIN)
-    assert read_config(tmp_path / "args.txt") == Settings(samples=(32, 48))
+    assert read_config(tmp_path / "args.txt") == SamplingSettings(samples=(32, 48))
     (tmp_path / "llff.txt").write_text("factor = 8\nN_importance = 64\nno_ndc = False\n")
-    assert read_config(tmp_path / "llff.txt") == Settings(
+    assert read_config(tmp_path / "llff.txt") == SamplingSettings(
         0.0, 1.0, (64, 64), ndc=True, white_background=False
     )
     (tmp_path / "config.yml").write_text(
         "dataset: {near: 1, far: 3, no_ndc: true}\n"
         "nerf: {validation: {num_coarse: 10, num_fine: 20, lindisp: true, white_background: false}}\n"
     )
-    expected = Settings(1.0, 3.0, (10, 20), lindisp=True, white_background=False)
+    expected = SamplingSettings(1.0, 3.0, (10, 20), lindisp=True, white_background=False)
     assert read_config(tmp_path / "config.yml") == expected
     assert find_config(tmp_path / "any.ckpt") == tmp_path / "args.txt"
     assert find_config(Path("nowhere") / "any.ckpt") is None
@@ -195,7 +195,7 @@ def networks(seed: int = 0) -> Checkpoint:
 
 
 def test_without_a_data_set_an_orbit_looks_at_the_field() -> None:
-    imported = import_nerf(networks(), Settings(near=2.0, far=6.0))
+    imported = import_nerf(networks(), SamplingSettings(near=2.0, far=6.0))
     assert {split: len(group) for split, group in imported.cameras.items()} == {"train": 24, "test": 8}
     for camera in imported.cameras["test"]:
         assert np.linalg.norm(camera.origin) == pytest.approx(4.0)
@@ -204,7 +204,7 @@ def test_without_a_data_set_an_orbit_looks_at_the_field() -> None:
 
 
 def test_a_forward_facing_field_needs_its_field_of_view() -> None:
-    settings = Settings(0.0, 1.0, (8, 8), ndc=True, white_background=False)
+    settings = SamplingSettings(0.0, 1.0, (8, 8), ndc=True, white_background=False)
     with pytest.raises(FieldError, match=r"give the data set \(--data\), or its horizontal field of view"):
         import_nerf(networks(), settings)
     imported = import_nerf(networks(), settings, fov_x=math.radians(60.0))
@@ -249,7 +249,7 @@ def test_a_forward_facing_capture_is_scaled_and_centred_as_nerf_pytorch_does(tmp
     mean = np.eye(4)
     mean[:3] = np.stack([right, np.cross(back, right), back, poses[:, :3, 3].mean(0)], 1)
     expected = np.linalg.inv(mean) @ poses
-    settings = Settings(0.0, 1.0, (8, 8), ndc=True, white_background=False)
+    settings = SamplingSettings(0.0, 1.0, (8, 8), ndc=True, white_background=False)
     imported = import_nerf(networks(), settings, load_dataset(tmp_path, holdout=0))
     found = np.stack([camera.c2w for camera in imported.cameras["train"]])
     np.testing.assert_allclose(found, expected, atol=1e-9)
@@ -305,11 +305,11 @@ def test_exact_pictures_show_the_original_through_the_edits(scene) -> None:
 
 
 def test_baking_anew_changes_the_voxels_alone(scene, tmp_path, capsys) -> None:
-    before = files_of(scene)
+    before = source_files(scene)
     text = printed(capsys, "bake", scene, "-o", tmp_path / "new", "--resolution", 20, "--compare", 1)
     assert "PSNR of the voxels against the original" in text and "(1 views)" in text
-    assert files_of(scene) == before
-    after = files_of(tmp_path / "new")
+    assert source_files(scene) == before
+    after = source_files(tmp_path / "new")
     # The order of a safetensors file's header is not fixed: the original is compared as it is read.
     changed = {name for name in after if after[name] != before[name]}
     assert changed - {"original.safetensors"} == {"field.safetensors"}

@@ -67,10 +67,10 @@ nerf:
 def _import_networks(folder: Path) -> None:
     """What `cagefield import` makes of a checkpoint, but for the baking."""
     from cagefield.formats.nerf.nerf_pytorch import read_checkpoint as read
-    from cagefield.formats.nerf.nerf_pytorch_config import Settings
+    from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings
     from cagefield.scene.import_nerf_pytorch import import_nerf
 
-    import_nerf(read(folder / "a.tar"), Settings(), None, None)
+    import_nerf(read(folder / "a.tar"), SamplingSettings(), None, None)
 
 
 def _make_training(rows: int, folder: Path) -> None:

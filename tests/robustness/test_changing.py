@@ -21,7 +21,7 @@ from cagefield.edits import EditStack, load_edits
 from cagefield.edits.edit_files import save_edits
 from cagefield.errors import CagefieldError, DatasetError, FieldError, SceneError
 from cagefield.fields.tensor_file import read_header
-from cagefield.formats.splats.splat_files import open_splats, read_opened, write_splats
+from cagefield.formats.splats.splat_files import open_splats, read_source, write_splats
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import field_states
 from cagefield.server.editor.persistence import SceneStore
@@ -92,7 +92,7 @@ def test_splats_that_are_cut_off_while_they_are_read_are_a_line(tmp_path: Path, 
     source = open_splats(file)
     os.truncate(file, file.stat().st_size // 2)
     with pytest.raises(FieldError, match="it has become shorter while it was read"):
-        read_opened(source)
+        read_source(source)
 
 
 _CUT_OFF = """

@@ -34,9 +34,9 @@ class Convert:
 
     def run(self) -> None:
         """Convert, and print a summary of the written file."""
-        from cagefield.formats.splats.splat_files import convert_splats, writer_of
+        from cagefield.formats.splats.splat_files import convert_splats, find_writer
 
-        writer_of(self.out, self.spz_version)
+        find_writer(self.out, self.spz_version)
         if self.out.exists() and not self.overwrite:
             raise CagefieldError(f"{self.out} exists; add --overwrite to replace it")
         if self.out.exists() and self.out.samefile(self.file):

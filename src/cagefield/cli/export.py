@@ -156,7 +156,7 @@ class Export:
     def _check(self) -> None:
         """Check the options before anything is computed."""
         from cagefield.formats.mesh_files import MESH_SUFFIXES
-        from cagefield.formats.splats.splat_files import writer_of
+        from cagefield.formats.splats.splat_files import find_writer
 
         check_file(self.out, self.overwrite)
         suffix = self.out.suffix.lower()
@@ -165,7 +165,7 @@ class Export:
         if self.source_coordinates and self.up is not None:
             raise CagefieldError("--source-coordinates turns nothing upright; leave out --up")
         if self.what == "splats":
-            writer_of(self.out, self.spz_version)
+            find_writer(self.out, self.spz_version)
         elif (self.axes, self.up, self.spz_version) != (None, None, None):
             raise CagefieldError(
                 "--axes, --up and --spz-version are for splats; leave them out for a mesh or points"

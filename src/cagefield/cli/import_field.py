@@ -94,14 +94,14 @@ class ImportField:
         from cagefield.cli.bake import bake_scene
         from cagefield.compute import devices
         from cagefield.formats.nerf.nerf_pytorch import read_checkpoint
-        from cagefield.formats.nerf.nerf_pytorch_config import Settings, find_config, read_config
+        from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings, find_config, read_config
         from cagefield.scene.import_nerf_pytorch import import_nerf
 
         if self.up != "y-down" or self.unbounded != "auto" or self.axes is not None:
             raise CagefieldError("--up, --axes and --unbounded are for splats; leave them out for a NeRF")
         found = read_checkpoint(self.file)
         config = self.config or find_config(self.file)
-        settings = Settings() if config is None else read_config(config)
+        settings = SamplingSettings() if config is None else read_config(config)
         fov = None if self.fov_deg is None else math.radians(self.fov_deg)
         imported = import_nerf(found, settings, self._dataset(), fov)
         devices.start(self.device)

@@ -17,7 +17,7 @@ from cagefield.errors import CagefieldError
 from cagefield.fields.meshing import Mesh
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.formats.splats.splat_table import SplatBatch
-from cagefield.formats.splats.transform import transformed
+from cagefield.formats.splats.transform import transform_splats
 from cagefield.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def splats_in_source(splats: SplatField, back: FloatArray) -> SplatField:
     The field's own offset is left out of it: `back` has it.
     """
     batch = SplatBatch(splats.means, splats.log_scales, splats.quaternions, splats.opacities, splats.sh)
-    found = transformed(batch, back)
+    found = transform_splats(batch, back)
     means, offset = _near_origin(found.means.astype(np.float64))
     return replace(
         splats,

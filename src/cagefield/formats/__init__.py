@@ -1,1 +1,1 @@
-"""Files that other programs wrote: one module for each format."""
+"""Readers and writers of other programs' files: one module per format."""

@@ -1,8 +1,9 @@
-"""Meshes and point clouds as files: PLY for both, binary glTF for meshes, colours at the vertices.
+"""Mesh and point cloud files with vertex colors: PLY for both, binary glTF for meshes.
 
-PLY: x y z, nx ny nz (float), red green blue (uchar, as a screen shows them), and faces as lists of vertices.
-glTF has y up and linear colours: the scene's own up becomes y by the node's rotation, positions stay what
-they are; COLOR_0 is linear, 16 bits.
+PLY: x y z, nx ny nz (float), red green blue (uchar, sRGB), and faces as vertex lists. glTF is y up with
+linear
+colors: the node's rotation takes the scene's up direction to y, positions stay unchanged; COLOR_0 is linear,
+16 bits.
 
 Sources: Turk, "The PLY Polygon File Format" (1994); Khronos, "glTF 2.0 Specification", sections 3.7.2.1 and
 4.4; IEC 61966-2-1 (sRGB).
@@ -39,9 +40,9 @@ def write_points(
     *,
     offset: Offset = NO_OFFSET,
 ) -> None:
-    """Writes positions [M,3], colours [M,3] in [0,1] and normals [M,3] as a PLY, complete or not at all.
+    """Write positions [M,3], colors [M,3] in [0,1] and normals [M,3] as a PLY, complete or not at all.
 
-    An `offset` is added to positions, which are doubles then.
+    A nonzero `offset` is added to the positions, which are then written as doubles.
     """
     _write_ply(Path(path), positions, normals, rgb, None, offset)
 
@@ -49,9 +50,9 @@ def write_points(
 def write_mesh(
     path: str | Path, mesh: Mesh, up: ArrayLike = (0.0, 0.0, 1.0), *, offset: Offset = NO_OFFSET
 ) -> None:
-    """Writes a mesh as .ply or .glb, complete or not at all; `up` [3] is the scene's, for glTF.
+    """Write a mesh as .ply or .glb, complete or not at all; `up` [3] is the scene's up direction, for glTF.
 
-    An `offset` is added to a .ply's positions, doubles then, and to the translation of a .glb's node.
+    A nonzero `offset` is added to a .ply's positions, as doubles, and to the translation of a .glb's node.
 
     Raises:
         FieldError: another suffix.
@@ -77,8 +78,8 @@ def _write_ply(
     columns += [(name, "<f4") for name in ("nx", "ny", "nz")] if normals is not None else []
     columns += [(name, "u1") for name in ("red", "green", "blue")]
     table = np.empty(len(positions), columns)
-    places = positions.astype(np.float64) + offset if any(offset) else positions
-    parts = [places, *([] if normals is None else [normals]), to_uint8(np.asarray(rgb))]
+    coordinates = positions.astype(np.float64) + offset if any(offset) else positions
+    parts = [coordinates, *([] if normals is None else [normals]), to_uint8(np.asarray(rgb))]
     for name, values in zip(table.dtype.names or (), np.concatenate(parts, axis=1).T, strict=True):
         table[name] = values
     header = ["ply", "format binary_little_endian 1.0", "comment written by cagefield"]
@@ -96,16 +97,16 @@ def _write_ply(
 
 
 def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64], shift: NDArray[np.float64]) -> None:
-    turn = _to_y(up)
+    turn = _rotation_to_y(up)
     node: dict[str, Any] = {"mesh": 0, "rotation": turn.as_quat().tolist()}
     if shift.any():
         node["translation"] = turn.apply(shift).tolist()
-    colours = np.full((len(mesh.rgb), 4), 65535, "<u2")
-    colours[:, :3] = np.rint(65535.0 * linear(mesh.rgb))
+    colors = np.full((len(mesh.rgb), 4), 65535, "<u2")
+    colors[:, :3] = np.rint(65535.0 * srgb_to_linear(mesh.rgb))
     parts: list[tuple[NDArray[Any], int, str, int]] = [
         (mesh.positions.astype("<f4"), _FLOAT, "VEC3", _ARRAY),
         (mesh.normals.astype("<f4"), _FLOAT, "VEC3", _ARRAY),
-        (colours, _USHORT, "VEC4", _ARRAY),
+        (colors, _USHORT, "VEC4", _ARRAY),
         (mesh.faces.astype("<u4").reshape(-1), _UINT, "SCALAR", _ELEMENTS),
     ]
     views, accessors, offset = list[dict[str, Any]](), list[dict[str, Any]](), 0
@@ -146,13 +147,13 @@ def _write_glb(path: Path, mesh: Mesh, up: NDArray[np.float64], shift: NDArray[n
             file.write(values.tobytes())
 
 
-def linear(rgb: NDArray[Any]) -> NDArray[np.float64]:
-    """Linear light [N,3] of colours as screens show them [N,3], both in [0,1]."""
+def srgb_to_linear(rgb: NDArray[Any]) -> NDArray[np.float64]:
+    """Linear light [N,3] of sRGB colors [N,3], both in [0,1]."""
     c = np.clip(np.asarray(rgb, np.float64), 0.0, 1.0)
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def _to_y(up: NDArray[np.float64]) -> Rotation:
-    """A rotation that takes `up` [3] to y."""
+def _rotation_to_y(up: NDArray[np.float64]) -> Rotation:
+    """Rotation that takes `up` [3] to y."""
     rotation, _ = Rotation.align_vectors([[0.0, 1.0, 0.0]], [up / np.linalg.norm(up)])
     return rotation

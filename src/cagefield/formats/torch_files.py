@@ -1,4 +1,4 @@
-"""Checkpoints of PyTorch, read without running code that they may hold."""
+"""PyTorch checkpoints, read without executing pickled code."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from cagefield.errors import FieldError
 from cagefield.files.safe_open import UnreadableError, check_regular
 
 
-def read_tensors_of(path: Path) -> dict[str, Any]:
-    """The dict that `torch.save` wrote; only tensors and plain values are unpickled, no code is run.
+def read_torch_tensors(path: Path) -> dict[str, Any]:
+    """Dictionary written by `torch.save`; only tensors and plain values are unpickled.
 
     Raises:
-        FieldError: no such file, no PyTorch, a file that is damaged or holds other objects.
+        FieldError: missing file, missing PyTorch, a damaged file, or one with other objects.
     """
     try:
         check_regular(path)
@@ -37,17 +37,17 @@ def read_tensors_of(path: Path) -> dict[str, Any]:
     _check_unpacked(path)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # torch's, of pickles that are refused anyway
+            warnings.simplefilter("ignore")  # torch warns about pickles that are refused below
             content = torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
-        found = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
-        what = f" ({found.group(1)})" if found else ""
+        match = re.search(r"(?:GLOBAL|class|global) ([\w.]+)", str(error))
+        class_name = f" ({match.group(1)})" if match else ""
         raise FieldError(
-            f"{path}: holds Python objects beside tensors{what}, or is no checkpoint; unpickling those can "
-            "run any code, so it is refused; save the two state dicts alone with torch.save and read that"
+            f"{path}: holds Python objects beside tensors{class_name}, or is no checkpoint; unpickling those "
+            "can run any code, so it is refused; save the two state dicts alone with torch.save and read that"
         ) from error
-    except Exception as error:  # the unpickler raises what damaged opcodes lead it to
-        # An end too early has no text, a wrong opcode is a KeyError of its number.
+    except Exception as error:  # damaged opcodes raise any exception
+        # A truncated file has no message; an invalid opcode is a KeyError of its number.
         reason = "" if isinstance(error, LookupError) else " ".join(str(error).split())[:120]
         raise FieldError(
             f"{path}: not a readable checkpoint ({reason or 'no file of torch.save'}); it may be truncated, "
@@ -60,34 +60,34 @@ def read_tensors_of(path: Path) -> dict[str, Any]:
 
 
 def _check_unpacked(path: Path) -> None:
-    """Refuses an archive that is much larger than its file: `torch.save` does not compress."""
+    """Refuse an archive that unpacks to more than its file size; `torch.save` does not compress."""
     try:
         if not zipfile.is_zipfile(path):
             return
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        return  # torch says what is wrong with it
+        return  # torch.load reports the problem
     if unpacked > path.stat().st_size:
         raise FieldError(f"{path}: unpacks to {unpacked} bytes, which no torch.save does; copy it again")
 
 
-def _check_sizes(path: Path, content: Any, left: int) -> None:
-    """Refuses tensors that say they hold more numbers than the file has room for.
+def _check_sizes(path: Path, content: Any, file_bytes: int) -> None:
+    """Refuse tensors whose number of elements exceeds the file's size.
 
-    A tensor whose strides are 0 is one number in the file, and any number of them once it is copied.
+    A tensor with strides of 0 stores one number, but has any number of elements once it is copied.
     """
-    waiting, seen = [content], 0
-    while waiting:
-        value = waiting.pop()
+    pending, tensor_bytes = [content], 0
+    while pending:
+        value = pending.pop()
         if isinstance(value, dict):
-            waiting.extend(value.values())
+            pending.extend(value.values())
         elif isinstance(value, (list, tuple)):
-            waiting.extend(value)
+            pending.extend(value)
         elif hasattr(value, "numel") and hasattr(value, "element_size"):
-            seen += int(value.numel()) * int(value.element_size())
-            if seen > 2 * left:
+            tensor_bytes += int(value.numel()) * int(value.element_size())
+            if tensor_bytes > 2 * file_bytes:
                 raise FieldError(
-                    f"{path}: its tensors say that they hold {seen} bytes or more, the file has {left}; "
-                    "save them contiguous"
+                    f"{path}: its tensors say that they hold {tensor_bytes} bytes or more, the "
+                    f"file has {file_bytes}; save them contiguous"
                 )

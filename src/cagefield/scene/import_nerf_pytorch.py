@@ -21,7 +21,7 @@ from cagefield.datasets.nerf_normalization import Similarity, all_cameras, ndc_b
 from cagefield.errors import FieldError
 from cagefield.fields.nerf_field import NerfField
 from cagefield.formats.nerf.nerf_pytorch import Checkpoint
-from cagefield.formats.nerf.nerf_pytorch_config import Settings
+from cagefield.formats.nerf.nerf_pytorch_config import SamplingSettings
 
 BLENDER_FOV = 0.6911112070083618
 """Horizontal field of view of the NeRF-synthetic cameras, radians."""
@@ -39,7 +39,10 @@ class ImportedNerf:
 
 
 def import_nerf(
-    checkpoint: Checkpoint, settings: Settings, dataset: Dataset | None = None, fov_x: float | None = None
+    checkpoint: Checkpoint,
+    settings: SamplingSettings,
+    dataset: Dataset | None = None,
+    fov_x: float | None = None,
 ) -> ImportedNerf:
     """The field of a checkpoint, in its own world, seen by the data set's cameras or by an orbit's.
 
@@ -78,7 +81,7 @@ def shifted(camera: Camera) -> Camera:
     return dataclasses.replace(camera, cx=camera.cx + 0.5, cy=camera.cy + 0.5)
 
 
-def _bounds(settings: Settings, dataset: Dataset | None) -> NDArray[np.float64]:
+def _bounds(settings: SamplingSettings, dataset: Dataset | None) -> NDArray[np.float64]:
     if dataset is not None and not dataset.unbounded:
         return dataset.bounds
     half = 0.375 * (settings.far - settings.near)
@@ -104,7 +107,7 @@ def _llff_cameras(dataset: Dataset) -> Cameras:
     return _cameras(dataset, to_mean_camera(all_cameras(dataset), dataset.depths[0]))
 
 
-def _guessed_cameras(settings: Settings, fov_x: float | None) -> Cameras:
+def _guessed_cameras(settings: SamplingSettings, fov_x: float | None) -> Cameras:
     if not settings.ndc:
         radius = 0.5 * (settings.near + settings.far)
         return {

@@ -19,7 +19,7 @@ from cagefield.datasets.transforms.transforms_json import without_scale
 from cagefield.datasets.views import Dataset
 from cagefield.errors import FieldError
 from cagefield.fields.splat_field import SplatField
-from cagefield.formats.splats.splat_table import VISIBLE
+from cagefield.formats.splats.splat_table import MIN_VISIBLE_OPACITY
 from cagefield.typing import Array, Float32
 
 Up = Literal["y-down", "y-up", "z-up", "z-down", "x-up", "x-down"]
@@ -65,7 +65,7 @@ def import_splats(
     Raises:
         FieldError: no splat that is visible.
     """
-    visible = field.opacities >= VISIBLE
+    visible = field.opacities >= MIN_VISIBLE_OPACITY
     if not visible.any():
         raise FieldError("the file holds no splat that is visible; export it again")
     means = field.means[visible]

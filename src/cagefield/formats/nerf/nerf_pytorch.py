@@ -1,14 +1,14 @@
-"""Checkpoints of the two nerf-pytorch projects, as networks of a `NerfField`.
+"""Networks of a `NerfField` from checkpoints of the two nerf-pytorch projects.
 
 yenchenlin/nerf-pytorch, `.tar`: "network_fn_state_dict" and "network_fine_state_dict" with pts_linears.N,
 views_linears.N, feature_linear, alpha_linear, rgb_linear, or pts_linears.N and output_linear for a network
 without view directions (which keeps an unused views_linears.0).
 
 krrish94/nerf-pytorch, `.ckpt`: "model_coarse_state_dict" and "model_fine_state_dict" with layer1,
-layers_xyz.N, fc_feat, fc_alpha, layers_dir.N, fc_rgb. Its forward pass has no ReLU after layer1, which makes
-one affine layer of layer1 and layers_xyz.0; one after fc_feat; and skips that put the encoding last.
+layers_xyz.N, fc_feat, fc_alpha, layers_dir.N, fc_rgb. Its forward pass has no ReLU after layer1, so layer1
+and layers_xyz.0 merge into one affine layer; it has a ReLU after fc_feat, and skips that append the encoding.
 
-Depth, width, skips and octaves are what the tensors' shapes say; a config's are ignored.
+Depth, width, skips and octaves follow from the tensors' shapes; the config's values are ignored.
 """
 
 from __future__ import annotations
@@ -24,18 +24,19 @@ from numpy.typing import NDArray
 
 from cagefield.errors import FieldError
 from cagefield.fields.mlp import Linear, Mlp
-from cagefield.formats.torch_files import read_tensors_of
+from cagefield.formats.torch_files import read_torch_tensors
 
 YENCHENLIN = ("network_fn_state_dict", "network_fine_state_dict")
 _KRRISH94 = "krrish94/nerf-pytorch"
 KRRISH94 = ("model_coarse_state_dict", "model_fine_state_dict")
 
-_NAMED = 6  # tensors named in a message, at most
+_MAX_NAMED_TENSORS = 6
+"""Maximum number of tensors named in a message."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """The networks of a checkpoint, the project that wrote it, and its training step (None if not told)."""
+    """Networks of a checkpoint, the project that wrote it, and its training step (None if unknown)."""
 
     coarse: Mlp
     fine: Mlp | None
@@ -49,14 +50,14 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path | str) -> Checkpoint:
-    """The networks in a checkpoint of either nerf-pytorch.
+    """Networks of a checkpoint of either nerf-pytorch.
 
     Raises:
-        FieldError: no such file, PyTorch is not installed, a file that is no checkpoint or holds more than
-            tensors and plain values (it is not unpickled), tensors that are missing, unknown or misshapen.
+        FieldError: missing file, missing PyTorch, a file that is no checkpoint or has objects beside tensors
+            and plain values (which are not unpickled), missing, unknown or misshapen tensors.
     """
     path = Path(path)
-    content = read_tensors_of(path)
+    content = read_torch_tensors(path)
     for project, names, read in (
         ("yenchenlin/nerf-pytorch", YENCHENLIN, _yenchenlin),
         (_KRRISH94, KRRISH94, _krrish94),
@@ -72,35 +73,35 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
         step = content.get("global_step", content.get("iter"))
         return Checkpoint(coarse, fine, project, int(step) if isinstance(step, (int, float)) else None)
     raise FieldError(
-        f"{path}: no nerf-pytorch checkpoint: it holds {_listed(content)}; expected {YENCHENLIN[0]!r} or "
-        f"{KRRISH94[0]!r}"
+        f"{path}: no nerf-pytorch checkpoint: it holds {_format_names(content)}; expected "
+        f"{YENCHENLIN[0]!r} or {KRRISH94[0]!r}"
     )
 
 
 class _State:
-    """A state dict whose tensors are taken by name; what is left over at the end is extra."""
+    """State dict whose tensors are taken by name, with a check for unused tensors at the end."""
 
     def __init__(self, tensors: Any, where: str) -> None:
         if not isinstance(tensors, Mapping) or not all(hasattr(v, "shape") for v in tensors.values()):
             raise FieldError(f"{where} must be a dict of tensors, got {type(tensors).__name__}")
         self.where = where
-        # DataParallel puts its own name before every tensor's
-        self.left = {str(name).removeprefix("module."): tensor for name, tensor in tensors.items()}
+        # DataParallel prefixes every name
+        self.unused = {str(name).removeprefix("module."): tensor for name, tensor in tensors.items()}
         self.missing: list[str] = []
 
     def count(self, prefix: str) -> int:
-        """How many layers prefix.0, prefix.1, ... there are: up to the last one that is named."""
-        found = [re.match(re.escape(prefix) + r"\.(\d+)\.", name) for name in self.left]
+        """Number of layers prefix.0, prefix.1, ...: the largest index plus 1."""
+        found = [re.match(re.escape(prefix) + r"\.(\d+)\.", name) for name in self.unused]
         highest = max((int(match.group(1)) for match in found if match), default=-1)
-        if highest >= len(self.left):
-            raise FieldError(f"{self.where}: {prefix}.{highest} is beyond its {len(self.left)} tensors")
+        if highest >= len(self.unused):
+            raise FieldError(f"{self.where}: {prefix}.{highest} is beyond its {len(self.unused)} tensors")
         return highest + 1
 
     def take(self, name: str) -> Linear | None:
-        """The layer of that name, or None where a tensor of it is missing."""
+        """Layer of a name; None where one of its tensors is missing."""
         pair = []
         for kind in ("weight", "bias"):
-            tensor = self.left.pop(f"{name}.{kind}", None)
+            tensor = self.unused.pop(f"{name}.{kind}", None)
             if tensor is None:
                 self.missing.append(f"{name}.{kind}")
             else:
@@ -108,25 +109,27 @@ class _State:
         return Linear(pair[0], pair[1], f"{self.where}: {name}") if len(pair) == 2 else None
 
     def layers(self, prefix: str) -> list[Linear | None]:
-        """The layers prefix.0, prefix.1, ..."""
+        """Layers prefix.0, prefix.1, ..."""
         return [self.take(f"{prefix}.{index}") for index in range(max(1, self.count(prefix)))]
 
     def finish(self, *layers: Linear | None) -> list[Linear]:
-        """The layers, all of them there.
+        """Layers of the network, after a check for missing and unused tensors.
 
         Raises:
-            FieldError: tensors are missing, or there are others.
+            FieldError: missing or unused tensors.
         """
         if self.missing:
-            raise FieldError(f"{self.where}: tensors missing: {_listed(self.missing)}")
-        if self.left:
-            raise FieldError(f"{self.where}: tensors that this network does not have: {_listed(self.left)}")
+            raise FieldError(f"{self.where}: tensors missing: {_format_names(self.missing)}")
+        if self.unused:
+            raise FieldError(
+                f"{self.where}: tensors that this network does not have: {_format_names(self.unused)}"
+            )
         return [layer for layer in layers if layer is not None]
 
 
 def _yenchenlin(state: _State) -> Mlp:
     trunk = state.layers("pts_linears")
-    if any(name.startswith("output_linear.") for name in state.left):
+    if any(name.startswith("output_linear.") for name in state.unused):
         if state.count("views_linears"):
             state.layers("views_linears")
         *trunk_layers, output = state.finish(*trunk, state.take("output_linear"))
@@ -145,7 +148,7 @@ def _yenchenlin(state: _State) -> Mlp:
 
 def _krrish94(state: _State) -> Mlp:
     trunk = [state.take("layer1"), *state.layers("layers_xyz")]
-    plain = any(name.startswith("fc_out.") for name in state.left)
+    plain = any(name.startswith("fc_out.") for name in state.unused)
     view = [] if plain else state.layers("layers_dir")
     names = ("fc_out",) if plain else ("fc_feat", "fc_alpha", "fc_rgb")
     layers = state.finish(*trunk, *view, *(state.take(name) for name in names))
@@ -153,7 +156,7 @@ def _krrish94(state: _State) -> Mlp:
     encoded = first.inputs
     before = [second, *rest]
     own = (
-        _merged(first, second),
+        _merge_layers(first, second),
         *(_encoding_first(layer, b.outputs, encoded) for b, layer in zip(before, rest, strict=False)),
     )
     if plain:
@@ -167,8 +170,8 @@ def _krrish94(state: _State) -> Mlp:
     return Mlp(own, density, rgb, feature, tuple(layers[len(trunk) : -3]), rectified_feature=True)
 
 
-def _merged(first: Linear, second: Linear) -> Linear:
-    """The affine layer second(first(x))."""
+def _merge_layers(first: Linear, second: Linear) -> Linear:
+    """Affine layer second(first(x))."""
     if second.inputs != first.outputs:
         raise FieldError(
             f"{second.name}.weight is {list(second.weight.shape)}, "
@@ -183,7 +186,7 @@ def _merged(first: Linear, second: Linear) -> Linear:
 
 
 def _encoding_first(layer: Linear, hidden: int, encoded: int) -> Linear:
-    """A layer that saw (h, encoding) as one that sees (encoding, h); any other layer as it is."""
+    """Layer with input (h, encoding) reordered to input (encoding, h); other layers unchanged."""
     if layer.inputs != hidden + encoded:
         return layer
     weight: NDArray[np.float32] = np.roll(layer.weight, encoded, axis=1)
@@ -194,7 +197,7 @@ def _rows(layer: Linear, start: int, stop: int) -> Linear:
     return Linear(layer.weight[start:stop], layer.bias[start:stop], layer.name)
 
 
-def _listed(names: Any) -> str:
+def _format_names(names: Any) -> str:
     found = sorted(str(name) for name in names)
-    more = f" and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-    return ", ".join(found[:_NAMED]) + more if found else "nothing"
+    more = f" and {len(found) - _MAX_NAMED_TENSORS} more" if len(found) > _MAX_NAMED_TENSORS else ""
+    return ", ".join(found[:_MAX_NAMED_TENSORS]) + more if found else "nothing"

@@ -1,7 +1,7 @@
-"""What the config of a nerf-pytorch checkpoint says about sampling; shapes of networks come from the weights.
+"""Ray sampling settings from the config of a nerf-pytorch checkpoint; network shapes come from the weights.
 
 yenchenlin/nerf-pytorch writes "key = value" lines (args.txt, config.txt), krrish94/nerf-pytorch YAML
-(config.yml). Both lie beside their checkpoints.
+(config.yml). Both are stored beside their checkpoints.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ _OWN = {
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How a checkpoint's rays are sampled; the defaults are those of the Blender scenes.
+class SamplingSettings:
+    """Ray sampling of a checkpoint; the defaults are those of the Blender scenes.
 
-    near, far: planar depths; samples: (coarse, fine); ndc: True for a forward-facing capture in normalised
-    device coordinates; white_background: what is behind the photos.
+    near, far: planar depths; samples: (coarse, fine); ndc: True for a forward-facing capture in normalized
+    device coordinates; white_background: whether the photos have a white background.
     """
 
     near: float = 2.0
@@ -47,16 +47,16 @@ class Settings:
 
 
 def find_config(checkpoint: Path) -> Path | None:
-    """The config beside a checkpoint, or None."""
+    """Path of the config beside a checkpoint, or None."""
     return next((checkpoint.parent / name for name in NAMES if (checkpoint.parent / name).is_file()), None)
 
 
-def read_config(path: Path | str) -> Settings:
-    """The settings in a config file of either nerf-pytorch.
+def read_config(path: Path | str) -> SamplingSettings:
+    """Ray sampling in a config file of either nerf-pytorch.
 
     Raises:
-        FieldError: a file that is missing or no such config, values of the wrong kind, or an encoding that
-            `NerfField` does not have.
+        FieldError: a missing or invalid config, values of the wrong type, or an encoding that `NerfField`
+            lacks.
     """
     path = Path(path)
     if not path.is_file():
@@ -76,7 +76,7 @@ def read_config(path: Path | str) -> Settings:
         raise FieldError(f"{path}: not a nerf-pytorch config ({reason}); {_CURE}") from error
 
 
-def _yenchenlin(text: str) -> Settings:
+def _yenchenlin(text: str) -> SamplingSettings:
     values: dict[str, str] = {}
     for line in text.splitlines():
         key, equals, value = line.partition("#")[0].partition("=")
@@ -99,10 +99,10 @@ def _yenchenlin(text: str) -> Settings:
     ndc = forward and not flag("no_ndc")
     if forward and not ndc:
         raise FieldError(
-            "no_ndc = True: trained on an LLFF capture without NDC, in a world that nerf-pytorch centres and "
+            "no_ndc = True: trained on an LLFF capture without NDC, in a world that nerf-pytorch centers and "
             "may make a sphere, which is not read; train it here: cagefield train --field nerf --ndc off"
         )
-    return Settings(
+    return SamplingSettings(
         near=0.0 if ndc else 2.0,
         far=1.0 if ndc else 6.0,
         samples=(int(values.get("N_samples", 64)), int(values.get("N_importance", 0))),
@@ -112,7 +112,7 @@ def _yenchenlin(text: str) -> Settings:
     )
 
 
-def _krrish94(document: dict[str, Any]) -> Settings:
+def _krrish94(document: dict[str, Any]) -> SamplingSettings:
     data, rays = document["dataset"], document["nerf"]["validation"]
     for part in document.get("models", {}).values():
         for key in ("log_sampling_xyz", "log_sampling_dir"):
@@ -121,7 +121,7 @@ def _krrish94(document: dict[str, Any]) -> Settings:
     near, far = float(data["near"]), float(data["far"])
     if not 0.0 <= near < far:
         raise FieldError(f"near is {near:g} and far {far:g}; they must satisfy 0 <= near < far")
-    return Settings(
+    return SamplingSettings(
         near=near,
         far=far,
         samples=(int(rays["num_coarse"]), int(rays["num_fine"])),

@@ -1,8 +1,8 @@
-"""Axes of splat files, and splats turned from ones to others.
+"""Coordinate axes of splat files, and conversions of splats between them.
 
-Axes are named by where x, y and z point, seen from a camera that looks at the thing: right or left, up or
-down, front (towards the camera) or back, "rdf" as in 3DGS' PLY, "rub" as in SPZ and glTF. From ones to others
-some coordinates change their sign; rotations turn with them, and harmonics that are odd in them change sign.
+Axes are named by the directions of x, y and z, seen from a camera that looks at the scene: right or left, up
+or down, front (towards the camera) or back; "rdf" in 3DGS' PLY, "rub" in SPZ and glTF. A conversion flips the
+sign of some coordinates; rotations follow, and harmonics that are odd in these coordinates change sign.
 
 Source: nianticlabs/spz, src/cc/splat-types.h (CoordinateConverter).
 """
@@ -19,18 +19,18 @@ from cagefield.typing import Array
 
 Axes = Literal["rdf", "rub", "luf", "ruf", "ldb", "rdb", "ldf", "lub"]
 AXES: tuple[str, ...] = get_args(Axes)
-PLY: Axes = "rdf"
-"""Axes of a table of splats."""
+PLY_AXES: Axes = "rdf"
+"""Axes of 3DGS' PLY and of splat tables."""
 
 
-def signs(source: str, target: str) -> Array:
-    """Factors [3] of x, y and z, 1 or -1."""
+def axis_signs(source: str, target: str) -> Array:
+    """Factors [3] of x, y and z, 1 or -1, from source to target axes."""
     return np.array([1.0 if a == b else -1.0 for a, b in zip(source, target, strict=True)])
 
 
-def with_axes(batch: SplatBatch, source: str, target: str) -> SplatBatch:
-    """The splats in other axes; mirrored where the two are not of the same hand."""
-    flip = signs(source, target)
+def convert_axes(batch: SplatBatch, source: str, target: str) -> SplatBatch:
+    """Splats in target axes; mirrored where the two have different handedness."""
+    flip = axis_signs(source, target)
     if (flip > 0).all():
         return batch
     # R' = F R F: a rotation by the same angle about the axis F r, mirrored once more where det F < 0.

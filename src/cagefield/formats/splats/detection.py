@@ -1,7 +1,7 @@
-"""Format of a splat file by its content: magic numbers, keys of JSON, names in a zip.
+"""Detection of a splat file's format from its content: magic numbers, JSON keys, names in a zip.
 
-Formats are named by their usual endings. A .splat has no magic number; its reader judges its rows. Names of
-other kinds of file that people try, meshes and pictures, are for messages.
+Formats are named by their usual suffixes. A .splat has no magic number; its reader checks its rows.
+Descriptions of other common file types, such as meshes and images, serve error messages.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from cagefield.files.safe_open import open_regular, read_bytes
 META, LOD_META = "meta.json", "lod-meta.json"
 
 ZIP_ARCHIVE = "a zip archive without meta.json; unpack it"
-"""Of another kind; checkpoints of PyTorch are such archives too."""
+"""Description of another zip archive; PyTorch checkpoints are such archives too."""
 
 _START_BYTES = 4096
 _MAX_JSON_BYTES = 64 << 20
 _KSPLAT_HEADER, _KSPLAT_SECTION = 4096, 1024
 
-_OTHERS = (
+_OTHER_TYPES = (
     (b"\x89PNG", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"RIFF", "a WebP picture or another RIFF file"),
@@ -46,11 +46,11 @@ _OTHERS = (
 _OBJ_WORDS = {b"v", b"vn", b"vt", b"f", b"o", b"g", b"mtllib", b"usemtl"}
 
 
-def detected_format(path: Path) -> str | None:
-    """The ending of the format that a file's content has, "meta.json" and "lod-meta.json" for folders too.
+def detect_format(path: Path) -> str | None:
+    """Suffix of the content's format; "meta.json" and "lod-meta.json" for folders too.
 
-    None for a content without magic number: a .splat, a checkpoint, or no splats. Raises OSError where the
-    file cannot be read.
+    None for a content without magic number: a .splat, a checkpoint, or no splats. Raises OSError for an
+    unreadable file.
     """
     if path.is_dir():
         return next((name for name in (LOD_META, META) if (path / name).is_file()), None)
@@ -64,36 +64,36 @@ def detected_format(path: Path) -> str | None:
     if start.startswith(b"NGSP") or _gzip_start(path, start) == b"NGSP":
         return ".spz"
     if start.startswith(b"PK\x03\x04"):
-        return _of_zip(path)
+        return _zip_format(path)
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{"):
-        return _of_json(path)
+        return _json_format(path)
     return ".ksplat" if _is_ksplat(start, size) else None
 
 
-def splat_folder(path: Path) -> bool:
-    """Whether a folder holds a SOG, or a streamed one."""
+def is_splat_folder(path: Path) -> bool:
+    """Whether a folder holds a SOG or a streamed SOG."""
     return any((path / name).is_file() for name in (META, LOD_META))
 
 
-def other_kind(path: Path) -> str | None:
-    """A file of another kind that a content has, as a noun phrase; None where it is not known."""
+def describe_other_file(path: Path) -> str | None:
+    """Description of a known file type without splats, as a noun phrase; None for an unknown one."""
     with open_regular(path) as file:
         start = file.read(_START_BYTES)
-    found = next((name for magic, name in _OTHERS if start.startswith(magic)), None)
-    if found is None and not start:
+    result = next((name for magic, name in _OTHER_TYPES if start.startswith(magic)), None)
+    if result is None and not start:
         return "an empty file"
-    if found is None and start.startswith(b"\x1f\x8b"):
+    if result is None and start.startswith(b"\x1f\x8b"):
         return "a gzip archive of something else than SPZ; unpack it"
-    if found is None and start.startswith(b"PK\x03\x04"):
+    if result is None and start.startswith(b"PK\x03\x04"):
         return ZIP_ARCHIVE
-    if found is None and is_text(start):
+    if result is None and is_text(start):
         words = {line.split()[0] for line in start.splitlines() if line.split()}
         return "an OBJ mesh" if b"v" in words and words <= _OBJ_WORDS | {b"#", b"s"} else "a text"
-    return found
+    return result
 
 
 def is_text(content: bytes) -> bool:
-    """Whether bytes are printable ASCII, as no table of binary numbers is."""
+    """Whether all bytes are printable ASCII, unlike in tables of binary numbers."""
     return all(32 <= byte < 127 or byte in b"\t\n\r" for byte in content)
 
 
@@ -107,7 +107,7 @@ def _gzip_start(path: Path, start: bytes) -> bytes:
         return b""
 
 
-def _of_zip(path: Path) -> str | None:
+def _zip_format(path: Path) -> str | None:
     try:
         with zipfile.ZipFile(path) as archive:
             names = {PurePosixPath(name).name for name in archive.namelist()}
@@ -118,24 +118,24 @@ def _of_zip(path: Path) -> str | None:
     return ".sog" if META in names else None
 
 
-def _of_json(path: Path) -> str | None:
+def _json_format(path: Path) -> str | None:
     try:
-        found = json_text.loads(read_bytes(path, _MAX_JSON_BYTES).decode("utf-8-sig"))
+        result = json_text.loads(read_bytes(path, _MAX_JSON_BYTES).decode("utf-8-sig"))
     except UnicodeDecodeError:
         return None
     except (ValueError, OSError):
         return ".gltf" if path.name.lower().endswith(".gltf") else None
-    if not isinstance(found, dict):
+    if not isinstance(result, dict):
         return None
-    if "tree" in found and "filenames" in found:
+    if "tree" in result and "filenames" in result:
         return LOD_META
-    if "means" in found:
+    if "means" in result:
         return META
-    return ".gltf" if "asset" in found else None
+    return ".gltf" if "asset" in result else None
 
 
 def _is_ksplat(start: bytes, size: int) -> bool:
-    """Whether a header's version, level and numbers of sections and splats fit a file of so many bytes."""
+    """Whether the header's version, level, sections and splats fit a file of `size` bytes."""
     if len(start) < _KSPLAT_HEADER:
         return False
     sections, used, _, splats = struct.unpack_from("<IIII", start, 4)

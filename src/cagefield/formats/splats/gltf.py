@@ -1,10 +1,10 @@
-"""glTF with Gaussian splats: every splat that the default scene shows, of .glb and .gltf.
+"""Gaussian splats of glTF files (.glb, .gltf): all splats of the default scene.
 
-Primitives of points with KHR_gaussian_splatting have the attributes POSITION, KHR_gaussian_splatting:ROTATION
-(x y z w), :SCALE (not logarithms), :OPACITY (in [0, 1]) and :SH_DEGREE_l_COEF_n (n = 0 .. 2l). Before the
-extension was settled, exporters wrote COLOR_0 (color of degree 0 and opacity, in [0, 1]) for the last two,
-and _ROTATION, _SCALE (scales, or their logarithms, which some negative value tells) and _SH_DEGREE_l_COEF_n.
-An extension for SPZ (KHR_gaussian_splatting_compression_spz_2 and the names before it) has the content of a
+Point primitives with KHR_gaussian_splatting have the attributes POSITION, KHR_gaussian_splatting:ROTATION
+(x y z w), :SCALE (linear), :OPACITY (in [0, 1]) and :SH_DEGREE_l_COEF_n (n = 0 .. 2l). Exporters of
+early drafts write COLOR_0 (color of degree 0 and opacity, in [0, 1]) for the last two,
+and _ROTATION, _SCALE (linear, or logarithms where any value is negative) and _SH_DEGREE_l_COEF_n.
+An extension for SPZ (KHR_gaussian_splatting_compression_spz_2 and earlier names) has the content of a
 .spz file in a bufferView, whose splats are in the primitive's coordinates.
 
 Axes are glTF's, y up ("rub"). Nodes and instances may transform splats by any matrix (`gltf_nodes`,
@@ -29,13 +29,13 @@ import numpy as np
 from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.formats.splats.axes import Axes
-from cagefield.formats.splats.color_space import srgb_harmonics
+from cagefield.formats.splats.color_space import convert_harmonics_to_srgb
 from cagefield.formats.splats.gltf_buffers import Accessor, GltfAsset
 from cagefield.formats.splats.gltf_nodes import INSTANCING, MeshInstances, scene_meshes
 from cagefield.formats.splats.splat_ply import MESH, POINT_CLOUD_CURE
-from cagefield.formats.splats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.formats.splats.splat_table import BATCH_SPLATS, SplatBatch, SplatSource
 from cagefield.formats.splats.spz import open_spz_stream
-from cagefield.formats.splats.transform import transformed
+from cagefield.formats.splats.transform import transform_splats
 from cagefield.typing import Array
 
 GLTF_AXES: Axes = "rub"
@@ -43,25 +43,25 @@ EXTENSION = "KHR_gaussian_splatting"
 QUANTIZATION = "KHR_mesh_quantization"
 SRGB, LINEAR = "srgb_rec709_display", "lin_rec709_display"
 MAX_SPLATS = 1 << 31
-"""Splats of all instances of a file: few bytes can say any number of them."""
+"""Maximum number of splats over all instances; a few bytes can claim any number."""
 
-_PART_BYTES = 1 << 20
+_COPY_BYTES = 1 << 20
 _POINTS, _TRIANGLES = 0, 4
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """The splats of a primitive in its own coordinates and the matrices [I,4,4] of its instances."""
+    """Splats of a primitive in its own coordinates, and the matrices [I,4,4] of its instances."""
 
     splats: SplatSource
     matrices: Array
 
 
 def open_splat_gltf(path: Path) -> SplatSource:
-    """The splats of a glTF file; a warning counts what is left out of it.
+    """Open glTF file; a warning counts its ignored content.
 
     Raises:
-        FieldError: no glTF, none with splats, a file that is damaged or lacks one of its buffers.
+        FieldError: no glTF, no splats, a damaged file, or a missing buffer.
     """
     try:
         return _source(path, GltfAsset(path))
@@ -83,7 +83,7 @@ def open_splat_gltf(path: Path) -> SplatSource:
 
 
 def harmonic_names(degree: int, prefix: str = f"{EXTENSION}:") -> list[str]:
-    """Names of the attributes of harmonics up to a degree."""
+    """Attribute names of the harmonics up to a degree."""
     return [f"{prefix}SH_DEGREE_{of}_COEF_{n}" for of in range(degree + 1) for n in range(2 * of + 1)]
 
 
@@ -97,30 +97,30 @@ def _source(path: Path, asset: GltfAsset) -> SplatSource:
     for shown in meshes:
         for number, primitive in enumerate(asset.item("meshes", shown.mesh)["primitives"]):
             if not _has_splats(primitive):
-                _count(ignored, _kind_of(primitive), len(shown.matrices))
+                _add_count(ignored, _primitive_kind(primitive), len(shown.matrices))
                 continue
             if (shown.mesh, number) not in opened:
-                opened[shown.mesh, number] = _splats(path, asset, primitive, ignored)
+                opened[shown.mesh, number] = _open_primitive(path, asset, primitive, ignored)
             parts.append(_Part(opened[shown.mesh, number], shown.matrices))
     if not parts:
         raise FieldError(f"{path}: {_without_splats(ignored, hidden)}")
     for name in ("animations", "skins", "cameras"):
-        _count(ignored, name, len(asset.items(name)))
-    _count(ignored, "meshes of nodes that the default scene does not show", hidden)
+        _add_count(ignored, name, len(asset.items(name)))
+    _add_count(ignored, "meshes of nodes that the default scene does not show", hidden)
     if asset.items("nodes"):
         named = {node.get("mesh") for node in asset.items("nodes")}
-        _count(ignored, "meshes that no node shows", len(set(range(len(asset.items("meshes")))) - named))
+        _add_count(ignored, "meshes that no node shows", len(set(range(len(asset.items("meshes")))) - named))
     for name in asset.json.get("extensionsRequired", []):
         if name not in (EXTENSION, INSTANCING, QUANTIZATION) and "spz" not in name.lower():
-            _count(ignored, f"required extension {name:.60}", 1)
+            _add_count(ignored, f"required extension {name:.60}", 1)
     if ignored:
         said = ", ".join(f"{count} {name}" for name, count in ignored.items())
         warnings.warn(f"{path}: left out: {said:.300}", stacklevel=2)
-    return _joined(path, parts, asset.end)
+    return _concatenate_parts(path, parts, asset.end)
 
 
-def _joined(path: Path, parts: list[_Part], end: int) -> SplatSource:
-    """The splats of all instances of all primitives."""
+def _concatenate_parts(path: Path, parts: list[_Part], end: int) -> SplatSource:
+    """Splats of all instances of all primitives."""
     count = sum(part.splats.count * len(part.matrices) for part in parts)
     if count > MAX_SPLATS:
         raise ValueError(f"its instances are {count} splats, at most {MAX_SPLATS} are read")
@@ -130,7 +130,7 @@ def _joined(path: Path, parts: list[_Part], end: int) -> SplatSource:
         for part in parts:
             for matrix in part.matrices:
                 for batch in part.splats.batches():
-                    yield transformed(batch, matrix).padded(degree)
+                    yield transform_splats(batch, matrix).pad_harmonics(degree)
 
     antialiased = all(part.splats.antialiased for part in parts)
     return SplatSource(path, count, degree, GLTF_AXES, batches, antialiased, end=end, is_double=True)
@@ -147,7 +147,7 @@ def _has_splats(primitive: dict[str, Any]) -> bool:
 
 
 def _spz_view(primitive: dict[str, Any]) -> Any:
-    """The number of the bufferView with the content of a .spz file; None where there is none."""
+    """Index of the bufferView with the content of a .spz file; None without."""
     extensions = primitive.get("extensions", {})
     for found in (extensions, extensions.get(EXTENSION, {}).get("extensions", {})):
         for name, said in found.items():
@@ -156,8 +156,10 @@ def _spz_view(primitive: dict[str, Any]) -> Any:
     return None
 
 
-def _splats(path: Path, asset: GltfAsset, primitive: dict[str, Any], ignored: dict[str, int]) -> SplatSource:
-    """The splats of a primitive; what it has beside them is counted in `ignored`."""
+def _open_primitive(
+    path: Path, asset: GltfAsset, primitive: dict[str, Any], ignored: dict[str, int]
+) -> SplatSource:
+    """Splats of a primitive; ignored attributes are counted in `ignored`."""
     linear = _is_linear(path, primitive)
     view = _spz_view(primitive)
     found = _attributes(path, asset, primitive, ignored) if view is None else _compressed(path, asset, view)
@@ -165,17 +167,17 @@ def _splats(path: Path, asset: GltfAsset, primitive: dict[str, Any], ignored: di
         return found
 
     def batches() -> Iterator[SplatBatch]:
-        return (replace(batch, sh=srgb_harmonics(batch.sh)) for batch in found.batches())
+        return (replace(batch, sh=convert_harmonics_to_srgb(batch.sh)) for batch in found.batches())
 
     return replace(found, batches=batches)
 
 
 def _compressed(path: Path, asset: GltfAsset, view: Any) -> SplatSource:
-    """The splats of the content of a .spz file in a bufferView."""
+    """Splats of a .spz file's content in a bufferView."""
     buffer, begin, size, _ = asset.view(view)
     with tempfile.SpooledTemporaryFile(max_size=1 << 22) as content:
-        for at in range(0, size, _PART_BYTES):
-            content.write(buffer.read(begin + at, min(_PART_BYTES, size - at)))
+        for at in range(0, size, _COPY_BYTES):
+            content.write(buffer.read(begin + at, min(_COPY_BYTES, size - at)))
         content.seek(0)
         return open_spz_stream(path, cast(BinaryIO, content), size)
 
@@ -183,7 +185,7 @@ def _compressed(path: Path, asset: GltfAsset, view: Any) -> SplatSource:
 def _attributes(
     path: Path, asset: GltfAsset, primitive: dict[str, Any], ignored: dict[str, int]
 ) -> SplatSource:
-    """The splats of a primitive's attributes, by their settled names or those before."""
+    """Splats of a primitive's attributes, by their final names or those of drafts."""
     numbers = dict(primitive["attributes"])
 
     def column(name: str, width: int | tuple[int, ...]) -> Accessor:
@@ -200,7 +202,7 @@ def _attributes(
     names = [name.removeprefix(prefix) for name in harmonic_names(degree, prefix)]
     early = f"{EXTENSION}:{names[0]}" not in numbers and f"_{names[0]}" not in numbers
     color = column("COLOR_0", (3, 4)) if early else None
-    numbers.pop("COLOR_0", None)  # of settled files: for programs that know no splats
+    numbers.pop("COLOR_0", None)  # in final files COLOR_0 serves programs without splats
     sh = [column(name, 3) for name in names[int(early) :]]
     has_opacity = any(p + "OPACITY" in numbers for p in (f"{EXTENSION}:", "_"))
     opacity = column("OPACITY", 1) if has_opacity or color is None or color.width == 3 else None
@@ -210,8 +212,8 @@ def _attributes(
     if not all(part.is_stored for part in (mean, rotation, scale)):
         raise ValueError("an attribute has no values")
     for name in numbers:
-        _count(ignored, f"attributes {name:.60}", 1)
-    is_log = early and scale.least < 0.0
+        _add_count(ignored, f"attributes {name:.60}", 1)
+    is_log = early and scale.min_value < 0.0
     if early:
         taken = "logarithms, as some are negative" if is_log else "lengths, as none is negative"
         warnings.warn(f"{path}: attributes of an early draft; its scales are taken as {taken}", stacklevel=2)
@@ -225,7 +227,7 @@ def _attributes(
         alpha = None if opacity is None else opacity.rows(first, last)[:, 0]
         if color is not None:
             rgba = color.rows(first, last)
-            rgba = color.shares(rgba) if color.is_whole else rgba
+            rgba = color.normalize(rgba) if color.is_integer else rgba
             values.insert(0, (rgba[:, :3] - 0.5) / spherical_harmonics.C0)
             alpha = rgba[:, 3] if alpha is None else alpha
         assert alpha is not None  # of one or the other
@@ -233,38 +235,38 @@ def _attributes(
         return SplatBatch(mean.rows(first, last), log_scales, quaternions, alpha, np.stack(values, axis=1))
 
     def batches() -> Iterator[SplatBatch]:
-        return (rows(first, min(first + BATCH, mean.count)) for first in range(0, mean.count, BATCH))
+        return (
+            rows(first, min(first + BATCH_SPLATS, mean.count)) for first in range(0, mean.count, BATCH_SPLATS)
+        )
 
     return SplatSource(path, mean.count, degree, GLTF_AXES, batches)
 
 
 def _is_linear(path: Path, primitive: dict[str, Any]) -> bool:
-    """Whether the colors are linear light; warns of that, and of a space that is not known."""
+    """Whether the colors are linear light; warns about linear light and unknown color spaces."""
     space = primitive.get("extensions", {}).get(EXTENSION, {}).get("colorSpace", SRGB)
     if space == LINEAR:
         warnings.warn(
-            f"{path}: its colours are linear light; they become sRGB splat by splat, and are blended as sRGB",
+            f"{path}: its colors are linear light; they become sRGB splat by splat, and are blended as sRGB",
             stacklevel=2,
         )
     elif space != SRGB:
-        warnings.warn(
-            f"{path}: its colour space {space!r:.60} is not known and taken as {SRGB}", stacklevel=2
-        )
+        warnings.warn(f"{path}: its color space {space!r:.60} is not known and taken as {SRGB}", stacklevel=2)
     return bool(space == LINEAR)
 
 
-def _kind_of(primitive: dict[str, Any]) -> str:
+def _primitive_kind(primitive: dict[str, Any]) -> str:
     mode = primitive.get("mode", _TRIANGLES)
     return "primitives of points" if mode == _POINTS else "primitives of lines or triangles"
 
 
-def _count(counts: dict[str, int], name: str, count: int) -> None:
+def _add_count(counts: dict[str, int], name: str, count: int) -> None:
     if count:
         counts[name] = counts.get(name, 0) + count
 
 
 def _without_splats(found: dict[str, int], hidden: int) -> str:
-    """A line about a file whose scene shows no splats."""
+    """Error message for a file whose scene has no splats."""
     if "primitives of lines or triangles" in found:
         return MESH
     if "primitives of points" in found:

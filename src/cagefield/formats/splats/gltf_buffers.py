@@ -1,7 +1,7 @@
-"""The JSON, buffers and accessors of a glTF 2.0 asset: .glb, or .gltf with external or embedded buffers.
+"""JSON, buffers and accessors of a glTF 2.0 asset: .glb, or .gltf with external or embedded buffers.
 
-Buffers are read in parts from where they lie; those of data URIs are held decoded. External files are read
-from the asset's folder and below it, never from elsewhere.
+Buffers are read in parts from their files; data URIs are decoded in memory. External files must lie in the
+asset's folder or below it.
 
 Source: KhronosGroup/glTF, specification 2.0, "GLB File Format", "Buffers and Buffer Views", "Accessors".
 """
@@ -33,7 +33,7 @@ from cagefield.typing import AnyArray
 
 MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 MAX_EMBEDDED_BYTES = 1 << 30
-"""Bytes of a .gltf, whose buffers may lie in it as base64."""
+"""Maximum size of a .gltf, whose buffers may be embedded as base64."""
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -42,7 +42,7 @@ _INDEX_TYPES = (5121, 5123, 5125)
 
 @dataclass(frozen=True, eq=False)
 class Buffer:
-    """`size` bytes, of a file from `begin` on or in memory."""
+    """Buffer of `size` bytes, in a file from `begin` on, or in memory."""
 
     path: Path
     begin: int
@@ -50,7 +50,7 @@ class Buffer:
     content: bytes | None = None
 
     def read(self, offset: int, size: int) -> bytes:
-        """Bytes of the buffer. Raises ValueError where they end after it, FieldError as `read_array`."""
+        """Bytes of the buffer. Raises ValueError beyond the buffer, FieldError as `read_array`."""
         if offset < 0 or size < 0 or offset + size > self.size:
             raise ValueError(f"{size} bytes from {offset} on end after a buffer of {self.size}")
         if self.content is not None:
@@ -59,10 +59,10 @@ class Buffer:
 
 
 class GltfAsset:
-    """An opened asset: its JSON and its buffers, which are found when they are asked for."""
+    """Open asset: its JSON, and its buffers, which are opened on demand."""
 
     def __init__(self, path: Path) -> None:
-        """Raises ValueError, TypeError, KeyError or struct.error for what is no asset."""
+        """Open an asset. Raises ValueError, TypeError, KeyError or struct.error for an invalid one."""
         self.path = path
         with open_regular(path) as file:
             is_binary = file.read(4) == b"glTF"
@@ -73,28 +73,28 @@ class GltfAsset:
         self._buffers: dict[int, Buffer] = {}
 
     def items(self, name: str) -> list[dict[str, Any]]:
-        """A list of objects of the JSON's top level; empty where there is none."""
+        """List of objects at the JSON's top level; empty without."""
         found = self.json.get(name, [])
         if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
             raise ValueError(f"its {name} are no list of objects")
         return found
 
     def item(self, name: str, number: Any) -> dict[str, Any]:
-        """An object of such a list. Raises ValueError where its number is none of the list."""
+        """Object of such a list. Raises ValueError for an index out of range."""
         found = self.items(name)
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
             raise ValueError(f"{name} {number!r:.20} is not there, it has {len(found)}")
         return found[number]
 
     def buffer(self, number: Any) -> Buffer:
-        """A buffer; an external file is opened when it is read."""
-        said = self.item("buffers", number)
+        """Buffer by index; an external file is opened on demand."""
+        description = self.item("buffers", number)
         if number not in self._buffers:
-            self._buffers[number] = self._found(number, said)
+            self._buffers[number] = self._open_buffer(number, description)
         return self._buffers[number]
 
     def view(self, number: Any) -> tuple[Buffer, int, int, int | None]:
-        """(buffer, first byte, bytes, stride or None) of a bufferView.
+        """(buffer, first byte, size in bytes, stride or None) of a bufferView.
 
         Raises ValueError for a compressed one.
         """
@@ -109,25 +109,27 @@ class GltfAsset:
         return buffer, begin, size, None if stride is None else int(stride)
 
     def accessor(self, number: Any, width: int | tuple[int, ...]) -> Accessor:
-        """The numbers of an accessor with `width` of them an element, one of several widths."""
-        said = self.item("accessors", number)
-        found = _WIDTHS.get(said["type"], 0)
+        """Accessor by index, whose elements have `width` components, one of several widths."""
+        description = self.item("accessors", number)
+        found = _WIDTHS.get(description["type"], 0)
         if found not in (width if isinstance(width, tuple) else (width,)):
-            raise ValueError(f"an attribute is {said['type']!s:.20}")
-        return Accessor(self, said, found)
+            raise ValueError(f"an attribute is {description['type']!s:.20}")
+        return Accessor(self, description, found)
 
     @property
     def end(self) -> int:
-        """The first byte of the asset's own file that is not read."""
+        """Offset of the first unread byte of the asset's own file."""
         return check_regular(self.path) if self._binary is None else sum(self._binary)
 
     def external_files(self) -> tuple[Path, ...]:
-        """The files that the buffers lie in, beside the asset itself."""
-        said = [buffer.get("uri") for buffer in self.items("buffers")]
-        return tuple(self._external(uri) for uri in said if isinstance(uri, str) and uri[:5] != "data:")
+        """External files of the buffers."""
+        description = [buffer.get("uri") for buffer in self.items("buffers")]
+        return tuple(
+            self._external(uri) for uri in description if isinstance(uri, str) and uri[:5] != "data:"
+        )
 
-    def _found(self, number: int, said: dict[str, Any]) -> Buffer:
-        uri = said.get("uri")
+    def _open_buffer(self, number: int, description: dict[str, Any]) -> Buffer:
+        uri = description.get("uri")
         if uri is None:
             if self._binary is None or number:
                 raise ValueError(f"buffer {number} has no content")
@@ -160,26 +162,26 @@ class GltfAsset:
 
 
 class Accessor:
-    """Numbers [count,width] of a buffer, with those that a sparse accessor puts in their places."""
+    """Values [count,width] of a buffer, with the replacements of a sparse accessor."""
 
-    def __init__(self, asset: GltfAsset, said: dict[str, Any], width: int) -> None:
-        base = np.dtype(_TYPES[said["componentType"]])
-        self.count, self.width, self._base = int(said["count"]), width, base
-        self.is_share = bool(said.get("normalized", False)) and base.kind != "f"
-        self.is_whole = base.kind != "f" and not self.is_share
+    def __init__(self, asset: GltfAsset, description: dict[str, Any], width: int) -> None:
+        base = np.dtype(_TYPES[description["componentType"]])
+        self.count, self.width, self._base = int(description["count"]), width, base
+        self.is_normalized = bool(description.get("normalized", False)) and base.kind != "f"
+        self.is_integer = base.kind != "f" and not self.is_normalized
         self._itemsize = base.itemsize * width
         self._sparse = None
-        if "sparse" in said:
-            self._sparse = _sparse(asset, said["sparse"], base, width, self.count)
+        if "sparse" in description:
+            self._sparse = _sparse(asset, description["sparse"], base, width, self.count)
         self._buffer: Buffer | None = None
         if self.count < 1:
             raise ValueError(f"an attribute has {self.count} values")
-        if "bufferView" not in said:
+        if "bufferView" not in description:
             if self._sparse is None:
                 raise ValueError("an attribute has no values")
             return
-        self._buffer, begin, size, stride = asset.view(said["bufferView"])
-        offset = int(said.get("byteOffset", 0))
+        self._buffer, begin, size, stride = asset.view(description["bufferView"])
+        offset = int(description.get("byteOffset", 0))
         self._stride = self._itemsize if stride is None else stride
         self._begin = begin + offset
         end = offset + self._stride * (self.count - 1) + self._itemsize
@@ -188,7 +190,7 @@ class Accessor:
 
     @property
     def is_stored(self) -> bool:
-        """False where all values are 0 but for sparse ones: `count` has nothing in the file to check it."""
+        """False where only sparse values exist; `count` then has no counterpart in the file."""
         return self._buffer is not None
 
     def rows(self, first: int, last: int) -> AnyArray:
@@ -205,27 +207,27 @@ class Accessor:
             places, put = self._sparse
             here = (places >= first) & (places < last)
             values[places[here] - first] = put[here]
-        return self.shares(values) if self.is_share else values.astype(np.float64)
+        return self.normalize(values) if self.is_normalized else values.astype(np.float64)
 
-    def shares(self, values: AnyArray) -> AnyArray:
-        """Integers as shares of the largest that their type has; floats as they are."""
+    def normalize(self, values: AnyArray) -> AnyArray:
+        """Integers as shares of their type's largest value; floats unchanged."""
         if self._base.kind == "f":
             return values
         return np.maximum(values / float(np.iinfo(self._base).max), -1.0)
 
     @cached_property
-    def least(self) -> float:
-        """The smallest of all values that are numbers."""
+    def min_value(self) -> float:
+        """Minimum of all finite values."""
         part = 1 << 18
         found = [self.rows(first, min(first + part, self.count)) for first in range(0, self.count, part)]
         return min(float(np.min(rows, where=np.isfinite(rows), initial=np.inf)) for rows in found)
 
 
 def _sparse(
-    asset: GltfAsset, said: dict[str, Any], base: np.dtype[Any], width: int, total: int
+    asset: GltfAsset, description: dict[str, Any], base: np.dtype[Any], width: int, total: int
 ) -> tuple[AnyArray, AnyArray]:
-    """(places [n], values [n,width]) of a sparse accessor."""
-    count, indices, values = int(said["count"]), said["indices"], said["values"]
+    """(indices [n], values [n,width]) of a sparse accessor."""
+    count, indices, values = int(description["count"]), description["indices"], description["values"]
     if indices["componentType"] not in _INDEX_TYPES or not 0 <= count <= total:
         raise ValueError(f"a sparse attribute has {count} of {total} values")
 
@@ -250,7 +252,7 @@ def _text(path: Path) -> dict[str, Any]:
 
 
 def _chunks(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
-    """(the JSON of a .glb, the first byte and the size of its binary part, None where it has none)."""
+    """(JSON of a .glb, (first byte, size) of its binary chunk or None)."""
     size = check_regular(path)
     with open_regular(path) as file:
         magic, version, _ = struct.unpack("<III", file.read(12))

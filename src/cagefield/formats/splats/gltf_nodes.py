@@ -1,6 +1,6 @@
-"""Transformations of the meshes that a glTF scene shows: every instance of every mesh, through its parents.
+"""Transformations of all mesh instances of a glTF scene, composed over parent nodes.
 
-Notation: a node's matrix [4,4] takes its coordinates to those of its parent, M = T R S or as it is given.
+Notation: a node's matrix [4,4] takes its coordinates to those of its parent; M = T R S, or given directly.
 
 Source: KhronosGroup/glTF, specification 2.0, "Scenes", "Transformations"; EXT_mesh_gpu_instancing.
 """
@@ -21,19 +21,19 @@ INSTANCING = "EXT_mesh_gpu_instancing"
 
 @dataclass(frozen=True, eq=False)
 class MeshInstances:
-    """A mesh's number, and the matrices [I,4,4] that take it to the coordinates of the scene."""
+    """Index of a mesh, and the matrices [I,4,4] from its coordinates to the scene's."""
 
     mesh: int
     matrices: Array
 
 
 def scene_meshes(asset: GltfAsset) -> tuple[list[MeshInstances], int]:
-    """(meshes of the default scene, number of nodes with a mesh that it does not show).
+    """(meshes of the default scene, number of nodes with meshes outside the scene).
 
-    Without scenes, all nodes that are nobody's children are shown.
+    Without scenes, all nodes without a parent are roots.
 
     Raises:
-        ValueError: a node with two parents or in a circle, a transformation that is none.
+        ValueError: a node with two parents or in a cycle, or an invalid transformation.
     """
     nodes, scenes = asset.items("nodes"), asset.items("scenes")
     if scenes:
@@ -41,10 +41,10 @@ def scene_meshes(asset: GltfAsset) -> tuple[list[MeshInstances], int]:
     else:
         below = {child for node in nodes for child in node.get("children", [])}
         roots = [number for number in range(len(nodes)) if number not in below]
-    found, visited = list[MeshInstances](), set[int]()
-    waiting = [(number, np.eye(4)) for number in reversed(roots)]
-    while waiting:
-        number, parent = waiting.pop()
+    instances, visited = list[MeshInstances](), set[int]()
+    pending = [(number, np.eye(4)) for number in reversed(roots)]
+    while pending:
+        number, parent = pending.pop()
         node = asset.item("nodes", number)
         if number in visited:
             raise ValueError(f"node {number} has two parents, or is its own")
@@ -53,10 +53,10 @@ def scene_meshes(asset: GltfAsset) -> tuple[list[MeshInstances], int]:
         if not np.isfinite(matrix).all():
             raise ValueError(f"node {number} has a transformation that is no number")
         if "mesh" in node:
-            found.append(MeshInstances(node["mesh"], matrix @ _instances(asset, node)))
-        waiting.extend((child, matrix) for child in reversed(node.get("children", [])))
+            instances.append(MeshInstances(node["mesh"], matrix @ _instances(asset, node)))
+        pending.extend((child, matrix) for child in reversed(node.get("children", [])))
     hidden = sum("mesh" in node for number, node in enumerate(nodes) if number not in visited)
-    return found, hidden
+    return instances, hidden
 
 
 def _matrix(node: dict[str, Any]) -> Array:
@@ -69,7 +69,7 @@ def _matrix(node: dict[str, Any]) -> Array:
 
 
 def _instances(asset: GltfAsset, node: dict[str, Any]) -> Array:
-    """Matrices [I,4,4] of a node's instances; one that changes nothing where it has none."""
+    """Matrices [I,4,4] of a node's instances; the identity without instances."""
     said = node.get("extensions", {}).get(INSTANCING)
     if said is None:
         return np.eye(4)[None]
@@ -85,14 +85,14 @@ def _instances(asset: GltfAsset, node: dict[str, Any]) -> Array:
     count = counts.pop()
     rest = {"TRANSLATION": [0.0] * 3, "ROTATION": [0.0, 0.0, 0.0, 1.0], "SCALE": [1.0] * 3}
     values = [
-        columns[name].rows(0, count) if name in columns else np.tile(still, (count, 1))
-        for name, still in rest.items()
+        columns[name].rows(0, count) if name in columns else np.tile(default, (count, 1))
+        for name, default in rest.items()
     ]
     return _matrices(*values)
 
 
 def _matrices(shift: Array, turn: Array, scale: Array) -> Array:
-    """T R S [n,4,4] of translations [n,3], quaternions [n,4] (x y z w) and scales [n,3]."""
+    """Matrices T R S [n,4,4] of translations [n,3], quaternions [n,4] (x y z w) and scales [n,3]."""
     if not (np.linalg.norm(turn, axis=1) > 0.0).all():
         raise ValueError("a node has a rotation of length 0")
     matrices = np.tile(np.eye(4), (len(shift), 1, 1))

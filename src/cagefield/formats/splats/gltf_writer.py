@@ -1,4 +1,4 @@
-"""Writer of glTF with the extension KHR_gaussian_splatting, as one .glb file; see `splat_gltf`."""
+"""Writer of splats as glTF (.glb) with the extension KHR_gaussian_splatting; see `gltf`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from cagefield.formats.splats.splat_table import OnProgress, SplatTable
 
 
 def write_splat_gltf(path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None) -> None:
-    """Writes the splats, whose axes are glTF's, as one .glb file, complete or not at all.
+    """Write splats in glTF's axes as one .glb file, complete or not at all.
 
-    The table's offset becomes the translation of the node that shows them.
+    The table's offset becomes the translation of the splats' node.
     """
     count = table.count
     attributes = [("POSITION", 3), (f"{EXTENSION}:ROTATION", 4), (f"{EXTENSION}:SCALE", 3)]

@@ -1,10 +1,9 @@
-"""mkkellogg's .ksplat: sections of splats in three levels of compression. Read alone.
+"""Reader of mkkellogg's .ksplat: sections of splats in three levels of compression.
 
-A header of 4096 bytes, a header of 1024 bytes for each section that may be there, and the sections: lengths
-of the buckets that are not full, centres of the buckets, splats. Level 0 holds float32 and is not bucketed; 1
-and 2 hold positions as uint16 around their bucket's centre, scales and rotations (w x y z) as float16.
-Harmonics are float32, float16, or uint8 between two limits; within a degree all of red, then green, then
-blue.
+A header of 4096 bytes, a header of 1024 bytes per possible section, and the sections: lengths of the partial
+buckets, centers of the buckets, splats. Level 0 holds float32 without buckets; levels 1 and 2 hold positions
+as uint16 around their bucket's center, scales and rotations (w x y z) as float16. Harmonics are float32,
+float16, or uint8 between two limits; within a degree all of red, then green, then blue.
 
 Source: mkkellogg/GaussianSplats3D, src/loaders/SplatBuffer.js.
 """
@@ -22,12 +21,12 @@ from numpy.typing import NDArray
 from cagefield.errors import FieldError
 from cagefield.fields import sh as spherical_harmonics
 from cagefield.files.safe_open import open_regular, read_array
-from cagefield.formats.splats.axes import PLY
-from cagefield.formats.splats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.formats.splats.axes import PLY_AXES
+from cagefield.formats.splats.splat_table import BATCH_SPLATS, SplatBatch, SplatSource
 from cagefield.typing import AnyArray
 
-_HEADER, _SECTION = 4096, 1024
-_HARMONICS = {0: 0, 1: 9, 2: 24, 3: 45}
+_HEADER_BYTES, _SECTION_BYTES = 4096, 1024
+_HARMONIC_FLOATS = {0: 0, 1: 9, 2: 24, 3: 45}
 
 
 @dataclass(frozen=True)
@@ -40,21 +39,21 @@ class _Section:
     scale_range: int
     lengths_at: int
     lengths: int
-    centres_at: int
-    centres: int
-    centre_bytes: int
+    centers_at: int
+    centers: int
+    center_bytes: int
     splats_at: int
 
 
 def open_ksplat(path: Path) -> SplatSource:
-    """The splats of a .ksplat file.
+    """Open .ksplat file.
 
     Raises:
-        FieldError: a version or level that is not known, a file that is damaged.
+        FieldError: an unknown version or level, or a damaged file.
     """
     with open_regular(path) as file:
-        head = file.read(_HEADER)
-        if len(head) < _HEADER:
+        head = file.read(_HEADER_BYTES)
+        if len(head) < _HEADER_BYTES:
             raise _damaged(path, "its header is cut off")
         major, minor = head[0], head[1]
         (sections,) = struct.unpack_from("<I", head, 4)
@@ -62,13 +61,15 @@ def open_ksplat(path: Path) -> SplatSource:
         limits = struct.unpack_from("<ff", head, 36)
         if (major, minor) < (0, 1) or major > 1 or level > 2:
             raise FieldError(f"{path}: .ksplat of version {major}.{minor}, level {level}, is not known")
-        if _HEADER + sections * _SECTION > path.stat().st_size:
+        if _HEADER_BYTES + sections * _SECTION_BYTES > path.stat().st_size:
             raise _damaged(path, f"it says that it has {sections} sections")
-        heads = file.read(sections * _SECTION)
-    row = {degree: _row(level, degree) for degree in _HARMONICS}
-    found, at = [], _HEADER + sections * _SECTION
+        heads = file.read(sections * _SECTION_BYTES)
+    row = {degree: _row(level, degree) for degree in _HARMONIC_FLOATS}
+    found, at = [], _HEADER_BYTES + sections * _SECTION_BYTES
     for number in range(sections):
-        section, size = _section(path, heads[number * _SECTION : (number + 1) * _SECTION], at, row)
+        section, size = _section(
+            path, heads[number * _SECTION_BYTES : (number + 1) * _SECTION_BYTES], at, row
+        )
         at += size
         if at > path.stat().st_size:
             raise _damaged(path, f"section {number} ends after the file")
@@ -81,29 +82,29 @@ def open_ksplat(path: Path) -> SplatSource:
         for section in found:
             yield from _batches(path, section, row[section.degree], level, degree, limits)
 
-    return SplatSource(path, sum(section.count for section in found), degree, PLY, batches, end=at)
+    return SplatSource(path, sum(section.count for section in found), degree, PLY_AXES, batches, end=at)
 
 
 def _row(level: int, degree: int) -> np.dtype[np.void]:
     number, place, sh = ("<f4", "<f4", "<f4") if level == 0 else ("<f2", "<u2", "<f2" if level == 1 else "u1")
     parts = [("mean", place, (3,)), ("scale", number, (3,)), ("rotation", number, (4,)), ("rgba", "u1", (4,))]
-    return np.dtype([*parts, ("sh", sh, (_HARMONICS[degree],))])
+    return np.dtype([*parts, ("sh", sh, (_HARMONIC_FLOATS[degree],))])
 
 
 def _section(path: Path, head: bytes, at: int, row: dict[int, np.dtype[np.void]]) -> tuple[_Section, int]:
-    """(section that begins at a byte, its size)."""
+    """(section at byte `at`, its size in bytes)."""
     count, most, bucket_size, buckets = struct.unpack_from("<IIII", head, 0)
     (block,) = struct.unpack_from("<f", head, 16)
-    (centre_bytes,) = struct.unpack_from("<H", head, 20)
+    (center_bytes,) = struct.unpack_from("<H", head, 20)
     scale_range, _, full, partial = struct.unpack_from("<IIII", head, 24)
     (degree,) = struct.unpack_from("<H", head, 40)
     if degree not in row or count > most:
         raise _damaged(path, f"a section says {count} splats of degree {degree}")
-    lengths, centres = 4 * partial, centre_bytes * buckets
-    size = lengths + centres + most * row[degree].itemsize
+    lengths, centers = 4 * partial, center_bytes * buckets
+    size = lengths + centers + most * row[degree].itemsize
     section = _Section(
         count, degree, bucket_size, full, block, scale_range or 32767, at, partial,
-        at + lengths, buckets, centre_bytes, at + lengths + centres,
+        at + lengths, buckets, center_bytes, at + lengths + centers,
     )  # fmt: skip
     return section, size
 
@@ -118,13 +119,16 @@ def _batches(
 ) -> Iterator[SplatBatch]:
     lengths = read_array(path, "<u4", section.lengths, offset=section.lengths_at).astype(np.int64)
     ends = section.full_buckets * section.bucket_size + np.cumsum(lengths)
-    raw = read_array(path, np.uint8, section.centres * section.centre_bytes, offset=section.centres_at)
-    centres = np.zeros((0, 3))
-    if section.centres and section.centre_bytes >= 12:
-        centres = raw.reshape(section.centres, -1)[:, :12].copy().view("<f4").astype(np.float64)
-    for first in range(0, section.count, BATCH):
+    raw = read_array(path, np.uint8, section.centers * section.center_bytes, offset=section.centers_at)
+    centers = np.zeros((0, 3))
+    if section.centers and section.center_bytes >= 12:
+        centers = raw.reshape(section.centers, -1)[:, :12].copy().view("<f4").astype(np.float64)
+    for first in range(0, section.count, BATCH_SPLATS):
         rows = read_array(
-            path, row, min(BATCH, section.count - first), offset=section.splats_at + first * row.itemsize
+            path,
+            row,
+            min(BATCH_SPLATS, section.count - first),
+            offset=section.splats_at + first * row.itemsize,
         )
         means = rows["mean"].astype(np.float64)
         if level:
@@ -135,10 +139,10 @@ def _batches(
                 number // max(1, section.bucket_size),
                 section.full_buckets + np.searchsorted(ends, number, side="right"),
             )
-            if len(bucket) and bucket.max() >= len(centres):
+            if len(bucket) and bucket.max() >= len(centers):
                 raise _damaged(path, "a splat lies in a bucket that is not there")
             step = 0.5 * section.block / section.scale_range
-            means = (means - section.scale_range) * step + centres[bucket]
+            means = (means - section.scale_range) * step + centers[bucket]
         yield _batch(rows, means, level, section.degree, degree, limits)
 
 

@@ -1,4 +1,4 @@
-"""Morton codes: a curve through space along which neighbours lie close to each other.
+"""Morton codes: positions along a space-filling curve that preserves locality.
 
 Source: Morton, "A Computer Oriented Geodetic Data Base" (1966).
 """
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from cagefield.typing import AnyArray
 
-_BITS = 21  # of each axis: 63 in all
-_SPREAD = (
+_BITS_PER_AXIS = 21  # 63 bits in total
+_SPREAD_MASKS = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
     (8, 0x100F00F00F00F00F),
@@ -21,14 +21,14 @@ _SPREAD = (
 
 
 def morton_codes(points: AnyArray, low: AnyArray, high: AnyArray) -> NDArray[np.uint64]:
-    """Codes [N] of points [N,3] of a box: the bits of x, y and z, interleaved, x lowest."""
+    """Morton codes [N] of points [N,3] within a box: interleaved bits of x, y and z, x lowest."""
     size = np.maximum(np.asarray(high, np.float64) - low, 1e-300)
     share = np.clip((np.asarray(points, np.float64) - low) / size, 0.0, 1.0)
-    cells = (share * (2**_BITS - 1)).astype(np.uint64)
+    cells = (share * (2**_BITS_PER_AXIS - 1)).astype(np.uint64)
     code = np.zeros(len(cells), np.uint64)
     for axis in range(3):
         bits = cells[:, axis]
-        for shift, mask in _SPREAD:
+        for shift, mask in _SPREAD_MASKS:
             bits = (bits | bits << np.uint64(shift)) & np.uint64(mask)
         code |= bits << np.uint64(axis)
     return code

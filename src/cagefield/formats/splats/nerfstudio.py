@@ -1,7 +1,7 @@
-"""Checkpoints of nerfstudio's splatfacto: the splats alone, as tensors; no code is run.
+"""Splats of nerfstudio's splatfacto checkpoints, read as tensors without executing code.
 
-Under "pipeline" lie _model.gauss_params.means [N,3], scales [N,3] (logarithms), quats [N,4] (w x y z),
-opacities [N,1] (logits), features_dc [N,3] and features_rest [N,K,3]; in older versions without
+"pipeline" has _model.gauss_params.means [N,3], scales [N,3] (logarithms), quats [N,4] (w x y z),
+opacities [N,1] (logits), features_dc [N,3] and features_rest [N,K,3]; older versions omit
 "gauss_params.". Axes and units are those of nerfstudio's training.
 
 Source: nerfstudio-project/nerfstudio, nerfstudio/models/splatfacto.py.
@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 
 from cagefield.errors import FieldError
-from cagefield.formats.splats.axes import PLY
-from cagefield.formats.splats.splat_table import BATCH, SplatBatch, SplatSource
-from cagefield.formats.torch_files import read_tensors_of
+from cagefield.formats.splats.axes import PLY_AXES
+from cagefield.formats.splats.splat_table import BATCH_SPLATS, SplatBatch, SplatSource
+from cagefield.formats.torch_files import read_torch_tensors
 from cagefield.typing import AnyArray
 
 _NAMES = ("means", "scales", "quats", "opacities", "features_dc", "features_rest")
 
 
 def open_splatfacto(path: Path) -> SplatSource:
-    """The splats of a checkpoint.
+    """Open splatfacto checkpoint.
 
     Raises:
-        FieldError: no PyTorch, a file that is damaged, or a checkpoint of another method.
+        FieldError: missing PyTorch, a damaged file, or a checkpoint of another method.
     """
-    pipeline = read_tensors_of(path).get("pipeline")
+    pipeline = read_torch_tensors(path).get("pipeline")
     if not isinstance(pipeline, Mapping):
         raise FieldError(f'{path}: no checkpoint of nerfstudio: it has no "pipeline"; give a step-*.ckpt')
     found = {name: tensor for name in _NAMES if (tensor := _tensor(pipeline, name)) is not None}
@@ -47,19 +47,19 @@ def open_splatfacto(path: Path) -> SplatSource:
         raise FieldError(f"{path}: tensors of splatfacto have shapes {shapes} that do not fit; save it again")
 
     def batches() -> Iterator[SplatBatch]:
-        for first in range(0, count, BATCH):
-            here = slice(first, first + BATCH)
+        for first in range(0, count, BATCH_SPLATS):
+            here = slice(first, first + BATCH_SPLATS)
             with np.errstate(over="ignore"):
                 alpha = 1.0 / (1.0 + np.exp(-opacities[here, 0].astype(np.float64)))
             sh = np.concatenate([dc[here, None], rest[here]], axis=1)
             yield SplatBatch(means[here], scales[here], quats[here], alpha, sh)
 
-    return SplatSource(path, count, degree, PLY, batches)
+    return SplatSource(path, count, degree, PLY_AXES, batches)
 
 
 def is_splatfacto(path: Path) -> bool:
-    """Whether a checkpoint is there and was written by nerfstudio. Raises FieldError as `open_splatfacto`."""
-    return path.is_file() and "pipeline" in read_tensors_of(path)
+    """Whether the file is a nerfstudio checkpoint. Raises FieldError as `open_splatfacto`."""
+    return path.is_file() and "pipeline" in read_torch_tensors(path)
 
 
 def _tensor(pipeline: Mapping[str, Any], name: str) -> AnyArray | None:

@@ -1,8 +1,8 @@
-"""Splat files opened by their content; the ending of their name decides where the content does not.
+"""Splat files, opened by their content, or by the suffix of their name for contents without magic number.
 
-| ending | format | read | written |
+| suffix | format | read | written |
 | --- | --- | --- | --- |
-| .ply | 3DGS, and what follows it | yes | yes |
+| .ply | 3DGS and derivatives | yes | yes |
 | .compressed.ply | PlayCanvas | yes | yes |
 | .spz | Niantic, versions 1 to 4 | yes | 3, or 4 |
 | .sog, a folder with meta.json | PlayCanvas, versions 1 and 2 | yes | 2, as one file |
@@ -24,7 +24,7 @@ from cagefield.files.ply import open_ply
 from cagefield.files.safe_open import check_regular
 from cagefield.formats.splats.antimatter15_splat import open_splat_rows
 from cagefield.formats.splats.compressed_ply import open_compressed_ply
-from cagefield.formats.splats.detection import LOD_META, META, ZIP_ARCHIVE, detected_format, other_kind
+from cagefield.formats.splats.detection import LOD_META, META, ZIP_ARCHIVE, describe_other_file, detect_format
 from cagefield.formats.splats.gltf import open_splat_gltf
 from cagefield.formats.splats.gltf_buffers import GltfAsset
 from cagefield.formats.splats.ksplat import open_ksplat
@@ -46,7 +46,7 @@ _NAMES = {
     ".ply": "a PLY", ".spz": "an SPZ", ".sog": "a SOG", ".ksplat": "a .ksplat", ".glb": "a binary glTF",
     ".gltf": "a glTF", META: "a SOG's meta.json", LOD_META: "a streamed SOG's lod-meta.json",
 }  # fmt: skip
-_MAY_END = {META: (META, ".json"), LOD_META: (LOD_META, META, ".json")}
+_ALSO_VALID_SUFFIXES = {META: (META, ".json"), LOD_META: (LOD_META, META, ".json")}
 
 
 def _open_any_ply(path: Path) -> SplatSource:
@@ -70,8 +70,8 @@ _OPEN: dict[str, Callable[[Path], SplatSource]] = {
 }
 
 
-def ending_of(path: Path) -> str:
-    """The ending that says a file's format, such as ".compressed.ply"; "" where it is none of them."""
+def format_suffix(path: Path) -> str:
+    """Suffix that names a file's format, such as ".compressed.ply"; "" for an unknown one."""
     name = path.name.lower()
     if path.is_dir():
         return META
@@ -79,76 +79,77 @@ def ending_of(path: Path) -> str:
 
 
 def open_splats(path: Path) -> SplatSource:
-    """The open file of splats; its values are read when its batches are.
+    """Open splat file; values are read batch by batch.
 
-    A warning says where the content has another format than the name's ending says.
+    A warning names a content of another format than the suffix.
 
     Raises:
-        FieldError: no such file, a format that is not known, a file that is damaged.
+        FieldError: missing file, unknown format, or a damaged file.
     """
     if not path.exists():
         raise FieldError(f"{path}: no such file; give a file of splats ({', '.join(READABLE[:-2])})")
-    ending = ending_of(path)
+    ending = format_suffix(path)
     try:
         if not path.is_dir():
             check_regular(path)
-        found = detected_format(path)
+        found = detect_format(path)
     except OSError as error:
         raise FieldError(f"{path}: cannot be read ({error.strerror or error})") from None
     if found is None:
-        return _opened_by_ending(path, ending)
+        return _open_by_suffix(path, ending)
     if found not in _OPEN:
         raise FieldError(f"{path}: a zip of a streamed SOG; unpack it and give its folder")
-    if not path.is_dir() and not path.name.lower().endswith((found, *_MAY_END.get(found, ()))):
+    if not path.is_dir() and not path.name.lower().endswith((found, *_ALSO_VALID_SUFFIXES.get(found, ()))):
         said = f"not what its name says ({ending})" if ending else "which its name does not say"
         warnings.warn(f"{path}: its content is {_NAMES[found]}, {said}; it is read as that", stacklevel=2)
     return _OPEN[found](path)
 
 
 def holds_splats(path: Path) -> bool:
-    """Whether a file is to be read as one of splats, by its content or its ending.
+    """Whether to read a file as splats, by its content or its suffix.
 
-    A checkpoint is, where its tensors are splats; a mesh or a picture is, whose error says what it is.
+    True for a checkpoint with tensors of splats, and for a mesh or an image, so that the reader's error names
+    it.
     """
     try:
-        if path.is_dir() or (path.is_file() and detected_format(path) is not None):
+        if path.is_dir() or (path.is_file() and detect_format(path) is not None):
             return True
-        ending = ending_of(path)
+        ending = format_suffix(path)
         if ending == ".ckpt":
             return is_splatfacto(path)
-        return bool(ending) or (path.is_file() and other_kind(path) not in (None, ZIP_ARCHIVE))
+        return bool(ending) or (path.is_file() and describe_other_file(path) not in (None, ZIP_ARCHIVE))
     except OSError:
-        return bool(ending_of(path))
+        return bool(format_suffix(path))
 
 
-def files_of(path: Path) -> list[Path]:
-    """The files that splats are read from: of a folder all in it and below, of a .gltf its buffers too.
+def source_files(path: Path) -> list[Path]:
+    """Files that splats are read from: all files of a folder, and the buffers of a .gltf.
 
     Raises:
-        FieldError: a .gltf that cannot be read.
+        FieldError: an unreadable .gltf.
     """
     if path.is_dir():
         return sorted(file for file in path.rglob("*") if file.is_file())
-    if detected_format(path) not in (".gltf", ".glb"):
+    if detect_format(path) not in (".gltf", ".glb"):
         return [path]
     try:
         return [path, *GltfAsset(path).external_files()]
     except (ValueError, TypeError, KeyError, OSError):
-        return [path]  # the reader says what is wrong with it
+        return [path]  # the reader reports the problem
 
 
-def _opened_by_ending(path: Path, ending: str) -> SplatSource:
-    """The file as its ending says; its content has no magic number."""
+def _open_by_suffix(path: Path, ending: str) -> SplatSource:
+    """Open file of the format of its suffix; its content has no magic number."""
     if path.is_dir():
         raise FieldError(f"{path}: a folder without {META} or {LOD_META}; give a file of splats")
     if ending in (".splat", ".ckpt"):
         return _OPEN[ending](path)
-    kind = other_kind(path)
+    kind = describe_other_file(path)
     if kind in _MESHES:
         raise FieldError(f"{path}: {kind}: {MESH}")
     if kind in _CLOUDS:
         raise FieldError(f"{path}: {kind}, no splats; as a PLY, {POINT_CLOUD_CURE}")
     if ending and (kind is None or ending == ".ply"):
-        return _OPEN[ending](path)  # whose reader says what is wrong with it
+        return _OPEN[ending](path)  # the reader reports the problem
     of = f" ({kind})" if kind else ""
     raise FieldError(f"{path}: no format of splats that is known{of}; these are: {', '.join(READABLE)}")

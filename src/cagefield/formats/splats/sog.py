@@ -1,15 +1,15 @@
-"""PlayCanvas' SOG, versions 1 and 2: images of quantised values, one pixel a splat, in a folder or a zip.
+"""PlayCanvas' SOG, versions 1 and 2: images of quantized values, one pixel per splat, in a folder or a zip.
 
-meta.json names lossless WebP images and what their values mean:
+meta.json names lossless WebP images and the meaning of their values:
 
     means_l, means_u   low and high bytes of 16 bits between mins and maxs of sign(v) ln(1 + |v|)
     quats              the smallest three (c / 255 - .5) sqrt(2), and 252 + the index of the largest (w x y z)
-    scales, sh0        version 2: places in a codebook of 256 values; version 1: between mins and maxs. The
+    scales, sh0        version 2: indices into a codebook of 256 values; version 1: between mins and maxs. The
                        opacity is sh0's fourth channel: in [0, 1], or in version 1 a logit
     shN                labels (16 bits) into a palette of harmonics; centroid n has its K coefficients at
                        (n % 64) K .. of row n // 64, values as those of sh0, in one codebook
 
-Splats are sorted through space. Axes are PLY's.
+Splats are in Morton order, in PLY's axes.
 
 Source: the PlayCanvas manual, "The SOG Format"; playcanvas/splat-transform, read-sog.ts and read-sog-v1.ts.
 """
@@ -30,24 +30,24 @@ from PIL import Image
 from cagefield.errors import FieldError
 from cagefield.files import json_text
 from cagefield.files.safe_open import UnreadableError, check_regular, read_bytes
-from cagefield.formats.splats.axes import PLY
+from cagefield.formats.splats.axes import PLY_AXES
 from cagefield.formats.splats.detection import META
-from cagefield.formats.splats.splat_table import BATCH, SplatBatch, SplatSource
+from cagefield.formats.splats.splat_table import BATCH_SPLATS, SplatBatch, SplatSource
 from cagefield.images.image_files import check_pixels
 from cagefield.typing import AnyArray
 
-PALETTE_WIDTH = 64
-"""Centroids side by side."""
+PALETTE_WIDTH_CENTROIDS = 64
+"""Number of centroids per row of the palette."""
 
-_MOST_META = 1 << 24
-_MOST_IMAGE = 1 << 30
-"""Bytes of an image's file, which is read whole."""
+_MAX_META_BYTES = 1 << 24
+_MAX_IMAGE_BYTES = 1 << 30
+"""Maximum size of an image file, which is read whole."""
 
-_DENSEST, _ALWAYS = 4, 1 << 16
-"""Splats for each byte of the images, at most: honest files take 8 bytes or more for each."""
+_MAX_SPLATS_PER_BYTE, _MIN_SPLAT_LIMIT = 4, 1 << 16
+"""Maximum number of splats per image byte, beyond 65,536 splats; real files need 8 bytes per splat."""
 
-_MOST_CENTROIDS = (1 << 16) * 24
-"""Pixels of a palette: labels have 16 bits, a centroid at most 24 harmonics above degree 0."""
+_MAX_PALETTE_PIXELS = (1 << 16) * 24
+"""Maximum number of palette pixels: labels have 16 bits, a centroid at most 24 harmonics above degree 0."""
 
 _DEGREES = {3: 1, 8: 2, 15: 3, 24: 4}  # harmonics above degree 0 -> degree
 
@@ -55,10 +55,10 @@ Images = Callable[[str], bytes]
 
 
 def open_sog(path: Path) -> SplatSource:
-    """The splats of a .sog file, of a folder with meta.json, or of that meta.json.
+    """Open SOG: a .sog file, a folder with meta.json, or that meta.json.
 
     Raises:
-        FieldError: files that are missing, damaged, or do not fit each other.
+        FieldError: missing, damaged or inconsistent files.
     """
     if path.is_dir() or path.suffix.lower() == ".json":
         folder, meta = (path, META) if path.is_dir() else (path.parent, path.name)
@@ -75,8 +75,8 @@ def open_sog(path: Path) -> SplatSource:
 
         def from_zip(name: str) -> bytes:
             info = archive.getinfo(held[name])
-            # Images do not get smaller in a zip; meta.json does.
-            if info.file_size > min(_MOST_IMAGE, _MOST_META + 4 * info.compress_size):
+            # Images do not compress in a zip; meta.json does.
+            if info.file_size > min(_MAX_IMAGE_BYTES, _MAX_META_BYTES + 4 * info.compress_size):
                 raise ValueError(f"{name} is much larger than it should be")
             return archive.read(info)
 
@@ -87,7 +87,7 @@ def _from_folder(folder: Path, name: str) -> bytes:
     if PurePosixPath(name).name != name:
         raise ValueError(f"{name} lies in another folder")
     try:
-        return read_bytes(folder / name, _MOST_IMAGE)
+        return read_bytes(folder / name, _MAX_IMAGE_BYTES)
     except FileNotFoundError:
         raise ValueError(f"it has no {name}") from None
 
@@ -127,7 +127,7 @@ def _source(path: Path, meta: dict[str, Any], content: Images) -> SplatSource:
         raise ValueError(f"it says that it holds {count} splats")
     means = meta["means"]["files"]
     size = sum(len(content(name)) for name in means)
-    if count > max(_ALWAYS, _DENSEST * size):
+    if count > max(_MIN_SPLAT_LIMIT, _MAX_SPLATS_PER_BYTE * size):
         raise ValueError(f"it says that it holds {count} splats, their places have {size} bytes")
 
     def image(name: str, channels: int) -> NDArray[np.uint8]:
@@ -138,34 +138,36 @@ def _source(path: Path, meta: dict[str, Any], content: Images) -> SplatSource:
     scales = image(meta["scales"]["files"][0], 3)[:count]
     sh0 = image(meta["sh0"]["files"][0], 4)[:count]
     mins, maxs = (np.array(meta["means"][end], np.float64).reshape(3) for end in ("mins", "maxs"))
-    scale_of = _values(meta["scales"], old)
-    colour_of = _values(meta["sh0"], old, 3)
+    scale_of = _dequantizer(meta["scales"], old)
+    color_of = _dequantizer(meta["sh0"], old, 3)
     palette, labels = _palette(meta["shN"], content, count, old) if meta.get("shN") else (None, None)
     degree = 0 if palette is None else _DEGREES[palette.shape[1]]
 
     def batches() -> Iterator[SplatBatch]:
-        for first in range(0, count, BATCH):
-            here = slice(first, first + BATCH)
+        for first in range(0, count, BATCH_SPLATS):
+            here = slice(first, first + BATCH_SPLATS)
             share = (low[here] + 256.0 * high[here]) / 65535.0
             coded = mins + (maxs - mins) * share
             alpha = sh0[here, 3] / 255.0
             if old:
                 ends = [float(meta["sh0"][end][3]) for end in ("mins", "maxs")]
                 alpha = 1.0 / (1.0 + np.exp(-(ends[0] + (ends[1] - ends[0]) * alpha)))
-            dc = colour_of(sh0[here, :3])[:, None]
+            dc = color_of(sh0[here, :3])[:, None]
             rest = [] if palette is None or labels is None else [palette[labels[here]]]
             with np.errstate(over="ignore"):
                 means = np.sign(coded) * np.expm1(np.abs(coded))
             yield SplatBatch(
-                means, scale_of(scales[here]), _smallest_three(quats[here]), alpha,
+                means, scale_of(scales[here]), _decode_smallest_three(quats[here]), alpha,
                 np.concatenate([dc, *rest], axis=1),
             )  # fmt: skip
 
-    return SplatSource(path, count, degree, PLY, batches, bool(meta.get("antialias", False)))
+    return SplatSource(path, count, degree, PLY_AXES, batches, bool(meta.get("antialias", False)))
 
 
-def _values(part: dict[str, Any], old: bool, channels: int = 3) -> Callable[[NDArray[np.uint8]], AnyArray]:
-    """What the bytes [n,channels] of an image mean."""
+def _dequantizer(
+    part: dict[str, Any], old: bool, channels: int = 3
+) -> Callable[[NDArray[np.uint8]], AnyArray]:
+    """Function from an image's bytes [n,channels] to values."""
     if not old:
         codebook = np.array(part["codebook"], np.float64).reshape(256)
         return lambda values: codebook[values]
@@ -181,12 +183,14 @@ def _palette(
     centroids, labels = part["files"]
     bytes_of = _pixels(content(labels), labels, 2, count)[:count].astype(np.int64)
     label = bytes_of[:, 0] + 256 * bytes_of[:, 1]
-    pixels = _pixels(content(centroids), centroids, -3, 1, _MOST_CENTROIDS)
+    pixels = _pixels(content(centroids), centroids, -3, 1, _MAX_PALETTE_PIXELS)
     height, width = pixels.shape[:2]
-    above = width // PALETTE_WIDTH
-    if above not in _DEGREES or width % PALETTE_WIDTH:
+    above = width // PALETTE_WIDTH_CENTROIDS
+    if above not in _DEGREES or width % PALETTE_WIDTH_CENTROIDS:
         raise ValueError(f"{centroids} is {width} pixels wide")
-    palette = _values(part, old)(pixels.reshape(-1, 3)).reshape(height * PALETTE_WIDTH, above, 3)
+    palette = _dequantizer(part, old)(pixels.reshape(-1, 3)).reshape(
+        height * PALETTE_WIDTH_CENTROIDS, above, 3
+    )
     if label.max() >= len(palette):
         raise ValueError(f"{labels} names a centroid that is not there")
     return palette.astype(np.float32), label
@@ -195,7 +199,7 @@ def _palette(
 def _pixels(
     content: bytes, name: str, channels: int, least: int, most: int | None = None
 ) -> NDArray[np.uint8]:
-    """The pixels [n,channels] of an image of at least so many; [height,width,3] where channels is -3."""
+    """Pixels [n,channels] of an image with at least `least` pixels; [height,width,3] for channels -3."""
     most = 2 * least + (1 << 16) if most is None else most
     with Image.open(io.BytesIO(content)) as image:
         check_pixels(image)
@@ -210,7 +214,7 @@ def _pixels(
     return pixels[:, :, :3] if channels == -3 else pixels.reshape(size, -1)[:, :channels]
 
 
-def _smallest_three(pixels: NDArray[np.uint8]) -> AnyArray:
+def _decode_smallest_three(pixels: NDArray[np.uint8]) -> AnyArray:
     """Quaternions [n,4] (w x y z) of pixels [n,4]."""
     others = (pixels[:, :3] / 255.0 - 0.5) * np.sqrt(2.0)
     largest = np.clip(pixels[:, 3].astype(np.int64) - 252, 0, 3)

@@ -1,8 +1,8 @@
-"""PlayCanvas' streamed SOG: a tree of levels of detail over several SOG files; the finest level is read.
+"""Finest level of PlayCanvas' streamed SOG: a tree of levels of detail over several SOG files.
 
-lod-meta.json: `filenames`, each a meta.json in a folder of its own or a .sog; `tree`, whose nodes have
-`children`, or `lods`, an object that gives for each level (0 is the finest) the rows {file, offset, count} of
-a leaf; `environment`, a SOG of the surroundings, or null.
+lod-meta.json: `filenames`, each a meta.json in its own folder or a .sog; `tree`, whose nodes have
+`children`, or `lods`, the rows {file, offset, count} of a leaf by level (0 is the finest); `environment`, a
+SOG of the surroundings, or null.
 
 Source: playcanvas/splat-transform, src/lib/writers/write-lod.ts.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from cagefield.errors import FieldError
 from cagefield.files import json_text
 from cagefield.files.safe_open import UnreadableError, read_text, real_path
-from cagefield.formats.splats.axes import PLY
+from cagefield.formats.splats.axes import PLY_AXES
 from cagefield.formats.splats.detection import LOD_META, META
 from cagefield.formats.splats.sog import open_sog
 from cagefield.formats.splats.splat_table import SplatBatch, SplatSource
@@ -32,7 +32,7 @@ _MAX_SPLATS = 1 << 31
 
 @dataclass(frozen=True, eq=False)
 class _File:
-    """A SOG file and the rows of it that are read, as half-open ranges in ascending order."""
+    """SOG file, and its rows to read as ascending half-open ranges."""
 
     path: Path
     ranges: tuple[tuple[int, int], ...]
@@ -43,10 +43,10 @@ class _File:
 
 
 def open_sog_lod(path: Path) -> SplatSource:
-    """The splats of the finest level of a streamed SOG, of its folder or of its lod-meta.json.
+    """Open finest level of a streamed SOG, from its folder or its lod-meta.json.
 
     Raises:
-        FieldError: files that are missing, damaged, or do not fit each other.
+        FieldError: missing, damaged or inconsistent files.
     """
     folder = path if path.is_dir() else path.parent
     meta = folder / LOD_META if path.is_dir() else path
@@ -95,15 +95,15 @@ def _source(path: Path, folder: Path, meta: dict[str, Any]) -> SplatSource:
         for file in files:
             yield from _rows(file, degree)
 
-    return SplatSource(path, count, degree, PLY, batches, antialiased)
+    return SplatSource(path, count, degree, PLY_AXES, batches, antialiased)
 
 
 def _finest(tree: dict[str, Any]) -> tuple[dict[int, list[tuple[int, int]]], int]:
-    """(ranges of rows of the finest level by the number of their file, number of rows of other levels)."""
-    ranges, coarser, waiting = dict[int, list[tuple[int, int]]](), 0, [tree]
-    while waiting:
-        node = waiting.pop()
-        waiting.extend(node.get("children") or [])
+    """(row ranges of the finest level by file index, number of rows of other levels)."""
+    ranges, coarser, pending = dict[int, list[tuple[int, int]]](), 0, [tree]
+    while pending:
+        node = pending.pop()
+        pending.extend(node.get("children") or [])
         lods = {int(level): part for level, part in (node.get("lods") or {}).items()}
         for level, part in lods.items():
             number, offset, count = (int(part[name]) for name in ("file", "offset", "count"))
@@ -125,7 +125,7 @@ def _disjoint(ranges: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
 
 
 def _inside(folder: Path, name: Any) -> Path:
-    """The file of a relative name, in the folder or below it."""
+    """File of a relative name, within the folder."""
     if not isinstance(name, str):
         raise ValueError(f"{name!r:.60} is no name of a file")
     path = real_path(folder / name.replace("\\", "/"))
@@ -139,14 +139,14 @@ def _inside(folder: Path, name: Any) -> Path:
 
 
 def _rows(file: _File, degree: int) -> Iterator[SplatBatch]:
-    """The rows of a file's ranges, with harmonics up to a degree."""
+    """Batches of a file's ranges, with harmonics up to a degree."""
     at = 0
     for batch in open_sog(file.path).batches():
         keep = np.zeros(len(batch), np.bool_)
         for first, last in file.ranges:
             keep[max(first - at, 0) : max(last - at, 0)] = True
         at += len(batch)
-        yield (batch if keep.all() else batch.take(keep)).padded(degree)
+        yield (batch if keep.all() else batch.take(keep)).pad_harmonics(degree)
 
 
 def _damaged(path: Path, why: str) -> FieldError:

@@ -1,4 +1,4 @@
-"""Splats read from files, written to them and converted: one way for all formats of `splat_opening`."""
+"""Reading, writing and conversion of splat files in all formats of `open_splats`."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from cagefield.fields import sh as spherical_harmonics
 from cagefield.fields.splat_field import NO_OFFSET, Offset, SplatField
 from cagefield.files.memory import lacking_memory
 from cagefield.formats.splats.antimatter15_splat import write_splat_rows
-from cagefield.formats.splats.axes import PLY, Axes, signs, with_axes
+from cagefield.formats.splats.axes import PLY_AXES, Axes, axis_signs, convert_axes
 from cagefield.formats.splats.compressed_ply import write_compressed_ply
 from cagefield.formats.splats.gltf import GLTF_AXES
 from cagefield.formats.splats.gltf_writer import write_splat_gltf
-from cagefield.formats.splats.open_splats import ending_of, open_splats
+from cagefield.formats.splats.open_splats import format_suffix, open_splats
 from cagefield.formats.splats.sog_writer import write_sog
 from cagefield.formats.splats.splat_ply import write_splat_ply
 from cagefield.formats.splats.splat_table import (
-    VISIBLE,
+    MIN_VISIBLE_OPACITY,
     FieldTable,
     OnProgress,
     SplatBatch,
     SplatSource,
     SplatTable,
-    cleaned,
-    spooled,
+    drop_invalid,
+    spool_splats,
 )
 from cagefield.formats.splats.spz import SPZ_AXES
 from cagefield.formats.splats.spz_writer import Version as SpzVersion
@@ -41,41 +41,40 @@ from cagefield.formats.splats.spz_writer import write_spz
 WRITABLE = (".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb")
 
 _WRITE: dict[str, tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]] = {
-    ".ply": (write_splat_ply, PLY),
-    ".compressed.ply": (write_compressed_ply, PLY),
+    ".ply": (write_splat_ply, PLY_AXES),
+    ".compressed.ply": (write_compressed_ply, PLY_AXES),
     ".spz": (write_spz, SPZ_AXES),
-    ".sog": (write_sog, PLY),
-    ".splat": (write_splat_rows, PLY),
+    ".sog": (write_sog, PLY_AXES),
+    ".splat": (write_splat_rows, PLY_AXES),
     ".glb": (write_splat_gltf, GLTF_AXES),
 }
 
-_HOLD_OFFSET = (".ply", ".glb")
-"""Formats whose coordinates are double, or have a translation that is."""
+_OFFSET_SUFFIXES = (".ply", ".glb")
+"""Formats with coordinates or a translation in double precision."""
 
-MAX_ROUNDING = 0.01
-"""Rounding of coordinates to float32, in sizes of the splats, that is let be."""
+MAX_ROUNDING_SIZES = 0.01
+"""Maximum rounding of coordinates to float32 without an offset, in splat sizes."""
 
-_MOST_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
-"""Degree of the harmonics that a format can hold, where it is less than what a field can."""
+_MAX_SH_DEGREE = {".compressed.ply": 3, ".sog": 3, ".glb": 3, ".splat": 0}
+"""Maximum degree of the harmonics of formats that hold less than a field."""
 
 
 def read_splats(
     path: str | Path, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
 ) -> SplatField:
-    """The splats of a file, in PLY's axes (x right, y down, z forwards).
+    """SplatField of a splat file, in PLY's axes (x right, y down, z forward).
 
-    `axes` are those that the file is in, where it is wrong or silent about them. Splats with a value that is
-    no number are left out with one warning.
+    `axes` replaces the axes that the file or its format states. Splats with non-finite values are left out,
+    with one warning.
 
     Raises:
-        FieldError: no such file, a format that is not known, a file that is damaged or holds no splat that is
-            visible.
+        FieldError: missing file, unknown format, or a damaged file or one without visible splats.
     """
-    return read_opened(open_fitting(Path(path)), axes, on_progress)
+    return read_source(open_within_memory(Path(path)), axes, on_progress)
 
 
-def open_fitting(path: Path) -> SplatSource:
-    """The open file of splats. Raises FieldError as `open_splats`, and for more than memory can hold."""
+def open_within_memory(path: Path) -> SplatSource:
+    """Open splat file. Raises FieldError as `open_splats`, and for splats that exceed the memory."""
     source = open_splats(path)
     needed = 4 * source.count * sum(map(math.prod, _shapes(source)))
     if (lacking := lacking_memory(needed)) is not None:
@@ -84,20 +83,20 @@ def open_fitting(path: Path) -> SplatSource:
 
 
 def _shapes(source: SplatSource) -> tuple[tuple[int, ...], ...]:
-    """The shapes of a splat's values."""
+    """Shapes of a splat's values."""
     degree = min(source.sh_degree, spherical_harmonics.MAX_DEGREE)
     return ((3,), (3,), (4,), (), ((degree + 1) ** 2, 3))
 
 
-def read_opened(
+def read_source(
     source: SplatSource, axes: Axes | None = None, on_progress: OnProgress = lambda _: None
 ) -> SplatField:
-    """The splats of an open file, as `read_splats` has them. Raises FieldError where none is visible."""
+    """SplatField of an open file, as `read_splats`. Raises FieldError where no splat is visible."""
     count = source.count
-    found = _with_visible(source)  # before memory is taken for all of them
+    opened = _check_visible(source)  # before the allocation of all arrays
     arrays = [np.empty((count, *shape), np.float32) for shape in _shapes(source)]
     done = 0
-    offset, shifted = _near_origin(source, _batches(source, found, axes))
+    offset, shifted = _shift_to_origin(source, _prepare_batches(source, opened, axes))
     for batch in shifted:
         parts = (batch.means, batch.log_scales, batch.quaternions, batch.opacities, batch.sh)
         for array, part in zip(arrays, parts, strict=True):
@@ -105,7 +104,7 @@ def read_opened(
         done += len(batch)
         on_progress(done / count)
     for array in arrays:
-        array.setflags(write=False)  # a field copies what may be written to
+        array.setflags(write=False)  # a field copies writable arrays
     means, log_scales, quaternions, opacities, sh = (array[:done] for array in arrays)
     return SplatField(
         means,
@@ -126,12 +125,12 @@ def write_splats(
     on_progress: OnProgress = lambda _: None,
     spz_version: SpzVersion | None = None,
 ) -> None:
-    """Writes the splats of a field in PLY's axes as the format of the path's ending, whole or not at all.
+    """Write a field's splats, in PLY's axes, in the format of the path's suffix, whole or not at all.
 
-    `axes` are those to write in place of the format's own; `spz_version` that of an .spz file, else 3.
+    `axes` replaces the format's axes; `spz_version` is the version of a .spz file, else 3.
 
     Raises:
-        FieldError: a format that cannot be written, a version for another format, a field without splats.
+        FieldError: a format without writer, a version for another format, or a field without splats.
     """
     if not len(field):
         raise FieldError(f"{path}: there are no splats to write")
@@ -147,31 +146,32 @@ def convert_splats(
     on_progress: OnProgress = lambda _: None,
     spz_version: SpzVersion | None = None,
 ) -> tuple[int, int]:
-    """(number of splats, degree of their harmonics) that went from one file into another, by a temporary one.
+    """(number of splats, SH degree) converted from one file to another.
 
-    Memory does not grow with their number, but for a byte or two each in images and codes.
+    Splats pass through a temporary file: memory does not grow with their number, but for a byte or two each
+    in images and codes.
 
     Raises:
         FieldError: as `read_splats` and `write_splats`.
     """
-    writer_of(Path(target), spz_version)
-    found = open_splats(Path(source))
-    degree = min(found.sh_degree, spherical_harmonics.MAX_DEGREE)
-    offset, batches = _near_origin(found, _batches(found, found.batches(), axes))
-    with spooled(found, batches, degree, lambda share: on_progress(0.4 * share), offset) as table:
+    find_writer(Path(target), spz_version)
+    opened = open_splats(Path(source))
+    degree = min(opened.sh_degree, spherical_harmonics.MAX_DEGREE)
+    offset, batches = _shift_to_origin(opened, _prepare_batches(opened, opened.batches(), axes))
+    with spool_splats(opened, batches, degree, lambda share: on_progress(0.4 * share), offset) as table:
         rest: OnProgress = lambda share: on_progress(0.4 + 0.6 * share)  # noqa: E731
         return table.count, _write(table, Path(target), target_axes, rest, spz_version)
 
 
-def writer_of(
+def find_writer(
     path: Path, spz_version: SpzVersion | None = None
 ) -> tuple[Callable[[Path, SplatTable, OnProgress], None], Axes]:
-    """(what writes the format of a path's ending, its axes).
+    """(writer of the format of a path's suffix, its axes).
 
     Raises:
-        FieldError: a format that is not written, or a version of .spz for another one.
+        FieldError: a format without writer, or a .spz version for another format.
     """
-    ending = ending_of(path)
+    ending = format_suffix(path)
     if ending not in _WRITE:
         raise FieldError(f"{path}: no format of splats that is written; these are: {', '.join(WRITABLE)}")
     if spz_version is None:
@@ -181,43 +181,48 @@ def writer_of(
     return partial(write_spz, version=spz_version), SPZ_AXES
 
 
-def _with_visible(source: SplatSource) -> Iterator[SplatBatch]:
-    """A file's batches, which are gone through once more where the first holds nothing that is visible.
+def _check_visible(source: SplatSource) -> Iterator[SplatBatch]:
+    """Batches of a file with a visible splat; rereads the file where the first batch has none.
 
     Raises:
-        FieldError: none does.
+        FieldError: no batch has a visible splat.
     """
     batches = source.batches()
     first = next(batches, None)
-    if first is not None and not _transparent(first):
+    if first is not None and not _is_transparent(first):
         return itertools.chain((first,), batches)
-    if first is not None and all(map(_transparent, batches)):
+    if first is not None and all(map(_is_transparent, batches)):
         raise FieldError(f"{source.path}: the file holds no splat that is visible; export it again")
     return source.batches()
 
 
-def _transparent(batch: SplatBatch) -> bool:
-    return bool((batch.opacities < VISIBLE).all())
+def _is_transparent(batch: SplatBatch) -> bool:
+    return bool((batch.opacities < MIN_VISIBLE_OPACITY).all())
 
 
-def _batches(source: SplatSource, batches: Iterator[SplatBatch], axes: Axes | None) -> Iterator[SplatBatch]:
-    """The splats that can be shown, in PLY's axes, with harmonics of a degree that a field may have."""
-    most = spherical_harmonics.MAX_DEGREE
-    if source.sh_degree > most:
+def _prepare_batches(
+    source: SplatSource, batches: Iterator[SplatBatch], axes: Axes | None
+) -> Iterator[SplatBatch]:
+    """Valid splats in PLY's axes, with harmonics up to a field's maximum degree."""
+    max_degree = spherical_harmonics.MAX_DEGREE
+    if source.sh_degree > max_degree:
         warnings.warn(
-            f"{source.path}: its harmonics have degree {source.sh_degree}; those above {most} are left out",
+            f"{source.path}: its harmonics have degree {source.sh_degree}; "
+            f"those above {max_degree} are left out",
             stacklevel=3,
         )
-    kept = (min(source.sh_degree, most) + 1) ** 2
-    for batch in cleaned(source, batches):
-        cut = dataclasses.replace(batch, sh=batch.sh[:, :kept])
-        yield with_axes(cut, axes or source.axes, PLY)
+    coefficients = (min(source.sh_degree, max_degree) + 1) ** 2
+    for batch in drop_invalid(source, batches):
+        cut = dataclasses.replace(batch, sh=batch.sh[:, :coefficients])
+        yield convert_axes(cut, axes or source.axes, PLY_AXES)
 
 
-def _near_origin(source: SplatSource, batches: Iterator[SplatBatch]) -> tuple[Offset, Iterator[SplatBatch]]:
-    """(offset, the splats less it): none, unless float32 would round coordinates that are doubles too much.
+def _shift_to_origin(
+    source: SplatSource, batches: Iterator[SplatBatch]
+) -> tuple[Offset, Iterator[SplatBatch]]:
+    """(offset, batches less the offset); a zero offset unless float32 rounds doubles too much.
 
-    Too much is MAX_ROUNDING of the size of most splats, in the first batch.
+    The limit is MAX_ROUNDING_SIZES times the median splat size of the first batch.
     """
     first = next(batches, None)
     if first is None or not source.is_double or not len(first):
@@ -226,11 +231,12 @@ def _near_origin(source: SplatSource, batches: Iterator[SplatBatch]) -> tuple[Of
     rounding = np.quantile(np.abs(means - means.astype(np.float32)).max(axis=1), 0.99)
     size = np.exp(np.median(np.median(first.log_scales, axis=1)))
     middle = np.round(np.median(means, axis=0)) + 0.0
-    if rounding <= MAX_ROUNDING * size or not middle.any():
+    if rounding <= MAX_ROUNDING_SIZES * size or not middle.any():
         return NO_OFFSET, itertools.chain((first,), batches)
     x, y, z = middle.tolist()
     warnings.warn(
-        f"{source.path}: its coordinates are far from the origin; {_shown((x, y, z))} is taken off, kept, "
+        f"{source.path}: its coordinates are far from the origin; "
+        f"{_format_offset((x, y, z))} is taken off, kept, "
         "and added where a .ply or .glb is exported",
         stacklevel=3,
     )
@@ -240,7 +246,7 @@ def _near_origin(source: SplatSource, batches: Iterator[SplatBatch]) -> tuple[Of
     return (x, y, z), shifted
 
 
-def _shown(offset: Offset) -> str:
+def _format_offset(offset: Offset) -> str:
     return "(" + ", ".join(f"{value:.15g}" for value in offset) + ")"
 
 
@@ -251,32 +257,33 @@ def _write(
     on_progress: OnProgress,
     spz_version: SpzVersion | None,
 ) -> int:
-    """Writes the splats; the degree of the harmonics that the format could hold."""
-    write, own = writer_of(path, spz_version)
-    degree = min(table.sh_degree, _MOST_DEGREE.get(ending_of(path), table.sh_degree))
+    """Write the splats; returns the degree of the written harmonics."""
+    write, format_axes = find_writer(path, spz_version)
+    degree = min(table.sh_degree, _MAX_SH_DEGREE.get(format_suffix(path), table.sh_degree))
     if degree < table.sh_degree:
         warnings.warn(
-            f"{path}: {ending_of(path)} holds harmonics of degree {degree} at most; those above are left out",
+            f"{path}: {format_suffix(path)} holds harmonics of degree {degree} at most; "
+            f"those above are left out",
             stacklevel=3,
         )
-    if table.discs and not ending_of(path).endswith(".ply"):
+    if table.discs and not format_suffix(path).endswith(".ply"):
         warnings.warn(
-            f"{path}: {ending_of(path)} cannot say that splats are discs (2DGS): they are written flat",
+            f"{path}: {format_suffix(path)} cannot say that splats are discs (2DGS): they are written flat",
             stacklevel=3,
         )
-    if any(table.offset) and ending_of(path) not in _HOLD_OFFSET:
+    if any(table.offset) and format_suffix(path) not in _OFFSET_SUFFIXES:
         warnings.warn(
-            f"{path}: {ending_of(path)} holds coordinates as float32: they are without the offset "
-            f"{_shown(table.offset)}, in PLY's axes; .ply and .glb have it",
+            f"{path}: {format_suffix(path)} holds coordinates as float32: they are without the offset "
+            f"{_format_offset(table.offset)}, in PLY's axes; .ply and .glb have it",
             stacklevel=3,
         )
-    write(path, _Written(table, axes or own, degree), on_progress)
+    write(path, _ConvertedTable(table, axes or format_axes, degree), on_progress)
     return degree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Written:
-    """A table in a format's axes, with harmonics of the degree that it holds."""
+class _ConvertedTable:
+    """Table in a format's axes, with harmonics of the format's degree."""
 
     table: SplatTable
     axes: str
@@ -296,7 +303,7 @@ class _Written:
 
     @property
     def offset(self) -> Offset:
-        x, y, z = (signs(PLY, self.axes) * np.array(self.table.offset) + 0.0).tolist()
+        x, y, z = (axis_signs(PLY_AXES, self.axes) * np.array(self.table.offset) + 0.0).tolist()
         return x, y, z
 
     def batches(self) -> Iterator[SplatBatch]:
@@ -306,5 +313,5 @@ class _Written:
         return (self._of(batch) for batch in self.table.sorted_batches())
 
     def _of(self, batch: SplatBatch) -> SplatBatch:
-        kept = dataclasses.replace(batch, sh=batch.sh[:, : (self.sh_degree + 1) ** 2])
-        return with_axes(kept, PLY, self.axes)
+        coefficients = dataclasses.replace(batch, sh=batch.sh[:, : (self.sh_degree + 1) ** 2])
+        return convert_axes(coefficients, PLY_AXES, self.axes)

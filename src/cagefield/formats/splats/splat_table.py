@@ -1,7 +1,7 @@
-"""Splats of a file in batches: what readers hand out and writers take, without holding all of them.
+"""Batches of splats between readers and writers, so that a file never has to fit in memory.
 
 Units and axes of a table are those of 3DGS' PLY: log scales, quaternions (w, x, y, z), opacities in [0, 1],
-harmonics [n, (degree+1)^2, 3], x right, y down, z forwards (see `splat_axes`).
+harmonics [n, (degree+1)^2, 3], x right, y down, z forward (see `axes`).
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from cagefield.files.temporary_folders import TemporaryFolder
 from cagefield.formats.splats.morton import morton_codes
 from cagefield.typing import AnyArray, Float32
 
-BATCH = 1 << 18
-"""Splats that are held at a time."""
+BATCH_SPLATS = 1 << 18
+"""Number of splats per batch."""
 
-VISIBLE = 0.02
-"""Splats less opaque say nothing about where things are; a scene of nothing else is refused."""
+MIN_VISIBLE_OPACITY = 0.02
+"""Minimum opacity of a visible splat; files without visible splats are refused."""
 
-LEAST_LOG_SCALE, MOST_LOG_SCALE = -30.0, 30.0
-"""Logarithms of scales outside are cut, or, above, make the splat one that cannot be shown."""
+MIN_LOG_SCALE, MAX_LOG_SCALE = -30.0, 30.0
+"""Limits of log scales: smaller ones are clamped, splats with larger ones are invalid."""
 
 OnProgress = Callable[[float], None]
-_SHAPE = 11
-"""Numbers of a splat beside its harmonics."""
+_SHAPE_FLOATS = 11
+"""Floats of a splat beside its harmonics."""
 
 
 @dataclass(frozen=True, eq=False)
 class SplatBatch:
-    """Some splats: means [n,3], log scales [n,3], quaternions [n,4], opacities [n], sh [n,K,3]."""
+    """Batch of splats: means [n,3], log scales [n,3], quaternions [n,4], opacities [n], sh [n,K,3]."""
 
     means: AnyArray
     log_scales: AnyArray
@@ -49,8 +49,8 @@ class SplatBatch:
     def __len__(self) -> int:
         return len(self.means)
 
-    def rows(self) -> Float32:
-        """The splats as rows [n, 11 + 3K]."""
+    def to_rows(self) -> Float32:
+        """Splats as rows [n, 11 + 3K]."""
         parts = (self.means, self.log_scales, self.quaternions, self.opacities[:, None])
         return np.concatenate(
             [*(part.astype(np.float32) for part in parts), self.sh.reshape(len(self), -1)],
@@ -59,28 +59,27 @@ class SplatBatch:
         )
 
     @classmethod
-    def of_rows(cls, rows: Float32) -> SplatBatch:
-        """The splats of rows [n, 11 + 3K]."""
-        sh = rows[:, _SHAPE:].reshape(len(rows), -1, 3)
+    def from_rows(cls, rows: Float32) -> SplatBatch:
+        """Splats of rows [n, 11 + 3K]."""
+        sh = rows[:, _SHAPE_FLOATS:].reshape(len(rows), -1, 3)
         return cls(rows[:, :3], rows[:, 3:6], rows[:, 6:10], rows[:, 10], sh)
 
     def take(self, index: AnyArray | slice) -> SplatBatch:
-        """Those of an index or a mask."""
+        """Splats of an index or a mask."""
         return SplatBatch(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
-    def padded(self, sh_degree: int) -> SplatBatch:
-        """The splats with harmonics up to a degree, those that they lack 0."""
+    def pad_harmonics(self, sh_degree: int) -> SplatBatch:
+        """Splats with harmonics up to a degree, padded with 0."""
         lacking = (sh_degree + 1) ** 2 - self.sh.shape[1]
         return replace(self, sh=np.pad(self.sh, ((0, 0), (0, lacking), (0, 0)))) if lacking else self
 
 
 @dataclass(frozen=True)
 class SplatSource:
-    """An open file of splats: `batches` hands them out from the first on, each time it is called.
+    """Open splat file; each call of `batches` iterates over its splats from the start.
 
-    `axes` are the file's own where it says so, or those its format prescribes. `end` is the first byte that
-    is not read any more, None where the file does not say. `is_double`: coordinates have more digits than
-    float32 holds.
+    `axes` are stated by the file or prescribed by its format. `end` is the offset of the first unread byte,
+    None where unknown. `is_double`: coordinates exceed the precision of float32.
     """
 
     path: Path
@@ -95,7 +94,7 @@ class SplatSource:
 
 
 class SplatTable(Protocol):
-    """Splats that a writer may go through again and again."""
+    """Splats that a writer may iterate over repeatedly."""
 
     @property
     def count(self) -> int: ...
@@ -107,18 +106,18 @@ class SplatTable(Protocol):
     def discs(self) -> bool: ...
     @property
     def offset(self) -> Offset:
-        """Coordinates of the file that the splats are from, less those of `batches`."""
+        """Difference between the source file's coordinates and those of `batches`."""
 
     def batches(self) -> Iterator[SplatBatch]:
-        """The splats in their order."""
+        """Batches in the stored order."""
 
     def sorted_batches(self) -> Iterator[SplatBatch]:
-        """The splats along a curve through space (Morton's): neighbours have similar values."""
+        """Batches in Morton order, in which neighbors have similar values."""
 
 
 @dataclass(frozen=True, eq=False)
 class FieldTable:
-    """A field's splats."""
+    """Splats of a field."""
 
     field: SplatField
 
@@ -152,13 +151,13 @@ class FieldTable:
     def _in_order(self, order: NDArray[np.int64] | None) -> Iterator[SplatBatch]:
         f = self.field
         whole = SplatBatch(f.means, f.log_scales, f.quaternions, f.opacities, f.sh)
-        for first in range(0, self.count, BATCH):
-            here = slice(first, first + BATCH)
-            yield whole.take(here if order is None else order[here])
+        for first in range(0, self.count, BATCH_SPLATS):
+            rows_of_batch = slice(first, first + BATCH_SPLATS)
+            yield whole.take(rows_of_batch if order is None else order[rows_of_batch])
 
 
 class Spool:
-    """Splats in a temporary file, row by row: memory does not grow with them."""
+    """Splats in a temporary file, row by row, so that memory does not grow with their number."""
 
     def __init__(
         self, folder: Path, sh_degree: int, antialiased: bool, discs: bool = False, offset: Offset = NO_OFFSET
@@ -167,27 +166,27 @@ class Spool:
         self.offset = offset
         self.count = 0
         self._folder, self._path = folder, folder / "splats"
-        self._width = _SHAPE + 3 * (sh_degree + 1) ** 2
+        self._width = _SHAPE_FLOATS + 3 * (sh_degree + 1) ** 2
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self._out = self._path.open("wb")
 
     def append(self, batch: SplatBatch) -> None:
-        """Some splats more."""
+        """Append a batch."""
         if len(batch):
-            self._out.write(batch.rows().tobytes())
+            self._out.write(batch.to_rows().tobytes())
             self.count += len(batch)
             self._low = np.minimum(self._low, batch.means.min(axis=0))
             self._high = np.maximum(self._high, batch.means.max(axis=0))
 
     def batches(self) -> Iterator[SplatBatch]:
         self._out.flush()
-        return (SplatBatch.of_rows(rows) for rows in self._rows(self._path))
+        return (SplatBatch.from_rows(rows) for rows in self._rows(self._path))
 
     def sorted_batches(self) -> Iterator[SplatBatch]:
-        """Sorted in two passes: into files of about BATCH splats by their place, then each by itself."""
+        """Batches in Morton order: partitioned into files of about BATCH_SPLATS splats, each then sorted."""
         self._out.flush()
         codes = np.concatenate([self._codes(rows) for rows in self._rows(self._path)])
-        parts = -(-self.count // BATCH)
+        parts = -(-self.count // BATCH_SPLATS)
         codes.sort()
         edges = codes[np.arange(1, parts) * self.count // parts]
         del codes
@@ -202,14 +201,14 @@ class Spool:
                 rows = np.frombuffer(file.read(), np.float32).reshape(-1, self._width)
                 file.truncate(0)
                 rows = rows[np.argsort(self._codes(rows), kind="stable")]
-                for first in range(0, len(rows), BATCH):
-                    yield SplatBatch.of_rows(rows[first : first + BATCH])
+                for first in range(0, len(rows), BATCH_SPLATS):
+                    yield SplatBatch.from_rows(rows[first : first + BATCH_SPLATS])
         finally:
             for file in files:
                 file.close()
 
     def close(self) -> None:
-        """Ends writing."""
+        """Close the file for writing."""
         self._out.close()
 
     def _codes(self, rows: Float32) -> NDArray[np.uint64]:
@@ -217,19 +216,19 @@ class Spool:
 
     def _rows(self, path: Path) -> Iterator[Float32]:
         with path.open("rb") as file:
-            while len(values := np.fromfile(file, np.float32, BATCH * self._width)):
+            while len(values := np.fromfile(file, np.float32, BATCH_SPLATS * self._width)):
                 yield values.reshape(-1, self._width)
 
 
 @contextmanager
-def spooled(
+def spool_splats(
     source: SplatSource,
     batches: Iterable[SplatBatch],
     sh_degree: int,
     on_progress: OnProgress,
     offset: Offset = NO_OFFSET,
 ) -> Iterator[Spool]:
-    """What a source's batches became in a temporary file, which is removed at the end."""
+    """Temporary file with the splats of the batches, removed at the end of the context."""
     with TemporaryFolder("splats") as folder:
         spool = Spool(folder, sh_degree, source.antialiased, source.discs, offset)
         try:
@@ -241,37 +240,38 @@ def spooled(
             spool.close()
 
 
-def cleaned(source: SplatSource, batches: Iterable[SplatBatch]) -> Iterator[SplatBatch]:
-    """The splats of a file that can be shown; others are left out with one warning.
+def drop_invalid(source: SplatSource, batches: Iterable[SplatBatch]) -> Iterator[SplatBatch]:
+    """Valid splats of a file's batches; a warning counts the others.
 
     Raises:
-        FieldError: none can be shown.
+        FieldError: no valid splat.
     """
-    bad = good = clipped = 0
+    invalid = valid = clipped = 0
     for batch in batches:
-        log_scales = np.maximum(batch.log_scales, LEAST_LOG_SCALE)
+        log_scales = np.maximum(batch.log_scales, MIN_LOG_SCALE)
         with np.errstate(over="ignore", invalid="ignore"):
             norm = np.linalg.norm(batch.quaternions.astype(np.float64), axis=1, keepdims=True)
-            # A rotation of length 0 is how some programs write "not turned".
+            # Some programs write the identity as a quaternion of length 0.
             quaternions = np.where(
                 norm > 0.0, batch.quaternions / np.maximum(norm, 1e-300), (1.0, 0.0, 0.0, 0.0)
             )
-            keep: NDArray[np.bool_] = np.asarray((log_scales <= MOST_LOG_SCALE).all(axis=1))
+            keep: NDArray[np.bool_] = np.asarray((log_scales <= MAX_LOG_SCALE).all(axis=1))
             for values in (batch.means, log_scales, quaternions, batch.opacities, batch.sh):
                 finite = np.isfinite(values.astype(np.float32))
                 keep &= finite.all(axis=tuple(range(1, values.ndim)))
         opacities = np.clip(batch.opacities, 0.0, 1.0)
         clipped += int((keep & (opacities != batch.opacities)).sum())
-        shown = SplatBatch(batch.means, log_scales, quaternions, opacities, batch.sh)
-        bad, good = bad + int((~keep).sum()), good + int(keep.sum())
-        yield shown if keep.all() else shown.take(keep)
-    if not good:
+        cleaned_batch = SplatBatch(batch.means, log_scales, quaternions, opacities, batch.sh)
+        invalid, valid = invalid + int((~keep).sum()), valid + int(keep.sum())
+        yield cleaned_batch if keep.all() else cleaned_batch.take(keep)
+    if not valid:
         raise FieldError(f"{source.path}: it holds no splat that can be shown; export the file again")
-    if bad:
+    if invalid:
         warnings.warn(
-            f"{source.path}: {bad} of {bad + good} splats hold no numbers and are left out", stacklevel=2
+            f"{source.path}: {invalid} of {invalid + valid} splats hold no numbers and are left out",
+            stacklevel=2,
         )
     if clipped:
         warnings.warn(
-            f"{source.path}: {clipped} of {good} opacities lie outside [0, 1] and are clipped", stacklevel=2
+            f"{source.path}: {clipped} of {valid} opacities lie outside [0, 1] and are clipped", stacklevel=2
         )

@@ -1,19 +1,19 @@
-"""Niantic's SPZ, versions 1 to 4: one stream a quantity, quantised and compressed.
+"""Niantic's SPZ, versions 1 to 4: one quantized, compressed stream per quantity.
 
 Version 1 to 3: gzip of a header of 16 bytes (magic "NGSP", version, count, degree of the harmonics, bits of
-the fraction, flags, a reserved byte) and the streams one after the other. Version 4: a header of 32 bytes, a
-table of contents, and one Zstandard frame a stream. Streams:
+the fraction, flags, a reserved byte) and the concatenated streams. Version 4: a header of 32 bytes, a
+table of contents, and one Zstandard frame per stream. Streams:
 
     positions   3 x 24-bit fixed point (version 1: 3 x float16)
     opacities   uint8, in [0, 1]
-    colours     3 x uint8: f_dc = (u / 255 - .5) / .15
+    colors     3 x uint8: f_dc = (u / 255 - .5) / .15
     scales      3 x uint8: log scale = u / 16 - 10
     rotations   versions 1, 2: x y z as uint8, u / 127.5 - 1, w >= 0; 3, 4: the smallest three, 9 bits and a
                 sign each, and the index of the largest (x y z w)
     harmonics   uint8, (u - 128) / 128, coefficient by coefficient, rgb inner
 
-Axes are "rub", unless the extension SPZ_ADOBE_coordinate_system says otherwise. Extensions lie behind the
-streams in versions 1 to 3, before the table of contents in version 4.
+Axes are "rub", unless the extension SPZ_ADOBE_coordinate_system says otherwise. Extensions follow the
+streams in versions 1 to 3, and precede the table of contents in version 4.
 
 Source: nianticlabs/spz, src/cc/load-spz.cc and README.md.
 """
@@ -43,52 +43,52 @@ MAGIC = b"NGSP"
 OLD_HEADER, NEW_HEADER = struct.Struct("<4sIIBBBB"), struct.Struct("<4sIIBBBBI12s")
 ANTIALIASED, _EXTENSIONS = 1, 2
 _COORDINATES = 0xADBE0003
-_MOST_EXTENSIONS = 1 << 20  # bytes of them that are looked at
-COLOUR = 0.15
-_MOST_RATIO = 1040
-"""Deflate packs 1032 bytes into one at most; what claims to hold more is damaged."""
+_MAX_EXTENSION_BYTES = 1 << 20
+COLOR_SCALE = 0.15
+_MAX_DEFLATE_RATIO = 1040
+"""Maximum compression ratio; Deflate compresses at most 1032 bytes into one."""
 
-_SMALL, _USUAL_RATIO = 1 << 20, 100
-"""Bytes, and how far they are packed: real splats to a half or so, and what is larger is damaged."""
+_SMALL_BYTES, _MAX_USUAL_RATIO = 1 << 20, 100
+"""Maximum compression ratio of larger contents; real splats compress to about a half."""
 
-_PART = 1 << 19
-"""Bytes that are decompressed at a time: a file that is cut off late is refused with little memory."""
+_CHUNK_BYTES = 1 << 19
+"""Bytes decompressed at a time, so that a truncated file is refused with little memory."""
 
-_DECODED = 1 << 12
-"""Splats that are decoded at a time: each takes 600 bytes meanwhile."""
+_DECODED_SPLATS = 1 << 12
+"""Splats decoded at a time, 600 bytes each."""
 
-# Coordinate systems of the extension, by their number.
+# Coordinate systems of the extension, by number.
 _SYSTEMS = (None, "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf")
 
 
 def open_spz(path: Path) -> SplatSource:
-    """The splats of a .spz file, decompressed to a temporary one.
+    """Open .spz file, decompressed into a temporary file.
 
     Raises:
-        FieldError: a file that is no SPZ, of a version that is not known, or damaged.
+        FieldError: no SPZ file, an unknown version, or a damaged file.
     """
     with open_regular(path) as file:
         return open_spz_stream(path, file, path.stat().st_size)
 
 
 def open_spz_stream(path: Path, file: BinaryIO, size: int) -> SplatSource:
-    """The splats of the content of a .spz file, `size` bytes of an open `file`; `path` names it in messages.
+    """Splats of a .spz file's content, `size` bytes of an open `file`; `path` names it in messages.
 
     Raises:
         FieldError: as `open_spz`.
     """
     start = file.read(NEW_HEADER.size)
     if start[:4] == MAGIC:
-        return _open_new(path, file, start, size)
+        return _open_version_4(path, file, start, size)
     file.seek(0)
     try:
         with gzip.open(file) as stream:
-            return _open_old(path, stream, size)
+            return _open_gzip_version(path, stream, size)
     except (OSError, EOFError, zlib.error):
         raise _damaged(path, "it is no gzip that can be read to its end") from None
 
 
-def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile, size: int) -> SplatSource:
+def _open_gzip_version(path: Path, stream: IO[bytes] | gzip.GzipFile, size: int) -> SplatSource:
     header = stream.read(OLD_HEADER.size)
     if len(header) < OLD_HEADER.size or header[:4] != MAGIC:
         raise _damaged(path, "it does not begin as SPZ does")
@@ -97,48 +97,54 @@ def _open_old(path: Path, stream: IO[bytes] | gzip.GzipFile, size: int) -> Splat
         raise FieldError(f"{path}: SPZ of version {version}; 1 to 4 are read")
     widths = _widths(path, version, count, degree, size)
     spool = _spool()
-    left = sum(widths) * count
-    while left:
-        part = stream.read(min(left, _PART))
+    remaining = sum(widths) * count
+    while remaining:
+        part = stream.read(min(remaining, _CHUNK_BYTES))
         if not part:
-            raise _damaged(path, f"it ends {left} bytes early")
+            raise _damaged(path, f"it ends {remaining} bytes early")
         spool.write(part)
-        left -= len(part)
+        remaining -= len(part)
     axes = SPZ_AXES
     if flags & _EXTENSIONS:
-        axes = _axes_said(stream.read(_MOST_EXTENSIONS), axes)
+        axes = _axes_from_extensions(stream.read(_MAX_EXTENSION_BYTES), axes)
     return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
 
 
-def _open_new(path: Path, file: BinaryIO, start: bytes, whole: int) -> SplatSource:
+def _open_version_4(path: Path, file: BinaryIO, start: bytes, whole: int) -> SplatSource:
     if len(start) < NEW_HEADER.size:
         raise _damaged(path, "its header is cut off")
     _, version, count, degree, fraction, flags, streams, contents, _ = NEW_HEADER.unpack(start)
     if version != 4:
-        # Files of versions 1 to 3 that were left uncompressed.
+        # Uncompressed files of versions 1 to 3.
         file.seek(0)
-        return _open_old(path, file, whole)
+        return _open_gzip_version(path, file, whole)
     widths = _widths(path, version, count, degree, whole)
     axes = SPZ_AXES
     if flags & _EXTENSIONS:
-        axes = _axes_said(file.read(min(max(0, contents - NEW_HEADER.size), _MOST_EXTENSIONS)), axes)
+        axes = _axes_from_extensions(
+            file.read(min(max(0, contents - NEW_HEADER.size), _MAX_EXTENSION_BYTES)), axes
+        )
     file.seek(contents)
     table = file.read(16 * streams)
     expected = [width * count for width in widths if width]
     raw = [size for _, size in struct.iter_unpack("<QQ", table)] if len(table) == 16 * streams else []
     if raw != expected:
-        raise _damaged(path, f"its streams have {_short(raw)} bytes, expected {_short(expected)}")
+        raise _damaged(
+            path, f"its streams have {_format_sizes(raw)} bytes, expected {_format_sizes(expected)}"
+        )
     spool, at = _spool(), contents + len(table)
     for packed, size in struct.iter_unpack("<QQ", table):
-        left = size
+        remaining = size
         try:
-            with zstandard.ZstdDecompressor().stream_reader(cast(Any, _Part(file, at, packed))) as reader:
-                while left and (part := reader.read(min(left, _PART))):
+            with zstandard.ZstdDecompressor().stream_reader(
+                cast(Any, _FileRange(file, at, packed))
+            ) as reader:
+                while remaining and (part := reader.read(min(remaining, _CHUNK_BYTES))):
                     spool.write(part)
-                    left -= len(part)
+                    remaining -= len(part)
         except zstandard.ZstdError:
-            left = max(left, 1)
-        if left:
+            remaining = max(remaining, 1)
+        if remaining:
             raise _damaged(path, "one of its streams cannot be decompressed")
         at += packed
         if at > whole:
@@ -146,8 +152,8 @@ def _open_new(path: Path, file: BinaryIO, start: bytes, whole: int) -> SplatSour
     return _source(path, spool, widths, version, count, degree, fraction, flags, axes)
 
 
-class _Part:
-    """Some bytes of a file, and no more."""
+class _FileRange:
+    """Read-only view of a byte range of a file."""
 
     def __init__(self, file: BinaryIO, begin: int, size: int) -> None:
         self._file, self._at, self._left = file, begin, size
@@ -160,8 +166,8 @@ class _Part:
         return part
 
 
-def _axes_said(extensions: bytes, axes: Axes) -> Axes:
-    """The axes that an extension states: records of type (uint32), length (uint32) and content."""
+def _axes_from_extensions(extensions: bytes, axes: Axes) -> Axes:
+    """Axes stated by the extension records of type (uint32), length (uint32) and content."""
     at = 0
     while at + 8 <= len(extensions):
         kind, length = struct.unpack_from("<II", extensions, at)
@@ -174,19 +180,23 @@ def _axes_said(extensions: bytes, axes: Axes) -> Axes:
 
 
 def _widths(path: Path, version: int, count: int, degree: int, size: int) -> tuple[int, ...]:
-    """Bytes of a splat in each stream. Raises FieldError where the file cannot hold so many."""
+    """Bytes per splat of each stream. Raises FieldError where the file is too small for `count` splats."""
     if degree > 4:
         raise _damaged(path, f"harmonics of degree {degree}; at most 4 exist")
     rotation = 3 if version < 3 else 4
     widths = (6 if version == 1 else 9, 1, 3, 3, rotation, 3 * ((degree + 1) ** 2 - 1))
     total = sum(widths) * count
-    if not count or total > _MOST_RATIO * size or (total > _SMALL and total > _USUAL_RATIO * size):
+    if (
+        not count
+        or total > _MAX_DEFLATE_RATIO * size
+        or (total > _SMALL_BYTES and total > _MAX_USUAL_RATIO * size)
+    ):
         raise _damaged(path, f"it says that it holds {count} splats")
     return widths
 
 
 def _spool() -> IO[bytes]:
-    """A temporary file, in memory while it is small; it ends with the source."""
+    """Temporary file, in memory while it is small; closed together with the source."""
     return cast(IO[bytes], tempfile.SpooledTemporaryFile(max_size=1 << 22))
 
 
@@ -208,17 +218,21 @@ def _source(
         return np.frombuffer(spool.read((last - first) * widths[number]), np.uint8).reshape(last - first, -1)
 
     def batches() -> Iterator[SplatBatch]:
-        for first in range(0, count, _DECODED):
-            last = min(first + _DECODED, count)
-            positions, alpha, colours, scales, turns, rest = (
+        for first in range(0, count, _DECODED_SPLATS):
+            last = min(first + _DECODED_SPLATS, count)
+            positions, alpha, colors, scales, rotations, rest = (
                 column(number, first, last) if widths[number] else np.zeros((last - first, 0), np.uint8)
                 for number in range(6)
             )
-            sh = np.concatenate([(colours / 255.0 - 0.5) / COLOUR, (rest - 128.0) / 128.0], axis=1)
+            sh = np.concatenate([(colors / 255.0 - 0.5) / COLOR_SCALE, (rest - 128.0) / 128.0], axis=1)
             yield SplatBatch(
-                positions.view("<f2").astype(np.float64) if version == 1 else _fixed(positions, fraction),
+                positions.view("<f2").astype(np.float64)
+                if version == 1
+                else _decode_fixed_point(positions, fraction),
                 scales / 16.0 - 10.0,
-                _first_three(turns) if version < 3 else _smallest_three(turns.view("<u4")[:, 0]),
+                _decode_first_three(rotations)
+                if version < 3
+                else _decode_smallest_three(rotations.view("<u4")[:, 0]),
                 alpha[:, 0] / 255.0,
                 sh.reshape(last - first, -1, 3),
             )
@@ -226,21 +240,21 @@ def _source(
     return SplatSource(path, count, degree, axes, batches, bool(flags & ANTIALIASED))
 
 
-def _fixed(positions: NDArray[np.uint8], fraction: int) -> AnyArray:
-    """24-bit fixed point numbers [n,9] as [n,3]."""
+def _decode_fixed_point(positions: NDArray[np.uint8], fraction: int) -> AnyArray:
+    """Values [n,3] of 24-bit fixed point numbers [n,9]."""
     whole = np.zeros((len(positions), 3, 4), np.uint8)
     whole[:, :, 1:] = positions.reshape(-1, 3, 3)
     return (whole.view("<i4")[:, :, 0] >> 8) / 2.0**fraction
 
 
-def _first_three(turns: NDArray[np.uint8]) -> AnyArray:
-    xyz = turns / 127.5 - 1.0
+def _decode_first_three(rotations: NDArray[np.uint8]) -> AnyArray:
+    xyz = rotations / 127.5 - 1.0
     w = np.sqrt(np.maximum(0.0, 1.0 - (xyz**2).sum(axis=1)))
     return np.concatenate([w[:, None], xyz], axis=1)
 
 
-def _smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
-    """Quaternions [n,4] (w x y z)."""
+def _decode_smallest_three(packed: NDArray[np.uint32]) -> AnyArray:
+    """Quaternions [n,4] (w x y z) of packed integers [n]."""
     largest = (packed >> 30).astype(np.int64)
     xyzw = np.zeros((len(packed), 4))
     rest = packed.astype(np.uint32)
@@ -259,5 +273,5 @@ def _damaged(path: Path, why: str) -> FieldError:
     return FieldError(f"{path}: no SPZ file that can be read: {why}; copy or export it again")
 
 
-def _short(sizes: list[int]) -> str:
+def _format_sizes(sizes: list[int]) -> str:
     return str(sizes[:8])[:150]

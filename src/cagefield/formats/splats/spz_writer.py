@@ -1,4 +1,4 @@
-"""Writes splats as Niantic's SPZ, versions 3 and 4; the streams are described in `splat_spz`."""
+"""Writer of splats as Niantic's SPZ, versions 3 and 4; `spz` documents the streams."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from numpy.typing import NDArray
 
 from cagefield.files.atomic import replaced_file
 from cagefield.formats.splats.splat_table import OnProgress, SplatBatch, SplatTable
-from cagefield.formats.splats.spz import ANTIALIASED, COLOUR, MAGIC, NEW_HEADER, OLD_HEADER
+from cagefield.formats.splats.spz import ANTIALIASED, COLOR_SCALE, MAGIC, NEW_HEADER, OLD_HEADER
 from cagefield.typing import AnyArray
 
 Version = Literal[3, 4]
-"""Versions that are written. Spark 2.2 reads 3 and not 4; splat-transform reads both."""
+"""Writable versions. Spark 2.2 reads 3 and not 4; splat-transform reads both."""
 
-FRACTION = 12
-"""Bits of the fraction of positions, where they fit."""
+MAX_FRACTION_BITS = 12
+"""Maximum number of fractional bits of positions."""
 
-_FIRST_STEP, _STEP = 8, 16
-"""Steps to which harmonics of degree 1 and above it are rounded, as Niantic's own writer does."""
+_DEGREE_1_STEP, _HIGHER_DEGREE_STEP = 8, 16
+"""Quantization steps of harmonics of degree 1 and of higher degrees, as in Niantic's writer."""
 
 
 def write_spz(
     path: Path, table: SplatTable, on_progress: OnProgress = lambda _: None, version: Version = 3
 ) -> None:
-    """Writes splats in SPZ's axes, sorted through space: version 3, packed by gzip, or 4, by Zstandard.
+    """Write splats in SPZ's axes, in Morton order: version 3, compressed by gzip, or 4, by Zstandard.
 
-    Positions have 12 bits of fraction, fewer where they do not fit: half a step is 1.2e-4 units.
+    Positions have 12 fractional bits, fewer for large coordinates: half a step is 1.2e-4 units.
     """
     with ExitStack() as stack:
         columns = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(6)]
-        fraction = _fraction_for(table)
+        fraction = _fraction_bits(table)
         done = 0
         for batch in table.sorted_batches():
-            for file, values in zip(columns, _encoded(batch, fraction), strict=True):
+            for file, values in zip(columns, _encode(batch, fraction), strict=True):
                 file.write(values.tobytes())
             done += len(batch)
             on_progress(0.6 * done / table.count)
@@ -74,26 +74,26 @@ def _copy(source: IO[bytes], target: Any) -> None:
         target.write(part)
 
 
-def _fraction_for(table: SplatTable) -> int:
+def _fraction_bits(table: SplatTable) -> int:
     most = max(float(np.abs(batch.means).max()) for batch in table.batches())
-    return int(np.clip(np.floor(np.log2((2**23 - 1) / max(most, 1e-30))), 0, FRACTION))
+    return int(np.clip(np.floor(np.log2((2**23 - 1) / max(most, 1e-30))), 0, MAX_FRACTION_BITS))
 
 
-def _encoded(batch: SplatBatch, fraction: int) -> tuple[AnyArray, ...]:
+def _encode(batch: SplatBatch, fraction: int) -> tuple[AnyArray, ...]:
     fixed = np.clip(np.round(batch.means.astype(np.float64) * 2.0**fraction), -(2**23), 2**23 - 1)
     positions = fixed.astype("<i4").view(np.uint8).reshape(len(batch), 3, 4)[:, :, :3]
-    colours = batch.sh[:, 0].astype(np.float64) * (COLOUR * 255.0) + 0.5 * 255.0
+    colors = batch.sh[:, 0].astype(np.float64) * (COLOR_SCALE * 255.0) + 0.5 * 255.0
     rest = batch.sh[:, 1:].astype(np.float64).reshape(len(batch), -1)
-    steps = np.full(rest.shape[1], _STEP)
-    steps[:9] = _FIRST_STEP
+    steps = np.full(rest.shape[1], _HIGHER_DEGREE_STEP)
+    steps[:9] = _DEGREE_1_STEP
     rest = np.round(rest * 128.0) + 128.0
     rest = np.floor((rest + steps / 2) / steps) * steps
     return (
         positions,
         _bytes(batch.opacities.astype(np.float64) * 255.0),
-        _bytes(colours),
+        _bytes(colors),
         _bytes((batch.log_scales.astype(np.float64) + 10.0) * 16.0),
-        _packed_rotations(batch.quaternions),
+        _encode_smallest_three(batch.quaternions),
         _bytes(rest),
     )
 
@@ -102,7 +102,7 @@ def _bytes(values: AnyArray) -> NDArray[np.uint8]:
     return np.clip(np.round(values), 0, 255).astype(np.uint8)
 
 
-def _packed_rotations(quaternions: AnyArray) -> NDArray[np.uint32]:
+def _encode_smallest_three(quaternions: AnyArray) -> NDArray[np.uint32]:
     xyzw = quaternions.astype(np.float64)[:, [1, 2, 3, 0]]
     largest = np.abs(xyzw).argmax(axis=1)
     negated = np.take_along_axis(xyzw, largest[:, None], axis=1) < 0.0

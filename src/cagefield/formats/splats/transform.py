@@ -1,8 +1,8 @@
-"""Splats under an affine map x' = M x + t.
+"""Affine transformation x' = M x + t of splats.
 
-Notation: R diag(s) a splat's own axes and scales, C = R diag(s^2) R^T its covariance. C' = M C M^T = A A^T
-with A = M R diag(s) = U S V^T: the new axes are U, the new scales S. Colors turn by P, the rotation or
-rotoreflection of the polar decomposition M = P (P^T M), as those of edited splats do: exact where M is a
+Notation: R diag(s) are a splat's axes and scales, C = R diag(s^2) R^T its covariance. C' = M C M^T = A A^T
+with A = M R diag(s) = U S V^T: the new axes are U, the new scales S. Harmonics rotate by P, the rotation or
+rotoreflection of the polar decomposition M = P (P^T M), as for edited splats: exact where M is a
 similarity. Under P = -Q, Q a rotation, harmonics of odd degree change their sign.
 
 Source: Zwicker et al., "EWA Splatting" (2002), for C'; `sh_rotation` for the harmonics.
@@ -18,10 +18,10 @@ from cagefield.geometry.quaternions import quaternions_from_matrices, rotation_m
 from cagefield.typing import AnyArray, Array
 
 
-def transformed(batch: SplatBatch, matrix: Array) -> SplatBatch:
-    """The splats under the affine map of a matrix [4,4]; means in float64.
+def transform_splats(batch: SplatBatch, matrix: Array) -> SplatBatch:
+    """Splats under the affine map of a matrix [4,4]; means in float64.
 
-    Quaternions may have any length; a splat with a value that is no number keeps one.
+    Quaternions may have any length; splats with non-finite values stay invalid.
     """
     M, shift = matrix[:3, :3], matrix[:3, 3]
     if np.array_equal(M, np.eye(3)):
@@ -43,7 +43,7 @@ def transformed(batch: SplatBatch, matrix: Array) -> SplatBatch:
         with np.errstate(divide="ignore"):
             log_scales = np.where(is_number[:, None], np.log(lengths), np.nan)
     quaternions = np.where(is_number[:, None], quaternions_from_matrices(turned), np.nan)
-    return SplatBatch(means, log_scales, quaternions, batch.opacities, _turned(batch.sh, P))
+    return SplatBatch(means, log_scales, quaternions, batch.opacities, _rotate_harmonics(batch.sh, P))
 
 
 def _with_means(batch: SplatBatch, means: AnyArray) -> SplatBatch:
@@ -51,7 +51,7 @@ def _with_means(batch: SplatBatch, means: AnyArray) -> SplatBatch:
 
 
 def _axes(quaternions: AnyArray) -> tuple[Array, AnyArray]:
-    """(rotations [n,3,3], which [n] are of numbers); the identity of what has no length."""
+    """(rotations [n,3,3], mask [n] of finite quaternions); the identity for length 0."""
     values = quaternions.astype(np.float64)
     is_number = np.asarray(np.isfinite(values).all(axis=1))
     values = np.where(is_number[:, None], values, 0.0)
@@ -60,7 +60,7 @@ def _axes(quaternions: AnyArray) -> tuple[Array, AnyArray]:
     return np.asarray(rotation_matrices(unit), np.float64), is_number
 
 
-def _turned(sh: AnyArray, P: Array) -> AnyArray:
+def _rotate_harmonics(sh: AnyArray, P: Array) -> AnyArray:
     """Harmonics [n,K,3] of functions f(P^T d)."""
     degree = int(np.sqrt(sh.shape[1])) - 1
     if not degree:

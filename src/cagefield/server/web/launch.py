@@ -20,7 +20,7 @@ from cagefield.cameras.camera_paths import shared_up
 from cagefield.errors import CagefieldError
 from cagefield.fields.splat_field import SplatField
 from cagefield.files.safe_open import MOST_TEXT, FileState, check_regular, read_text, real_path
-from cagefield.formats.splats.detection import LOD_META, META, splat_folder
+from cagefield.formats.splats.detection import LOD_META, META, is_splat_folder
 from cagefield.pages.page_field import VERSION as FIELD_VERSION
 from cagefield.scene.scene import Scene
 from cagefield.scene.scene_files import field_states, is_scene, recover
@@ -55,7 +55,7 @@ def open_scene(
     another program edits.
     """
     path = path.parent if path.name in (META, LOD_META) else path
-    if path.is_file() or (splat_folder(path) and not is_scene(path)):
+    if path.is_file() or (is_splat_folder(path) and not is_scene(path)):
         return open_cached(scene_of_file(path), path, device, root)
     return open_cached(path, None, device, root)
 

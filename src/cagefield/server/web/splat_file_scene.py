@@ -55,21 +55,21 @@ def scene_of_file(file: Path) -> Path:
 
     Raises CagefieldError for a file that holds no splats.
     """
-    from cagefield.formats.splats.splat_files import open_fitting, read_opened
+    from cagefield.formats.splats.splat_files import open_within_memory, read_source
     from cagefield.scene.import_splats import import_splats
     from cagefield.scene.scene import Scene
 
     stem = stem_of(file).encode(errors="replace")[:_LONGEST].decode(errors="ignore")
     # What memory cannot hold is refused before minutes go into its digest.
     with _recorded_warnings() as lines:
-        source = open_fitting(file) if file.is_file() and check_regular(file) > _LARGE else None
+        source = open_within_memory(file) if file.is_file() and check_regular(file) > _LARGE else None
     end = None if source is None else _end(source)
     folder = opened_folder() / f"{stem}-{_digest(file, end)}"
     if is_scene(folder):
         os.utime(folder)
     else:
         with _recorded_warnings() as more:
-            found = import_splats(read_opened(source or open_fitting(file)))
+            found = import_splats(read_source(source or open_within_memory(file)))
         lines += more
         folder.parent.mkdir(parents=True, exist_ok=True)
         _tidy(folder.parent)
@@ -108,10 +108,10 @@ def _end(source: SplatSource) -> int:
 
 def _digest(file: Path, end: int | None) -> str:
     """A name for the content of a file, up to its byte `end`, and of those that it is read with."""
-    from cagefield.formats.splats.open_splats import files_of
+    from cagefield.formats.splats.open_splats import source_files
 
     content = hashlib.blake2b(digest_size=8)
-    for part in files_of(file):
+    for part in source_files(file):
         last = end if part == file else None
         with open_regular(part) as stream:
             while block := stream.read(_BLOCK if last is None else min(_BLOCK, last - stream.tell())):

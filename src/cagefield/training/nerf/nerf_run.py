@@ -21,7 +21,7 @@ from cagefield.fields.mlp import Linear, Mlp
 from cagefield.fields.nerf_field import NerfField
 from cagefield.fields.nerf_torch import TorchMlp, TorchNerf, torch_device
 from cagefield.files.atomic import replaced_file
-from cagefield.formats.torch_files import read_tensors_of
+from cagefield.formats.torch_files import read_torch_tensors
 from cagefield.rendering.nerf.nerf_renderer import Jitter, Rays, march
 from cagefield.training.checkpoint import signature_options
 from cagefield.training.checkpoint_checks import check_run
@@ -236,7 +236,7 @@ class NerfRun:
 def _read_state(path: Path) -> dict[str, Any]:
     """Contents of a file written by `NerfRun.store`, on the CPU. Raises ValueError for a damaged file."""
     try:
-        return read_tensors_of(path)
+        return read_torch_tensors(path)
     except FieldError as error:
         raise ValueError(str(error).removeprefix(f"{path}: ")) from error
 

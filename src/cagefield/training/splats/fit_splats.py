@@ -183,7 +183,7 @@ def _render_images(
     for number, camera in enumerate(cameras, start=1):
         image = renderer.render(camera, background=background, normals=True)
         if image is None:
-            raise CagefieldError("a image of the field was given up; try again")
+            raise CagefieldError("an image of the field was given up; try again")
         on_stage("Rendering", number / len(cameras), f"image {number} of {len(cameras)}")
         yield image
 
