@@ -1,7 +1,7 @@
 """Options, markers and fixtures that several test modules share.
 
-Markers by file: `browser`, `train` and `robust`, for the quick tier of contributors (CONTRIBUTING.md); `nightly`
-stands at the tests themselves.
+Markers by file: `browser`, `train` and `robust`, for the quick tier of contributors (CONTRIBUTING.md);
+`nightly` stands at the tests themselves.
 """
 
 from __future__ import annotations
