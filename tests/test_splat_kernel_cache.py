@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -11,6 +12,9 @@ from pathlib import Path
 import pytest
 
 from cagefield.compute import numba_cache
+from cagefield.files import user_cache
+
+PACKAGE = Path(numba_cache.__file__).parents[1]
 
 # `overlaps` is the kernel that compiles fastest.
 ASK = """
@@ -69,26 +73,45 @@ def test_a_disk_that_fails_in_the_middle_is_one_line_of_warning(tmp_path: Path) 
     assert "(File too large)" in line
 
 
-def test_a_change_of_what_a_module_imports_is_another_folder(
+def imported_modules(file: Path) -> set[Path]:
+    """Modules of the package whose functions and constants a kernel module imports."""
+    found: set[Path] = set()
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cagefield."):
+            for name in (str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)):
+                path = PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")
+                if path.is_file() and path.parent.name not in ("compute", "files"):
+                    found.add(path)
+    return found
+
+
+def test_a_change_of_a_module_that_kernels_import_changes_the_digest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Constants, of the harmonics for instance, are compiled into kernels of other modules."""
+    kernels = [file for file in PACKAGE.rglob("*.py") if b"numba_cache import" in file.read_bytes()]
+    modules = {file for file in kernels if file.parent.name == "kernels"}
+    modules = modules.union(*map(imported_modules, modules))
+    names = {file.relative_to(PACKAGE).as_posix() for file in modules}
+    assert {"fields/sh.py", "rendering/splats/kernels/blending.py", "warps/flow_table.py"} < names
     package = tmp_path / "cagefield"
-    source = Path(numba_cache.__file__).parents[1]
-    names = ["rendering/splats/kernels/blending.py", "rendering/splats/kernels/projection.py", "fields/sh.py"]
-    for name in names:
-        (package / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(source / name, package / name)
+    shutil.copytree(PACKAGE, package, ignore=lambda folder, names: [n for n in names if n == "static"])
+    monkeypatch.setattr(user_cache, "__file__", str(package / "files" / "user_cache.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(numba_cache, "_PACKAGE", package)
-    folder_of = numba_cache._folder_of.__wrapped__
-    blending, projection = (str(package / name) for name in names[:2])
-    before = [folder_of(blending), folder_of(projection)]
-    assert folder_of(blending) == before[0] and before[0] != before[1]
-    # The harmonics' constants are compiled into both, by way of the projection.
-    with (package / "fields" / "sh.py").open("a") as file:
-        file.write("C0 = 1.0\n")
-    assert folder_of(blending) != before[0] and folder_of(projection) != before[1]
-    between = folder_of(projection)
-    with Path(blending).open("a") as file:
-        file.write("MORE = 1.0\n")
-    assert folder_of(projection) == between
+
+    def folder() -> Path | None:
+        user_cache.source_digest.cache_clear()
+        return numba_cache._kernel_folder.__wrapped__()
+
+    try:
+        before = folder()
+        (package / "scene" / "scene.py").write_text("")
+        assert before is not None and folder() == before
+        for file in modules:
+            copy = package / file.relative_to(PACKAGE)
+            content = copy.read_bytes()
+            copy.write_bytes(content + b"C0 = 1.0\n")
+            assert folder() != before, file
+            copy.write_bytes(content)
+    finally:
+        user_cache.source_digest.cache_clear()

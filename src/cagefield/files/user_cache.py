@@ -20,10 +20,15 @@ def cache_root() -> Path:
 
 
 @functools.cache
-def source_digest(mark: bytes = b"") -> str:
-    """SHA-256 digest, 16 hexadecimal digits, of all source folders with a file that contains `mark`."""
+def source_digest(mark: bytes = b"", parents: bool = False) -> str:
+    """SHA-256 digest, 16 hexadecimal digits, of all source folders with a file that contains `mark`.
+
+    With `parents` the folders above those named `kernels` count too.
+    """
     sources = {path: path.read_bytes() for path in sorted(Path(__file__).parents[1].rglob("*.py"))}
     folders = {path.parent for path, source in sources.items() if mark in source}
+    if parents:
+        folders |= {folder.parent for folder in folders if folder.name == "kernels"}
     digest = hashlib.sha256()
     for path, source in sources.items():
         if path.parent in folders:
