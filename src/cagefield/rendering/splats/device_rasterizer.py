@@ -1,6 +1,6 @@
 """Splat rasterizer on Quadrants' device: the host side of `kernels.splat_device`, for GPUs.
 
-Layouts of images and sums equal those of `rasterizer` on the CPU. Sorting is done on the host: depths, then
+The layout of images equals that of `rasterizer` on the CPU. Sorting is done on the host: depths, then
 the tiles that each splat touches, both stable.
 """
 
@@ -16,7 +16,6 @@ from cagefield.cameras.camera import Camera
 from cagefield.compute import devices
 from cagefield.compute.devices import floats, ints
 from cagefield.rendering.splats.kernels import device_rasterizer as kernels
-from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import AREA, PACKED, TILE
 from cagefield.rendering.splats.raster_splats import DeformedSplats
 from cagefield.rendering.splats.rasterizer import DEPTH, Region, intrinsics, untiled, world_to_camera
@@ -50,17 +49,11 @@ class SplatArrays:
 
 @dataclass(frozen=True, eq=False)
 class DeviceProjection:
-    """As `splat_rasterizer.Projection`, with packed splats, `ids` and `starts` on the device.
-
-    order, firsts, slots: as there, on the host.
-    """
+    """As `splat_rasterizer.Projection`, with packed splats, `ids` and `starts` on the device."""
 
     packed: Any
     ids: Any
     starts: Any
-    order: NDArray[np.int64]
-    firsts: NDArray[np.int64]
-    slots: NDArray[np.int32]
     ends: NDArray[np.int64]
     width: int
     height: int
@@ -75,11 +68,6 @@ class DeviceProjection:
         """Tiles of the picture."""
         return len(self.ends)
 
-    @property
-    def pairs(self) -> int:
-        """Pairs (tile, splat)."""
-        return int(self.firsts[-1])
-
     def blend(self, channels: int = DEPTH) -> tuple[Float32, NDArray[np.int64]]:
         """The picture [tiles,channels,AREA], and where each tile's splats end; see `Projection.blend`."""
         out = _empty(self.tiles * channels * AREA)
@@ -89,21 +77,6 @@ class DeviceProjection:
     def picture(self, channels: int = DEPTH) -> Float32:
         """The picture [H,W,channels]."""
         return untiled(self.blend(channels)[0], self.width, self.height)
-
-    def gradients(self, colour: Float32, slopes: Float32) -> Float32:
-        """Sums [pairs, SUMS] for dL/d(picture) `slopes` [tiles,3,AREA]; see `Projection.gradients`."""
-        sums = to_device(np.zeros(max(1, self.pairs) * SUMS, np.float32))
-        kernels.gradients(
-            self.packed,
-            self.ids,
-            self.starts,
-            self.tiles,
-            ints((self.width, self.height)),
-            to_device(colour),
-            to_device(slopes),
-            sums,
-        )
-        return sums.to_numpy().reshape(-1, SUMS)[: self.pairs]
 
     def opacity_before(self, pixels: NDArray[Any], distances: NDArray[Any]) -> Float32:
         """Opacity [K] gathered before distances [K] along the rays of pixels [K,2] inside the picture."""
@@ -173,19 +146,9 @@ def project(
     tile_of = touched.to_numpy()[: int(firsts[-1])]
     by_tile = np.argsort(tile_of, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(tile_of, minlength=across * down), dtype=np.int64)])
-    slots = np.empty(len(by_tile), np.int32)
-    slots[by_tile] = np.arange(len(by_tile), dtype=np.int32)
     ids = np.repeat(order, np.diff(firsts))[by_tile].astype(np.int32)
     return DeviceProjection(
-        packed,
-        to_device(ids),
-        to_device(starts.astype(np.int32)),
-        order,
-        firsts,
-        slots,
-        starts[1:],
-        width,
-        height,
+        packed, to_device(ids), to_device(starts.astype(np.int32)), starts[1:], width, height
     )
 
 

@@ -1,8 +1,8 @@
 """Splat projection and blending on Quadrants' devices, for GPUs; see `projection` and `blending`.
 
-Notation and layouts (packed splats, sums, tiles) as there. One thread has one splat, or one pixel; a pixel is
-left once it lets less than T_MIN through, and pixels add to a pair's sums atomically. Everything is float32:
-splats as thin as a pixel and much longer than a picture come out some percent wider or narrower.
+Notation and layouts (packed splats, tiles) as there. One thread has one splat, or one pixel; a pixel is left
+once it lets less than T_MIN through. Everything is float32: splats as thin as a pixel and much longer than a
+picture come out some percent wider or narrower.
 
 The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 """
@@ -11,7 +11,6 @@ The oracle is `cagefield.rendering.splats.reference_rasterizer`.
 
 from cagefield.compute.quadrants import qd
 from cagefield.rendering.splats.kernels import blending
-from cagefield.rendering.splats.kernels.blending import SUMS
 from cagefield.rendering.splats.kernels.projection import (
     ALPHA_MAX,
     ALPHA_MIN,
@@ -288,98 +287,6 @@ def blend(
         if qd.static(channels > 5):
             for j in qd.static(range(3)):
                 out[at + (5 + j) * AREA] = normal[j]
-
-
-@qd.kernel(fastcache=True)
-def gradients(
-    packed: F32,
-    ids: I32,
-    starts: I32,
-    count: qd.i32,
-    size: ivec2,
-    colour: F32,
-    slopes: F32,
-    sums: F32,
-):
-    """Adds to the sums of all pairs, which are 0 before; see `splat_blending.gradients`."""
-    across = (size.x + TILE - 1) // TILE
-    qd.loop_config(block_dim=AREA)
-    for n in range(count * AREA):
-        t = n // AREA
-        pixel = n % AREA
-        column = (t % across) * TILE + pixel % TILE
-        line = (t // across) * TILE + pixel // TILE
-        if column < size.x and line < size.y:
-            x = qd.cast(column, qd.f32)
-            y = qd.cast(line, qd.f32)
-            at = 3 * t * AREA + pixel
-            g = vec3(slopes[at], slopes[at + AREA], slopes[at + 2 * AREA])
-            rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
-            # The pixel's sum of |alpha dC/dalpha| first: it is part of every curvature.
-            influence = 0.0
-            T = 1.0
-            e = starts[t]
-            end = starts[t + 1]
-            while e < end and T >= T_MIN:
-                row = PACKED * ids[e]
-                dy = y - packed[row + 1]
-                l = x - packed[row] + packed[row + 3] * dy
-                q = packed[row + 2] * l * l + packed[row + 4] * dy * dy
-                a = qd.min(packed[row + 5] * qd.exp(-0.5 * q), ALPHA_MAX)
-                if a >= ALPHA_MIN:
-                    w = a * T
-                    c = vec3(packed[row + 6], packed[row + 7], packed[row + 8])
-                    rest -= w * c
-                    T -= w
-                    influence += (w * c - a / (1.0 - a) * rest).norm()
-                e += 1
-            rest = vec3(colour[at], colour[at + AREA], colour[at + 2 * AREA])
-            T = 1.0
-            e = starts[t]
-            while e < end and T >= T_MIN:
-                row = PACKED * ids[e]
-                dx = x - packed[row]
-                dy = y - packed[row + 1]
-                k = packed[row + 3]
-                l = dx + k * dy
-                ex = packed[row + 2] * l
-                f = packed[row + 4] * dy
-                ey = k * ex + f
-                full = packed[row + 5] * qd.exp(-0.5 * (l * ex + dy * f))
-                a = qd.min(full, ALPHA_MAX)
-                if a >= ALPHA_MIN:
-                    w = a * T
-                    c = vec3(packed[row + 6], packed[row + 7], packed[row + 8])
-                    rest -= w * c
-                    T -= w
-                    m = SUMS * e
-                    for j in qd.static(range(3)):
-                        qd.atomic_add(sums[m + 6 + j], w * g[j])
-                    qd.atomic_add(sums[m + 9], w)
-                    qd.atomic_add(sums[m + 19], w * g.dot(g))
-                    if full <= ALPHA_MAX:
-                        slope = w * c - a / (1.0 - a) * rest
-                        v = slope.dot(g)
-                        h = slope.norm() * influence
-                        xx = ex * ex
-                        xy = ex * ey
-                        yy = ey * ey
-                        qd.atomic_add(sums[m], v)
-                        qd.atomic_add(sums[m + 1], v * ex)
-                        qd.atomic_add(sums[m + 2], v * ey)
-                        qd.atomic_add(sums[m + 3], v * xx)
-                        qd.atomic_add(sums[m + 4], v * xy)
-                        qd.atomic_add(sums[m + 5], v * yy)
-                        qd.atomic_add(sums[m + 10], h)
-                        qd.atomic_add(sums[m + 11], h * xx)
-                        qd.atomic_add(sums[m + 12], h * xy)
-                        qd.atomic_add(sums[m + 13], h * yy)
-                        qd.atomic_add(sums[m + 14], h * xx * xx)
-                        qd.atomic_add(sums[m + 15], h * xx * xy)
-                        qd.atomic_add(sums[m + 16], h * xx * yy)
-                        qd.atomic_add(sums[m + 17], h * xy * yy)
-                        qd.atomic_add(sums[m + 18], h * yy * yy)
-                e += 1
 
 
 @qd.kernel(fastcache=True)
